@@ -31,6 +31,8 @@ BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
 EXACT = Numerics(precision="double")
 """Of simulated passes: derivatives by a micrometre need double precision."""
+MOST_LOOSE = 0.1
+"""Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
 """Coefficients of forces for each value from which on noise is known well enough. Own choice."""
 SEARCH, GRID = 0.5, 0.25
@@ -139,6 +141,11 @@ def _condition(
 ) -> LineCondition:
     """The condition in which each lane draws a line of its own: the plant makes room for what is freed."""
     known = TOLERANCES | dict(tolerances or {})
+    if known["tensions"] > MOST_LOOSE:
+        raise InputError(
+            f"The tolerance of tensions must be at most {MOST_LOOSE:g} of the design's, not "
+            f"{known['tensions']:g}; name a line whose design is nearer."
+        )
     room = LineCondition(
         irregularity=1.0 if "unevenness" in free else 0.0,
         dropper_scatter=TOLERANCES["droppers"],

@@ -12,6 +12,8 @@ from .fit import INTERVAL, Fit, Found
 from .solve import WHITE
 from .values import FREE
 
+STRANGE = 0.3
+"""Share of a force that is left, by standard deviation, from which on the fit is called wrong. Own choice."""
 NAMES = {
     "tensions": "tensions",
     "droppers": "lengths of droppers",
@@ -121,6 +123,16 @@ def remarks(fit: Fit) -> list[str]:
             found.append(f"{what}: the records tell {told or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
+    strange = [
+        part.name
+        for part, (before, after) in zip(fit.parts, fit.left, strict=True)
+        if after > STRANGE * before
+    ]
+    if strange:
+        found.append(
+            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or its "
+            "positions may be wrong by half a span or more; the values mean nothing then."
+        )
     unlike = [
         part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
     ]

@@ -7,7 +7,9 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
+from panto_env.fitting.fit import fit
 from panto_env.fitting.problem import problem
+from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.line_condition import LineCondition
@@ -164,3 +166,13 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     )
     assert both.notes[0].startswith("b is left out: Run '' has only")
     assert len(both.fitting.parts) == 1
+
+
+def test_a_tolerance_of_tensions_beyond_what_one_grid_bears_is_refused(record, design, pantograph):
+    with pytest.raises(InputError, match=r"at most 0\.1 of the design's, not 0\.3"):
+        problem([record], design, pantograph, tolerances={"tensions": 0.3})
+
+
+def test_a_record_of_another_line_is_called_strange(record, pantograph):
+    found = fit([record], load_catenary("re250"), pantograph, free=("tensions",))
+    assert any(note.startswith("The fit explains little of") for note in remarks(found))
