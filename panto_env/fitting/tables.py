@@ -130,8 +130,8 @@ def remarks(fit: Fit) -> list[str]:
     ]
     if strange:
         found.append(
-            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or its "
-            "positions may be wrong by half a span or more; the values mean nothing then."
+            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or "
+            "its positions may be wrong by half a span or more; the values mean nothing then."
         )
     unlike = [
         part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
