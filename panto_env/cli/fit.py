@@ -14,7 +14,6 @@ from ..terminal import (
     Plot,
     alert,
     bars,
-    console,
     print_json,
     print_table,
     progress_console,
@@ -169,5 +168,3 @@ def _print(found: Fit, json: bool) -> None:
             print_table(table)
     for sentence in remarks(found):
         alert("Note:", sentence)
-    if not found.solution.settled:
-        console.print("More steps: repeat the command with an --output.", soft_wrap=True)

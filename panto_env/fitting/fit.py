@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.arrays import Array
 from ..estimation.innovations import Whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
@@ -91,12 +92,16 @@ class Fit:
         """Of what is left of each part, over its noise: whether it is as random as noise."""
         return self.solution.whiteness([part.measured.band for part in self.parts])
 
+    @property
+    def shifts(self) -> Array:
+        """By how much positions of each part were short, beside its rough shift, (parts,) (m)."""
+        return self.solution.state.x[len(self.problem.fitting.values) :]
+
     @cached_property
     def left(self) -> list[tuple[float, float]]:
         """Standard deviation (N) of what is compared of each part, and of what is left of it."""
-        shifts = self.solution.state.x[len(self.problem.fitting.values) :]
         found = []
-        for part, shift, left in zip(self.parts, shifts, self.solution.left, strict=True):
+        for part, shift, left in zip(self.parts, self.shifts, self.solution.left, strict=True):
             own = part.measured
             found.append((own.std(own.coefficients(own.force(float(shift)))), own.std(left)))
         return found

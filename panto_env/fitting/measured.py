@@ -49,11 +49,6 @@ class Measured:
         """Measured force (N), (places,); shift: by which the record's positions are too small (m)."""
         return np.interp(self.place, self.piece.position - self.offset + shift, self.smooth)
 
-    @property
-    def mean(self) -> float:
-        """Mean force (N)."""
-        return float(self.force().mean())
-
     @cached_property
     def kept(self) -> Index:
         """Numbers of the coefficients that are compared."""

@@ -38,8 +38,8 @@ def plot_fit(fit: Fit, title: str) -> Figure:
 def _draw_force(axes: Axes, fit: Fit) -> None:
     worst = int(np.argmax([after / before for before, after in fit.left]))
     part = fit.parts[worst]
-    own, shift = part.measured, fit.solution.state.x[len(fit.problem.fitting.values) + worst]
-    seen = own.coefficients(own.force(float(shift)))
+    own = part.measured
+    seen = own.coefficients(own.force(float(fit.shifts[worst])))
     place = own.place + fit.before
     axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
     fitted = own.back(seen - fit.solution.left[worst])

@@ -56,18 +56,14 @@ def values_table(fit: Fit, most: int = 20) -> Table:
         (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
     ]
     headings = ("value", "unit", "difference", "from", "to")
-    return Table(
-        f"Most surely unlike the design, {len(rows)} of {sum(e.differs for e in fit.found)}",
-        headings,
-        rows,
-        text_columns=2,
-    )
+    title = f"Most surely unlike the design, {len(rows)} of {len(differing)}"
+    return Table(title, headings, rows, text_columns=2)
 
 
 def parts_table(fit: Fit) -> Table:
     """A row for each piece of a record: what the fit explains of it, and whether the rest is noise."""
     rows = []
-    shifts = fit.solution.state.x[len(fit.problem.fitting.values) :] + np.array(fit.problem.shifts)
+    shifts = fit.shifts + np.array(fit.problem.shifts)
     triples = zip(fit.parts, fit.left, fit.whiteness, shifts.tolist(), strict=True)
     for part, (before, after), white, shift in triples:
         probability = f"{white.probability:.2g}"

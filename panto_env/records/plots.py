@@ -14,7 +14,6 @@ from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
 from .compare import Comparison
 from .judge import Judgement, force_spectrum
-from .samples import Samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +46,7 @@ def draw_force(axes: Axes, found: Judgement) -> None:
     """Draw the contact force of all pieces by place, with supports where known."""
     samples, lost = found.samples, []
     smooth = "as recorded, low-passed" if samples.low_passed else "low-passed at 20 Hz, not delayed"
-    for k, part in enumerate(_pieces(samples)):
+    for k, part in enumerate(samples.slices):
         raw, words = ("raw", smooth) if k == 0 else (None, None)
         position = samples.position[part]
         if not samples.low_passed:
@@ -92,15 +91,6 @@ def _thin(position: Array, force: Array) -> tuple[Array, Array]:
     return position[shown], force[shown]
 
 
-def _pieces(samples: Samples) -> list[slice]:
-    """Samples of each piece."""
-    ends = np.cumsum([len(piece.force) for piece in samples.record.pieces])
-    return [
-        slice(int(end) - len(one.force), int(end))
-        for end, one in zip(ends, samples.record.pieces, strict=True)
-    ]
-
-
 def plot_comparison(found: Comparison, title: str) -> Figure:
     """Both forces by place, above the standard deviation of each in every common span."""
     from matplotlib.figure import Figure
@@ -120,7 +110,7 @@ def draw_overlay(axes: Axes, found: Comparison) -> None:
     """Draw both forces, low-passed without delay, by place over the common spans, with supports."""
     begin, end = found.spans[0].begin, found.spans[-1].end
     samples, run = found.samples, found.run
-    for k, part in enumerate(_pieces(samples)):
+    for k, part in enumerate(samples.slices):
         label = "record" if k == 0 else None
         axes.plot(samples.position[part], samples.in_place[part], color=ORANGE, linewidth=2.6, label=label)
     force = zero_phase_low_pass(run.contact_force, run.time_step)

@@ -45,6 +45,13 @@ class Samples:
     record: Record
 
     @cached_property
+    def slices(self) -> list[slice]:
+        """Samples of each piece."""
+        ends = np.cumsum([len(piece.force) for piece in self.record.pieces])
+        pairs = zip(ends.tolist(), self.record.pieces, strict=True)
+        return [slice(end - len(piece.force), end) for end, piece in pairs]
+
+    @cached_property
     def low_passed(self) -> bool:
         """Whether the record holds low-passed forces: then they are judged as they are, losses not at all."""
         return is_low_passed(self.record.longest)

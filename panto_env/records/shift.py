@@ -76,14 +76,10 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
 
 def _on_grid(samples: Samples, places: Array) -> list[Array]:
     """Force of each piece without delay at places (m), (n,), N; nan where the piece is not."""
-    found: list[Array] = []
-    begin = 0
-    for piece in samples.record.pieces:
-        part = slice(begin, begin + len(piece.force))
-        force = samples.in_place[part]
-        found.append(np.interp(places, piece.position, force, left=np.nan, right=np.nan))
-        begin = part.stop
-    return found
+    return [
+        np.interp(places, samples.position[part], samples.in_place[part], left=np.nan, right=np.nan)
+        for part in samples.slices
+    ]
 
 
 def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, int]:
