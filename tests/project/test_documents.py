@@ -45,6 +45,7 @@ RULES = (
     Rule("panto family", "a pass for each of many seeds", "--seeds 2"),
     Rule("panto film", "hundreds of frames", "--seconds 0.1 --size 320 240"),
     Rule("panto film passive runs/demo", "wants an agent of `make demo`, which is run by hand"),
+    Rule("panto fit", f"{MINUTES}; tests/fitting/test_commands.py has short ones"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
     Rule("panto oracle --stored", "as it stands", ""),
     Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
