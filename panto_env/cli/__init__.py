@@ -97,6 +97,7 @@ def make_app() -> typer.Typer:
         catalogue,
         compare,
         diagnose,
+        drift,
         estimate,
         family,
         film,
@@ -137,6 +138,7 @@ def make_app() -> typer.Typer:
     app.command()(record.record)
     app.command()(compare.compare)
     app.command()(fit.fit)
+    app.command()(drift.drift)
     app.command()(speed.speed)
     app.command()(reproduce.reproduce)
     app.command()(rig.rig)

@@ -66,6 +66,13 @@ def fit(
             callback=writable(TABLES),
         ),
     ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            help="Write the fit itself to this file (.safetensors), for `panto drift`.",
+            callback=writable((".safetensors",)),
+        ),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -73,19 +80,20 @@ def fit(
 
     Each value comes with its 95 % interval; what the records cannot tell is said.
     Records of several speeds tell more than as many of one. A fit that is broken off goes on where it was, if
-    it is given an --output or --values.
+    it is given an --output, --values or --keep.
     """
     from ..catalog import load_catenary, load_pantograph
     from ..fitting import fit as fits
-    from ..fitting.kept import SUFFIX, identity_of, keep, kept
+    from ..fitting.kept import SUFFIX, identity_of, kept
+    from ..fitting.kept import keep as keep_state
     from ..fitting.values import USUAL
     from ..records.record_file import read_record
 
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
-    tolerances = _numbers(tolerance or [])
+    tolerances = by_kind(tolerance or [])
     records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
-    target = output or values
+    target = output or values or keep
     place = None if target is None else Path(f"{target}{SUFFIX}")
     settings = {"free": list(names), "tolerances": tolerances}
     settings |= {"line": design.model_dump_json(), "pantograph": riding.model_dump_json()}
@@ -99,7 +107,7 @@ def fit(
         def report(state: State, gain: float) -> None:
             progress.update(bar, description=f"step {state.steps}, expected gain {gain:.3g}")
             if place is not None:
-                keep(place, state, identity)
+                keep_state(place, state, identity)
 
         def working(share: float) -> None:
             progress.update(bar, description=f"derivatives, {100 * share:.0f} %")
@@ -129,7 +137,11 @@ def fit(
         if values is not None:
             from ..fitting.tables import rows_of
 
-            later(write_rows, rows_of(found), values)
+            later(write_rows, rows_of(found.found, found.before), values)
+        if keep is not None:
+            from ..fitting.stored import knowledge, store
+
+            later(lambda: store(knowledge(found, every), keep))
         if plot is not None:
             from ..analysis.plots import save
             from ..fitting.plots import plot_fit
@@ -138,7 +150,7 @@ def fit(
         _print(found, json)
 
 
-def _numbers(given: list[str]) -> dict[str, float]:
+def by_kind(given: list[str]) -> dict[str, float]:
     """Tolerances by kind. Raises InputError for a kind that is unknown, or no positive number."""
     from ..base.names import suggest
     from ..fitting.values import FREE
@@ -163,7 +175,8 @@ def _print(found: Fit, json: bool) -> None:
     if json:
         print_json(plain(found))
         return
-    for table in (parts_table(found), summary_table(found), values_table(found)):
+    summary = summary_table(found.found, found.differing, "the design")
+    for table in (parts_table(found), summary, values_table(found.differing, "the design")):
         if table.rows:
             print_table(table)
     for sentence in remarks(found):

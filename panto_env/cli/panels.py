@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 PANELS = {
     "Simulate": ("list", "line", "simulate", "sweep", "family", "film"),
     "Judge": ("report", "record", "compare", "validate", "reproduce", "speed"),
-    "Identify": ("identify", "estimate", "fit", "diagnose", "rig"),
+    "Identify": ("identify", "estimate", "fit", "drift", "diagnose", "rig"),
     "Control": ("benchmark", "tune", "oracle", "replay", "returns", "submission"),
     "Learn": ("train", "trainings", "evaluate", "export", "ablation", "dataset"),
 }

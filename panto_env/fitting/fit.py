@@ -74,6 +74,11 @@ class Fit:
         """Values of one kind."""
         return [each for each in self.found if each.value.kind == kind]
 
+    @property
+    def differing(self) -> list[Found]:
+        """Values that differ from the design."""
+        return [each for each in self.found if each.differs]
+
     @cached_property
     def correlated(self) -> list[tuple[Value, Value, float]]:
         """Pairs of told values that the records hardly tell apart, strongest first."""

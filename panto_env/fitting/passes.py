@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.machine import cores
+from ..plant.branch import Kept, go_on, keep
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics, Runs
@@ -77,35 +78,82 @@ class Passes:
             ]
         return self._plants[catenary]
 
-    def forces(self, variants: Sequence[Variant]) -> Array:
-        """Contact forces (N), (variants, steps). Raises InputError where a computation diverged."""
+    def forces(self, variants: Sequence[Variant], begins: Array | None = None) -> Array:
+        """Contact forces (N), (variants, steps). Raises InputError where a computation diverged.
+
+        begins: (variants,): from which position on the force of each may differ from the first one's (m);
+        before it, it is not computed anew. By default, all differ from the line's start on.
+        """
+        steps = np.zeros(len(variants), dtype=int)
+        if begins is not None:
+            steps = np.clip((begins / (self.speed * self.time_step)).astype(int), 0, self.steps)
         found = np.zeros((len(variants), self.steps))
         for catenary in dict.fromkeys(each.catenary for each in variants):
-            plants = self._of(catenary)
             which = [k for k, each in enumerate(variants) if each.catenary == catenary]
-            shares = np.array_split(which, max(len(plants), -(-len(which) // LANES)))
-            jobs = [(share.tolist(), plants[k % len(plants)]) for k, share in enumerate(shares) if len(share)]
-            for first in range(0, len(jobs), len(plants)):
-                now = jobs[first : first + len(plants)]
-                with ThreadPoolExecutor(len(now)) as pool:
-                    done = [pool.submit(self._run, plant, [variants[k] for k in own]) for own, plant in now]
-                    for (own, _), force in zip(now, done, strict=True):
-                        found[own] = force.result()
+            whole = [k for k in which if steps[k] == 0 or catenary != variants[0].catenary]
+            self._side_by_side(
+                catenary, [(share, None) for share in _shares(whole, cores())], variants, found
+            )
+            late = sorted(set(which) - set(whole), key=lambda k: steps[k])
+            shares = _shares(late)
+            firsts = [int(steps[share[0]]) for share in shares]
+            if shares:
+                kept = self._kept(variants[0], firsts)
+                found[late] = found[0]
+                self._side_by_side(catenary, list(zip(shares, kept, strict=True)), variants, found)
         return found
 
-    def _run(self, plant: Plant, variants: Sequence[Variant]) -> Array:
-        """Contact forces (N), (variants, steps), each in one of the plant's first lanes."""
-        count, table = len(variants), self._samples(plant)
+    def _side_by_side(
+        self,
+        catenary: FlexibleCatenaryData,
+        shares: Sequence[tuple[list[int], Kept | None]],
+        variants: Sequence[Variant],
+        found: Array,
+    ) -> None:
+        """Compute shares of the variants, from a kept state on or from the line's start, a plant for each."""
+        plants = self._of(catenary)
+        for first in range(0, len(shares), len(plants)):
+            now = shares[first : first + len(plants)]
+            with ThreadPoolExecutor(len(now)) as pool:
+                done = [
+                    pool.submit(self._run, plant, [variants[k] for k in own], kept)
+                    for (own, kept), plant in zip(now, plants, strict=False)
+                ]
+                for (own, _), force in zip(now, done, strict=True):
+                    part = force.result()
+                    found[own, self.steps - part.shape[1] :] = part
+
+    def _kept(self, variant: Variant, steps: Sequence[int]) -> list[Kept]:
+        """States of a variant's pass after numbers of steps, in rising order."""
+        plant = self._of(variant.catenary)[0]
+        self._start(plant, [variant])
+        table, kept, done = self._samples(plant), [], 0
+        for end in steps:
+            plant.advance_passively(end - done, table, 1)
+            kept.append(keep(plant, 0))
+            done = end
+        return kept
+
+    def _start(self, plant: Plant, variants: Sequence[Variant]) -> None:
         plant.start(
-            np.arange(count),
+            np.arange(len(variants)),
             self.speed,
             [each.line for each in variants],
             [[each.pantograph] for each in variants],
             np.array([[each.static_force for each in variants]]),
         )
-        plant.advance_passively(self.steps, table, count)
-        force = table.rows[:count, 1:, 0, Row.CONTACT_FORCE].copy()
-        if not (np.isfinite(force).all() and np.abs(force).max() < LARGEST_FORCE):
+
+    def _run(self, plant: Plant, variants: Sequence[Variant], kept: Kept | None) -> Array:
+        """Contact forces (N), (variants, steps), from a kept state on or from the line's start."""
+        count, table = len(variants), self._samples(plant)
+        if kept is None:
+            self._start(plant, variants)
+        else:
+            go_on(plant, [each.line for each in variants], kept)
+        first = int(plant.of(0, Row.STEP))
+        plant.advance_passively(self.steps - first, table, count)
+        force = table.rows[:count, first + 1 :, 0, Row.CONTACT_FORCE].copy()
+        if not (np.isfinite(force).all() and np.abs(force).max(initial=0.0) < LARGEST_FORCE):
             raise InputError(
                 "A simulated pass diverged while the line was fitted; check the pantograph, or free fewer "
                 "values."
@@ -119,3 +167,9 @@ class Passes:
             uplift=np.zeros((plant.lanes, self.steps + 1, 0)),
             tension=np.zeros((plant.lanes, self.steps + 1, 0), dtype=np.float32),
         )
+
+
+def _shares(which: Sequence[int], least: int = 1) -> list[list[int]]:
+    """Numbers of variants in shares of even size, at most as many as a plant has lanes; ``least`` shares."""
+    count = min(len(which), max(least, -(-len(which) // LANES)))
+    return [share.tolist() for share in np.array_split(which, count)] if count else []

@@ -29,8 +29,8 @@ END = 20.0
 on."""
 BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
-EXACT = Numerics(precision="double")
-"""Of simulated passes: derivatives by a micrometre need double precision."""
+NUMERICS = Numerics()
+"""Of simulated passes."""
 MOST_LOOSE = 0.1
 """Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
@@ -85,7 +85,7 @@ def problem(
                 notes.append(f"{name} is left out: {error}")
                 continue
             facts = line, pantograph, condition, piece.speed, min(end + END, distance), spans
-            passes = Passes(*facts, EXACT)
+            passes = Passes(*facts, NUMERICS)
             droppers, supports = passes.droppers, passes.supports
             parts.append(Part(own, passes, name, is_low_passed(piece)))
     if not parts:

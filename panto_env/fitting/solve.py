@@ -41,6 +41,9 @@ WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 FRESH = 10.0
 """How many times that much a first step with new derivatives may bring for them to be good to the end."""
+FIRST = 0.1
+"""Differences from which derivatives are taken at first, as a share of tolerances. A dropper 0.1 mm shorter
+pulls with 10 N more, and goes slack later: they lead near the end, but are no ground for intervals."""
 WIDE = 1.0
 """Standard deviations of the differences from which derivatives are taken, once it is known how uncertain
 values are. Droppers that go slack bend the course of the force; small differences only see the nearest bend.
@@ -134,15 +137,16 @@ class Fitting:
         Where what is left is not like noise, values may have settled where only small steps lead to nothing
         better. Then the noise is held down for some steps, which lets values move further, and found anew.
         """
-        best = self._settle(state, np.inf, report, working)
+        best = self._settle(state, None, np.inf, report, working)
         for _ in range(PUSHES):
             if best.like_noise(self._bands):
                 break
             level = float(np.median(best.state.noise))
             pushed = best
             for share in PUSHED:
-                pushed = self._settle(pushed.state, max(share * level, HOPED), report, working)
-            found = self._settle(pushed.state, np.inf, report, working)
+                most = max(share * level, HOPED)
+                pushed = self._settle(pushed.state, pushed.covariance, most, report, working)
+            found = self._settle(pushed.state, pushed.covariance, np.inf, report, working)
             if not found.size < LESS * best.size:
                 break
             best = found
@@ -151,13 +155,20 @@ class Fitting:
     def _settle(
         self,
         state: State,
+        covariance: Array | None,
         most: float,
         report: Callable[[State, float], None],
         working: Callable[[float], None],
     ) -> Solution:
-        """Iterate until a further step would change little, with a noise of up to ``most`` (N)."""
-        differences, begin = np.diag(self.values.steps), state.steps
-        steps = STEPS if most == np.inf else PUSH_STEPS
+        """Iterate until a further step would change little, with a noise of up to ``most`` (N).
+
+        covariance: of the values, where it is known how uncertain they are.
+        """
+        begin, steps = state.steps, STEPS if most == np.inf else PUSH_STEPS
+        known = covariance is not None
+        differences = (
+            np.diag(FIRST * self.values.tolerances) if covariance is None else self._uncertain(covariance)
+        )
         while True:
             state, blocks, left = self._derivatives(state, differences, working)
             first = None  # expected decrease by the first step with these derivatives
@@ -171,20 +182,25 @@ class Fitting:
                 state = State(state.x, state.static_forces, noise, state.steps)
                 report(state, gain)
                 first = gain if first is None else first
-                settled = gain < self._done and first < FRESH * self._done
+                settled = known and gain < self._done and first < FRESH * self._done
                 if settled or state.steps >= begin + steps:
                     return Solution(state, covariance, tuple(left), settled)
                 before = self._sum(left, noise, state.x)
                 state, left, after = self._step(state, step)
                 if gain < self._done or before - after < KEPT * gain:
-                    differences = self._uncertain(covariance)
+                    differences, known = self._uncertain(covariance), True
                     break
 
     def _uncertain(self, covariance: Array) -> Array:
-        """Differences, (values, values), a row each, along which values are uncertain, by as much."""
-        count, scale = len(self.values), self.values.tolerances
-        sizes, directions = np.linalg.eigh(covariance[:count, :count] / np.outer(scale, scale))
-        found: Array = WIDE * np.sqrt(np.maximum(sizes, 1e-12))[:, None] * directions.T * scale
+        """Differences, (values, values), a row each, along which values are uncertain, by as much.
+
+        They are columns of the covariance's Cholesky factor, in the order in which values come to act: the
+        later ones leave the beginning of a pass as it is, which then need not be computed anew.
+        """
+        count = len(self.values)
+        order = np.argsort(self.values.begins, kind="stable")
+        found = np.zeros((count, count))
+        found[:, order] = WIDE * np.linalg.cholesky(covariance[np.ix_(order, order)]).T
         return found
 
     def _derivatives(
@@ -195,10 +211,11 @@ class Fitting:
         static, count = state.static_forces.copy(), len(self.values)
         now = state.x[:count]
         changed = [now, *(now + each for each in differences)]
+        begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences)]
         for k, part in enumerate(self.parts):
             working(k / len(self.parts))
             variants = [self.values.variant(each, static[k]) for each in changed]
-            force, *others = self._sampled(part, variants)
+            force, *others = self._sampled(part, variants, np.array(begins))
             by_value = np.linalg.solve(differences, np.array(others) - force)
             shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
@@ -230,13 +247,16 @@ class Fitting:
         misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
         return misfit + float(np.sum((x / self.prior) ** 2))
 
-    def _sampled(self, part: Part, variants: Sequence[Variant]) -> Array:
-        """Low-passed forces of variants at the places that are compared, (n, places) (N)."""
+    def _sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
+        """Low-passed forces of variants at the places that are compared, (n, places) (N).
+
+        begins: as ``Passes.forces`` takes them.
+        """
         passes, place = part.passes, part.measured.place
-        forces = passes.forces(variants)
+        forces = passes.forces(variants, begins)
         if part.low_passed:
             forces = low_pass(forces, passes.time_step)
-        smooth = (zero_phase_low_pass(force, passes.time_step) for force in forces)
+        smooth = zero_phase_low_pass(forces, passes.time_step)
         return np.array([np.interp(place, passes.position, force) for force in smooth])
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,39 +25,41 @@ NAMES = {
 }
 
 
-def summary_table(fit: Fit) -> Table:
-    """A row for each kind of value: how many, how many are told, and how well."""
+def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: str) -> Table:
+    """A row for each kind of value: how many, how many are told, how many differ, and how well they are known.
+
+    unlike: what values that differ are unlike.
+    """
     rows = []
     for kind in FREE:
-        found = fit.of_kind(kind)
-        if not found:
+        own = [each for each in found if each.value.kind == kind]
+        if not own:
             continue
-        told, unit, scale = [each for each in found if each.told], found[0].value.unit, found[0].value.scale
-        size = [INTERVAL * scale * each.deviation for each in found]
-        differing = sum(each.differs for each in found)
+        unit, scale = own[0].value.unit, own[0].value.scale
+        size = [INTERVAL * scale * each.deviation for each in own]
         rows.append(
             (
                 f"{NAMES[kind]} ({unit})",
-                f"{len(found)}",
-                f"{len(told)}",
-                f"{differing}",
-                number(float(np.sqrt(np.mean([(scale * each.difference) ** 2 for each in found]))), 2),
+                f"{len(own)}",
+                f"{sum(each.told for each in own)}",
+                f"{sum(each.value.kind == kind for each in differing)}",
+                number(float(np.sqrt(np.mean([(scale * each.difference) ** 2 for each in own]))), 2),
                 number(float(np.median(size)), 2),
             )
         )
-    headings = ("values", "number", "told", "unlike the design", "rms difference", "95 % interval ±, median")
+    headings = ("values", "number", "told", f"unlike {unlike}", "rms difference", "95 % interval ±, median")
     return Table("What the records tell", headings, rows)
 
 
-def values_table(fit: Fit, most: int = 20) -> Table:
-    """The values that differ most surely from the design."""
-    differing = [each for each in fit.found if each.differs and each.value.kind != "unevenness"]
-    found = sorted(differing, key=lambda each: -_sure(each))[:most]
+def values_table(differing: Sequence[Found], unlike: str, most: int = 20) -> Table:
+    """The values that most surely differ, waves of the running surface left out."""
+    named = [each for each in differing if each.value.kind != "unevenness"]
+    found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:most]
     rows = [
         (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
     ]
     headings = ("value", "unit", "difference", "from", "to")
-    title = f"Most surely unlike the design, {len(rows)} of {len(differing)}"
+    title = f"Most surely unlike {unlike}, {len(rows)} of {len(named)}"
     return Table(title, headings, rows, text_columns=2)
 
 
@@ -90,21 +93,21 @@ def parts_table(fit: Fit) -> Table:
     return Table("What is left of each record", headings, rows)
 
 
-def rows_of(fit: Fit) -> list[dict[str, Any]]:
-    """A row for each value, for a file."""
+def rows_of(found: Sequence[Found], before: float = 0.0) -> list[dict[str, Any]]:
+    """A row for each value, for a file; before: way along the line before their places (m)."""
     return [
         {
             "kind": each.value.kind,
             "name": each.value.name,
             "unit": each.value.unit,
-            "position": None if each.value.place is None else each.value.place + fit.before,
+            "position": None if each.value.place is None else each.value.place + before,
             "difference": each.value.scale * each.difference,
             "low": each.value.scale * each.interval[0],
             "high": each.value.scale * each.interval[1],
             "tolerance": each.value.scale * each.value.tolerance,
             "told": each.told,
         }
-        for each in fit.found
+        for each in found
     ]
 
 
@@ -146,10 +149,6 @@ def _signed(each: Found, *values: float) -> list[str]:
     return [f"{each.value.scale * value:+.2f}" for value in values]
 
 
-def _sure(each: Found) -> float:
-    return abs(each.difference) / each.deviation
-
-
 def plain(fit: Fit) -> dict[str, Any]:
     """All that was found, as plain data."""
     triples = zip(fit.parts, fit.left, fit.whiteness, strict=True)
@@ -159,6 +158,6 @@ def plain(fit: Fit) -> dict[str, Any]:
             {"name": part.name, "compared": before, "left": after, "as_noise": white.probability}
             for part, (before, after), white in triples
         ],
-        "values": rows_of(fit),
+        "values": rows_of(fit.found, fit.before),
         "notes": remarks(fit),
     }

@@ -31,17 +31,8 @@ TOLERANCES = {
 }
 """Standard deviations of values about the design, before any record is seen: those of a line as built
 (``LINE_CONDITIONS``); of damping and pantograph own choice."""
-STEPS = {
-    "tensions": 1e-5,
-    "droppers": 1e-6,
-    "supports": 1e-6,
-    "damping": 1e-4,
-    "pantograph": 1e-5,
-    "unevenness": 1e-6,
-}
-"""Differences by which derivatives are found. A dropper 0.1 mm shorter pulls with 10 N more, and goes slack
-later: its derivative then is off by 5 %, and that of a smooth shift of all droppers, which a force hardly
-shows, by ten times its size. With a micrometre both are exact, in double precision."""
+LEAD = {"droppers": 3, "supports": 6}
+"""Spans ahead of the train from which on a value acts on the force: before, by less than a millionth."""
 CHAIN = ("masses", "stiffnesses", "dampings")
 
 
@@ -54,7 +45,6 @@ class Value:
     unit: str  # for people; "" for a relative one
     scale: float  # from the value to this unit
     tolerance: float  # standard deviation before any record is seen
-    step: float  # for its derivative
     place: float | None  # along the line (m); None where it acts everywhere
     index: tuple[Any, ...]  # of what it is
 
@@ -104,9 +94,11 @@ class Values:
         return np.array([value.tolerance for value in self.all])
 
     @cached_property
-    def steps(self) -> Array:
-        """(values,)."""
-        return np.array([value.step for value in self.all])
+    def begins(self) -> Array:
+        """(values,): position from which on each acts on the force (m); 0 where it acts everywhere."""
+        span = self.design.catenary.alignment(self.design.spans).mean_length
+        found = [0.0 if each.place is None else each.place - LEAD[each.kind] * span for each in self.all]
+        return np.maximum(found, 0.0)
 
     def of_kind(self, kind: str) -> list[int]:
         """Numbers of the values of a kind."""
@@ -193,7 +185,7 @@ class Values:
     def _value(
         self, kind: str, name: str, unit: str, scale: float, place: float | None, *index: Any
     ) -> Value:
-        return Value(kind, name, unit, scale, self._tolerances[kind], STEPS[kind], place, index)
+        return Value(kind, name, unit, scale, self._tolerances[kind], place, index)
 
 
 def _rows(waves: Array) -> Array:

@@ -6,7 +6,7 @@ line.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -74,17 +74,25 @@ def low_pass_from(
 
 
 def zero_phase_low_pass(force: Array, time_step: float) -> Array:
-    """Contact force (N) with the attenuation of ``low_pass`` but without delay, for pictures along a line.
+    """Contact force (N), (..., n), with the attenuation of ``low_pass`` but without delay, by place.
 
     Its σ equals that of ``low_pass``; single peaks differ, because a causal filter also shifts phases.
     Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
     """
+    count = force.shape[-1]
+    beyond = min(count - 1, round(MIRRORED / time_step))
+    around = [(0, 0)] * (force.ndim - 1) + [(beyond, beyond)]
+    mirrored = np.pad(force, around, mode="reflect", reflect_type="odd")
+    whole = mirrored.shape[-1]
+    filtered = np.fft.irfft(_attenuation(whole, time_step) * np.fft.rfft(mirrored), whole)
+    return np.asarray(filtered[..., beyond : whole - beyond])
+
+
+@lru_cache(maxsize=16)
+def _attenuation(count: int, time_step: float) -> Array:
+    """Magnitude of the filter's response at the frequencies of ``count`` samples."""
     from scipy.signal import freqz_sos  # slow to import
 
     sections, _ = low_pass_sections(time_step)
-    before, after = (min(len(force) - 1, round(MIRRORED / time_step)),) * 2
-    mirrored = np.pad(force, (before, after), mode="reflect", reflect_type="odd")
-    frequency = np.fft.rfftfreq(len(mirrored))
-    _, response = freqz_sos(sections, worN=2 * np.pi * frequency)
-    filtered = np.fft.irfft(np.abs(response) * np.fft.rfft(mirrored), len(mirrored))
-    return np.asarray(filtered[before : len(mirrored) - after])
+    _, response = freqz_sos(sections, worN=2 * np.pi * np.fft.rfftfreq(count))
+    return np.abs(response)

@@ -50,7 +50,7 @@ def record_of(**settings):
 def coarse():
     """Forces of a fit are those of runs with accuracy="fast": as these tests' records, and twice as fast."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(problem, "EXACT", Numerics(precision="double", accuracy="fast"))
+        patch.setattr(problem, "NUMERICS", Numerics(accuracy="fast"))
         yield
 
 

@@ -144,7 +144,7 @@ def test_a_file_that_cannot_be_written_leaves_none(done, tmp_path):
 
 
 def test_tables_say_what_was_found(done):
-    rows = {row["name"]: row for row in rows_of(done)}
+    rows = {row["name"]: row for row in rows_of(done.found, done.before)}
     dropper = rows["dropper 4 of span 12"]
     assert dropper["difference"] == 3.0
     assert (dropper["low"], dropper["high"]) == pytest.approx((3 - 0.98, 3 + 0.98))
@@ -152,9 +152,9 @@ def test_tables_say_what_was_found(done):
     assert dropper["told"] is True
     assert rows["dropper 9 of span 12"]["told"] is False
     assert "dropper 1 of span 1" not in rows  # before what is compared
-    told = {row[0]: row for row in summary_table(done).rows}
+    told = {row[0]: row for row in summary_table(done.found, done.differing, "the design").rows}
     assert told["lengths of droppers (mm)"][1:4] == ("42", "2", "2")
-    names = [row[0] for row in values_table(done).rows]
+    names = [row[0] for row in values_table(done.differing, "the design").rows]
     assert names[0] == "tension of the messenger wire"
     assert set(names) == set(FOUND) - {"dropper 9 of span 12"}
     notes = remarks(done)

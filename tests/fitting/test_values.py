@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.values import FREE, STEPS, TOLERANCES, USUAL, Design, Values
+from panto_env.fitting.values import FREE, TOLERANCES, USUAL, Design, Values
 from panto_env.plant.line_condition import IRREGULARITY, LineCondition
 
 SPANS = 14
@@ -75,7 +75,6 @@ def test_tolerances(plan):
     assert own["support 1"] == TOLERANCES["supports"]
     # Parts of a wave of a drawn phase: cosine and sine of it have half its power each.
     assert own["sine of waves of 5 m"] == IRREGULARITY[1][1] / np.sqrt(2)
-    assert values.steps[values.of_kind("droppers")[0]] == STEPS["droppers"]
 
 
 def test_the_design_is_the_variant_of_zeros(plan):

@@ -216,16 +216,28 @@ def begin_window(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
     bind(take_start, pack(line, wire), 0)(lane)
 
 
+def slots_of_links(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, Index, Index]:
+    """Number along the line, set and segment of each link in a lane's window, in no order."""
+    numbers, slots, first = [], [], len(line.link_row)
+    for things, here in (
+        (line.scattered.links, wire.scattered.links),
+        (line.scattered.hung, wire.scattered.hung),
+    ):
+        own, sets = np.flatnonzero(here.number[lane] >= 0), here.node.shape[1]
+        numbers.append(things.number[here.number[lane][own]])
+        slots.append((first + own % max(sets, 1), own // max(sets, 1)))
+        first += sets
+    alike = len(line.link_set)  # of spans that are alike
+    numbers.append(int(wire.travelled[lane]) * (alike // line.window) + np.arange(alike))
+    slots.append((line.link_set, line.link_segment))
+    sets, segments = np.concatenate(slots, axis=1)
+    return np.concatenate(numbers), sets, segments
+
+
 def present(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, Array]:
     """Numbers of the links in a lane's window along the line, (links,), and their tension (N)."""
-    numbers, tensions, first = [], [], len(line.link_row)
-    all_tensions, (along, held) = wire.static[lane] + wire.change[lane], (line.scattered, wire.scattered)
-    for things, here in ((along.links, held.links), (along.hung, held.hung)):
-        slots, sets = np.flatnonzero(here.number[lane] >= 0), here.node.shape[1]
-        numbers.append(things.number[here.number[lane][slots]])
-        tensions.append(all_tensions[first + slots % max(sets, 1), slots // max(sets, 1)])
-        first += sets
-    number, tension = np.concatenate(numbers), np.concatenate(tensions)
+    number, sets, segments = slots_of_links(line, wire, lane)
+    tension = (wire.static[lane] + wire.change[lane])[sets, segments]
     order = np.argsort(number)
     return number[order], tension[order]
 

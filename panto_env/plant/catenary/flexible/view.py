@@ -49,7 +49,7 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
     for part in tension_lengths(data) if line.pairs > 1 else ():
         used[(x >= part.in_use[0]) & (x <= part.in_use[1])] = part.pair
     ropes = _ropes(model, shape, lane, x, messengers)
-    number, tension = _links(model, lane)
+    number, tension = present(model.line, model.wire, lane)
     droppers = model.droppers[number]
     hanging = (droppers >= begin) & (droppers <= end)
     number, droppers, tension = number[hanging], droppers[hanging], tension[hanging]
@@ -70,17 +70,6 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
         further=tuple(further),
         slack=tension <= 0,
     )
-
-
-def _links(model: FlexibleCatenary, lane: int) -> tuple[Index, Array]:
-    """Numbers of the droppers in a lane's window, (n,), in their order, and their tension (N)."""
-    line, wire = model.line, model.wire
-    if line.scattered.mobility.size:
-        return present(line, wire, lane)
-    links = line.link_set.size
-    first = int(wire.travelled[lane]) * (links // line.window)
-    tension = (wire.static[lane] + wire.change[lane])[line.link_set, line.link_segment]
-    return first + np.arange(links), tension
 
 
 def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:

@@ -1,0 +1,137 @@
+"""What of a line has changed between two fits, with the uncertainty of both.
+
+With x the values at the earlier fit and d their changes since, fits to the earlier and later records are
+Gaussian likelihoods of x and of x + d; x has the fits' tolerances as prior, d has tolerances of its own. What
+records hardly tell of a line, such as a smooth shift of all droppers, is in both fits and falls out: changes
+are known better than the line is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from .fit import Found
+from .stored import Stored
+from .values import Value
+
+SMALLER = 0.5
+"""Standard deviations of changes, before any record is seen, as a share of the tolerances of a line as built.
+Own choice."""
+FALSE = 0.05
+"""Share of changes that are named although there are none (Benjamini and Hochberg, 1995)."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Changes of values from an earlier fit to a later one; each counts from the earlier one."""
+
+    earlier: Stored
+    later: Stored
+    found: tuple[Found, ...]  # changes, along what both fits compared
+    surely: tuple[bool, ...]  # whether each is named as changed
+
+    def of_kind(self, kind: str) -> list[Found]:
+        """Changes of one kind of values."""
+        return [each for each in self.found if each.value.kind == kind]
+
+    @property
+    def changed(self) -> list[Found]:
+        """Values that have changed, most surely first."""
+        pairs = zip(self.found, self.surely, strict=True)
+        named = [each for each, sure in pairs if sure]
+        return sorted(named, key=lambda each: -abs(each.difference) / each.deviation)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Why it is less sure than it says."""
+        return *self.earlier.notes, *self.later.notes
+
+
+def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None = None) -> Drift:
+    """What has changed between two fits that count from one design.
+
+    tolerances: standard deviations of changes by kind, instead of half of the fits' own. Raises InputError
+    where the fits count from different designs or tolerances, free different kinds, or share no stretch.
+    """
+    _check_alike(earlier, later)
+    values = {value.name: value for known in (earlier, later) for value in known.values}
+    names, given = list(values), dict(tolerances or {})
+    prior = np.array([value.tolerance for value in values.values()])
+    usual = np.array([given.get(each.kind, SMALLER * each.tolerance) for each in values.values()])
+    (first, first_pull), (second, second_pull) = (_likelihood(known, names) for known in (earlier, later))
+    count = len(names)
+    precision = np.block(
+        [[np.diag(prior**-2) + first + second, second], [second, np.diag(usual**-2) + second]]
+    )
+    covariance = np.linalg.inv(precision)
+    change = (covariance @ np.concatenate([first_pull + second_pull, second_pull]))[count:]
+    deviation = np.sqrt(np.diag(covariance)[count:])
+    begin, end = _common(earlier, later)
+    both = {value.name for value in earlier.values} & {value.name for value in later.values}
+    found = [
+        Found(replace(value, tolerance=float(tolerance)), float(by), float(error))
+        for value, tolerance, by, error in zip(values.values(), usual, change, deviation, strict=True)
+        if value.name in both and (value.place is None or begin <= value.place <= end)
+    ]
+    return Drift(earlier, later, tuple(found), tuple(_named(found)))
+
+
+def _likelihood(known: Stored, names: Sequence[str]) -> tuple[Array, Array]:
+    """Information matrix, (n, n), and right side, (n,), of a fit's records alone, of values by name."""
+    where = np.array([names.index(value.name) for value in known.values])
+    inverse = np.linalg.inv(known.covariance)
+    information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
+    own = 0.5 * (inverse + inverse.T) - np.diag([value.tolerance**-2 for value in known.values])
+    information[np.ix_(where, where)] = own
+    pull[where] = inverse @ known.difference
+    return information, pull
+
+
+def _named(found: Sequence[Found]) -> list[bool]:
+    """Which changes are named: of those that the records tell, so that few are false."""
+    from scipy.stats import false_discovery_control, norm  # slow to import
+
+    told = [number for number, each in enumerate(found) if each.told]
+    sure = [False] * len(found)
+    if told:
+        sizes = np.array([abs(found[number].difference) / found[number].deviation for number in told])
+        for number, share in zip(told, false_discovery_control(2 * norm.sf(sizes)), strict=True):
+            sure[number] = bool(share < FALSE)
+    return sure
+
+
+def _check_alike(earlier: Stored, later: Stored) -> None:
+    if earlier.design != later.design:
+        raise InputError(
+            f"The fits to {earlier.name} and {later.name} count from different lines or pantographs; fit both "
+            "with the same --line and --pantograph."
+        )
+    if _tolerances(earlier.values) != _tolerances(later.values):
+        raise InputError(
+            f"The fits to {earlier.name} and {later.name} free different values, or with different "
+            "tolerances; fit both with the same --free and --tolerance."
+        )
+    begin, end = _common(earlier, later)
+    if not begin < end:
+        raise InputError(
+            f"The fit to {earlier.name} is of {earlier.compared[0]:,.0f} to {earlier.compared[1]:,.0f} m, that to "
+            f"{later.name} of {later.compared[0]:,.0f} to {later.compared[1]:,.0f} m; give fits of one stretch."
+        )
+
+
+def _common(earlier: Stored, later: Stored) -> tuple[float, float]:
+    """Stretch that both fits compared (m)."""
+    pairs = earlier.compared, later.compared
+    return max(begin for begin, _ in pairs), min(end for _, end in pairs)
+
+
+def _tolerances(values: Sequence[Value]) -> dict[str, set[float]]:
+    found: dict[str, set[float]] = {}
+    for value in values:
+        found.setdefault(value.kind, set()).add(value.tolerance)
+    return found

@@ -1,0 +1,104 @@
+"""What a fit knows, in a file: its values and how uncertain they are, singly and together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.array_file import read_arrays, write_arrays
+from ..base.arrays import Array
+from ..base.errors import InputError
+from .fit import Fit
+from .solve import WHITE
+from .values import Value
+
+SUFFIXES = (".safetensors",)
+"""Of the file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """Values of a fit, as differences from its design, and their covariance."""
+
+    name: str  # of its records
+    design: str  # line and pantograph that they count from, as JSON
+    values: tuple[Value, ...]  # all of them, with places along the line (m)
+    difference: Array  # (values,)
+    covariance: Array  # (values, values)
+    compared: tuple[float, float]  # stretch of the line that the records cover (m)
+    notes: tuple[str, ...]  # why it is less sure than it says
+
+
+def knowledge(fit: Fit, records: str) -> Stored:
+    """What a fit knows. records: their names."""
+    fitting, before = fit.problem.fitting, fit.before
+    design, count = fitting.values.design, len(fitting.values)
+    values = tuple(_along(each, before) for each in fitting.values.all)
+    notes = []
+    if not fit.solution.settled:
+        notes.append(f"The fit to {records} has not settled.")
+    if min(white.probability for white in fit.whiteness) < WHITE:
+        notes.append(f"What the fit to {records} left is not like noise.")
+    begin, end = fit.problem.stretch
+    return Stored(
+        name=records,
+        design=f"{design.catenary.model_dump_json()}\n{design.pantograph.model_dump_json()}",
+        values=values,
+        difference=fit.solution.state.x[:count],
+        covariance=fit.solution.covariance[:count, :count],
+        compared=(begin + before, end + before),
+        notes=tuple(notes),
+    )
+
+
+def store(known: Stored, path: str | Path) -> None:
+    """Write what a fit knows, whole or not at all. Raises InputError where it cannot be written."""
+    table = {
+        "name": known.name,
+        "design": known.design,
+        "values": [asdict(value) for value in known.values],
+        "compared": list(known.compared),
+        "notes": list(known.notes),
+    }
+    arrays = {"difference": known.difference, "covariance": known.covariance}
+    write_arrays(path, table, {name: np.ascontiguousarray(array) for name, array in arrays.items()})
+
+
+def stored(path: str | Path) -> Stored:
+    """What a fit knew. Raises InputError for a file that `panto fit` did not write."""
+    try:
+        table, arrays = read_arrays(path)
+        values = tuple(Value(**each | {"index": tuple(each["index"])}) for each in table["values"])
+        found = Stored(
+            name=table["name"],
+            design=table["design"],
+            values=values,
+            difference=arrays["difference"],
+            covariance=arrays["covariance"],
+            compared=_pair(table["compared"]),
+            notes=tuple(table["notes"]),
+        )
+    except OSError as error:
+        raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} does not hold a fit; give a file that `panto fit --keep` wrote.") from error
+    if found.covariance.shape != (len(values), len(values)) or found.difference.shape != (len(values),):
+        raise InputError(f"{path} does not hold a whole fit; write it anew with `panto fit --keep`.")
+    return found
+
+
+def _along(value: Value, before: float) -> Value:
+    """A value with its place on the line, of which some way lies before what was simulated (m)."""
+    if value.place is not None:
+        return replace(value, place=value.place + before)
+    # Waves have their phase where the simulated spans begin.
+    apart = value.kind == "unevenness" and before
+    return replace(value, name=f"{value.name} from {before:g} m on") if apart else value
+
+
+def _pair(numbers: Sequence[float]) -> tuple[float, float]:
+    begin, end = numbers
+    return float(begin), float(end)

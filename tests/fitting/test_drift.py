@@ -1,0 +1,159 @@
+"""What has changed between two fits: against least squares on both records at once, and as a command."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_env.base.errors import InputError
+from panto_env.fitting.drift import SMALLER, drift
+from panto_env.fitting.stored import Stored, store, stored
+from panto_env.fitting.values import Value
+
+from ..command import panto
+
+COUNT, TOLERANCE = 12, 5e-3
+
+
+def dropper(number):
+    return Value("droppers", f"dropper {number}", "mm", 1e3, TOLERANCE, 600.0 + 6.0 * number, (number,))
+
+
+def made_up(seed, change, forces=40, deviation=0.5):
+    """Two fits to forces that depend on droppers linearly, and hardly on a shift of all of them; and both
+    records: (derivatives, force) of each."""
+    random = np.random.default_rng(seed)
+    true = TOLERANCE * random.standard_normal(COUNT)
+    fits, records = [], []
+    for month, x in enumerate((true, true + change)):
+        slopes = 1e3 * random.standard_normal((forces, COUNT))
+        slopes -= 0.999 * slopes.mean(axis=1, keepdims=True)
+        force = slopes @ x + deviation * random.standard_normal(forces)
+        covariance = np.linalg.inv(slopes.T @ slopes / deviation**2 + np.eye(COUNT) / TOLERANCE**2)
+        difference = covariance @ slopes.T @ force / deviation**2
+        values = tuple(dropper(number) for number in range(COUNT))
+        fits.append(Stored(f"month {month}", "a line", values, difference, covariance, (500.0, 900.0), ()))
+        records.append((slopes / deviation, force / deviation))
+    return fits, records
+
+
+def test_it_is_least_squares_on_both_records():
+    """Values and changes found together, with their tolerances as rows of their own."""
+    fits, ((one, first), (two, second)) = made_up(0, np.zeros(COUNT))
+    none, change = np.zeros((COUNT, COUNT)), SMALLER * TOLERANCE
+    rows = np.block(
+        [
+            [one, np.zeros_like(one)],
+            [two, two],
+            [np.eye(COUNT) / TOLERANCE, none],
+            [none, np.eye(COUNT) / change],
+        ]
+    )
+    both = np.linalg.lstsq(rows, np.concatenate([first, second, np.zeros(2 * COUNT)]), rcond=None)[0][COUNT:]
+    deviation = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[COUNT:])
+    found = drift(*fits).found
+    np.testing.assert_allclose([each.difference for each in found], both, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose([each.deviation for each in found], deviation, rtol=1e-6)
+
+
+def test_intervals_hold_changes_as_often_as_they_say():
+    random, shares = np.random.default_rng(1), []
+    for seed in range(60):
+        change = SMALLER * TOLERANCE * random.standard_normal(COUNT)
+        found = drift(*made_up(seed, change)[0]).found
+        shares += [(each.difference - by) / each.deviation for each, by in zip(found, change, strict=True)]
+    assert np.std(shares) == pytest.approx(1.0, abs=0.12)
+
+
+def test_a_change_is_known_better_than_the_line():
+    """A shift of all droppers, which the forces hardly tell, is in both fits."""
+    fits, _ = made_up(2, np.eye(COUNT)[4] * 6e-3)
+    found = drift(*fits)
+    (changed,) = found.changed
+    assert changed.value.name == "dropper 4"
+    assert changed.difference == pytest.approx(6e-3, abs=2 * changed.deviation)
+    line = np.sqrt(fits[0].covariance[4, 4])
+    assert changed.deviation < 0.6 * line
+
+
+def test_few_changes_are_named_where_there_are_none():
+    named = [drift(*made_up(seed, np.zeros(COUNT))[0]).changed for seed in range(100)]
+    assert sum(map(bool, named)) <= 5
+
+
+def test_values_of_one_fit_only_are_no_changes():
+    (earlier, later), _ = made_up(3, np.zeros(COUNT))
+    keep = np.arange(2, COUNT)
+    shorter = replace(
+        later,
+        values=later.values[2:],
+        difference=later.difference[2:],
+        covariance=later.covariance[np.ix_(keep, keep)],
+    )
+    names = [each.value.name for each in drift(earlier, shorter).found]
+    assert names == [f"dropper {number}" for number in range(2, COUNT)]
+    there = replace(shorter, compared=(630.0, 900.0))
+    assert [each.value.name for each in drift(earlier, there).found] == names[3:]
+
+
+def test_fits_that_cannot_be_compared_are_refused(tmp_path):
+    (earlier, later), _ = made_up(4, np.zeros(COUNT))
+    with pytest.raises(InputError, match="count from different lines or pantographs"):
+        drift(earlier, replace(later, design="another line"))
+    looser = tuple(replace(value, tolerance=0.01) for value in later.values)
+    with pytest.raises(InputError, match="free different values, or with different tolerances"):
+        drift(earlier, replace(later, values=looser))
+    with pytest.raises(InputError, match="give fits of one stretch"):
+        drift(earlier, replace(later, compared=(900.0, 1000.0)))
+    with pytest.raises(InputError, match=r"none\.safetensors could not be read: No such file"):
+        stored(tmp_path / "none.safetensors")
+    (tmp_path / "text.safetensors").write_text("no arrays", encoding="utf-8")
+    with pytest.raises(InputError, match=r"does not hold a fit; give a file that `panto fit --keep` wrote"):
+        stored(tmp_path / "text.safetensors")
+    store(replace(earlier, difference=earlier.difference[1:]), tmp_path / "part.safetensors")
+    with pytest.raises(InputError, match="does not hold a whole fit"):
+        stored(tmp_path / "part.safetensors")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (earlier, later), _ = made_up(2, np.eye(COUNT)[4] * 6e-3)
+    store(earlier, tmp_path / "month0.safetensors")
+    store(replace(later, notes=("The fit to month 1 has not settled.",)), tmp_path / "month1.safetensors")
+    return tmp_path
+
+
+def test_what_is_stored_is_read_again(folder):
+    known, (fits, _) = stored(folder / "month0.safetensors"), made_up(2, np.eye(COUNT)[4] * 6e-3)
+    assert known.values == fits[0].values
+    assert (known.name, known.design, known.compared) == ("month 0", "a line", (500.0, 900.0))
+    np.testing.assert_array_equal(known.covariance, fits[0].covariance)
+
+
+def test_the_command(folder):
+    done = panto(
+        "drift", "month0.safetensors", "month1.safetensors",
+        "--values", "changes.csv", "--plot", "drift.png", cwd=folder,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Most surely unlike before, 1 of 1" in done.stdout
+    assert "dropper 4" in done.stdout
+    assert "has not settled" in done.stdout + done.stderr
+    assert (folder / "drift.png").read_bytes().startswith(b"\x89PNG")
+    lines = (folder / "changes.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 1 + COUNT
+    assert [line.split(",")[1] for line in lines if line.lower().endswith("true")] == ["dropper 4"]
+
+
+def test_the_command_as_json_and_without_changes(folder):
+    done = panto("drift", "month0.safetensors", "month1.safetensors", "--json", cwd=folder)
+    rows = {row["name"]: row for row in json.loads(done.stdout)["values"]}
+    assert [name for name, row in rows.items() if row["changed"]] == ["dropper 4"]
+    same = panto("drift", "month0.safetensors", "month0.safetensors", cwd=folder)
+    assert "Nothing has changed that these records would tell." in same.stdout
+    loose = panto(
+        "drift", "month0.safetensors", "month1.safetensors", "--tolerance", "dropper=0.01", cwd=folder
+    )
+    assert loose.returncode == 2
+    assert "--tolerance of unknown 'dropper'" in loose.stderr
