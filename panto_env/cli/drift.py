@@ -18,8 +18,8 @@ def drift(
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="Standard deviation of a kind of changes before any record is seen, e.g. droppers=0.002 (m); "
-            "may be repeated. Default: half of the fits' tolerance of values.",
+            help="Standard deviation of a kind of changes before any record is seen, e.g. droppers=0.002 "
+            "(m); may be repeated. Default: half of the fits' tolerance of values.",
         ),
     ] = None,
     values: Annotated[
