@@ -65,9 +65,8 @@ def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None
     usual = np.array([given.get(each.kind, SMALLER * each.tolerance) for each in values.values()])
     (first, first_pull), (second, second_pull) = (_likelihood(known, names) for known in (earlier, later))
     count = len(names)
-    precision = np.block(
-        [[np.diag(prior**-2) + first + second, second], [second, np.diag(usual**-2) + second]]
-    )
+    line, changes = np.diag(prior**-2) + first + second, np.diag(usual**-2) + second
+    precision = np.block([[line, second], [second, changes]])
     covariance = np.linalg.inv(precision)
     change = (covariance @ np.concatenate([first_pull + second_pull, second_pull]))[count:]
     deviation = np.sqrt(np.diag(covariance)[count:])
@@ -108,8 +107,8 @@ def _named(found: Sequence[Found]) -> list[bool]:
 def _check_alike(earlier: Stored, later: Stored) -> None:
     if earlier.design != later.design:
         raise InputError(
-            f"The fits to {earlier.name} and {later.name} count from different lines or pantographs; fit both "
-            "with the same --line and --pantograph."
+            f"The fits to {earlier.name} and {later.name} count from different lines or pantographs; fit "
+            "both with the same --line and --pantograph."
         )
     if _tolerances(earlier.values) != _tolerances(later.values):
         raise InputError(
@@ -119,8 +118,8 @@ def _check_alike(earlier: Stored, later: Stored) -> None:
     begin, end = _common(earlier, later)
     if not begin < end:
         raise InputError(
-            f"The fit to {earlier.name} is of {earlier.compared[0]:,.0f} to {earlier.compared[1]:,.0f} m, that to "
-            f"{later.name} of {later.compared[0]:,.0f} to {later.compared[1]:,.0f} m; give fits of one stretch."
+            f"The fit to {earlier.name} is of {_stretch(earlier)}, that to {later.name} of "
+            f"{_stretch(later)}; give fits of one stretch."
         )
 
 
@@ -128,6 +127,10 @@ def _common(earlier: Stored, later: Stored) -> tuple[float, float]:
     """Stretch that both fits compared (m)."""
     pairs = earlier.compared, later.compared
     return max(begin for begin, _ in pairs), min(end for _, end in pairs)
+
+
+def _stretch(known: Stored) -> str:
+    return "{:,.0f} to {:,.0f} m".format(*known.compared)
 
 
 def _tolerances(values: Sequence[Value]) -> dict[str, set[float]]:

@@ -84,7 +84,7 @@ def _draw_values(axes: Axes, found: list[Found], before: float, named: Sequence[
     out = [each for each in named if each.value.kind == value.kind]
     if out:
         axes.plot(
-            [each.value.place for each in out],
+            [each.value.place or 0.0 for each in out],
             [value.scale * each.difference for each in out],
             "o",
             color=series_colour(1),

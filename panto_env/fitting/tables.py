@@ -26,7 +26,7 @@ NAMES = {
 
 
 def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: str) -> Table:
-    """A row for each kind of value: how many, how many are told, how many differ, and how well they are known.
+    """A row for each kind of value: how many there are, are told and differ, and how well they are known.
 
     unlike: what values that differ are unlike.
     """

@@ -95,4 +95,4 @@ def _attenuation(count: int, time_step: float) -> Array:
 
     sections, _ = low_pass_sections(time_step)
     _, response = freqz_sos(sections, worN=2 * np.pi * np.fft.rfftfreq(count))
-    return np.abs(response)
+    return np.asarray(np.abs(response))

@@ -143,7 +143,7 @@ def test_the_command(folder):
     assert (folder / "drift.png").read_bytes().startswith(b"\x89PNG")
     lines = (folder / "changes.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + COUNT
-    assert [line.split(",")[1] for line in lines if line.lower().endswith("true")] == ["dropper 4"]
+    assert [line.split(",")[1].strip('"') for line in lines if line.lower().endswith("true")] == ["dropper 4"]
 
 
 def test_the_command_as_json_and_without_changes(folder):
