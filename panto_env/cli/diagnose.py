@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
+from .identify import pairs
+from .record import Mass, Unit
+
+if TYPE_CHECKING:
+    from ..diagnosis import Diagnosis
 
 MOST_FALSE_ALARMS = 20.0
 """Maximum false alarms per km, about one per span: beyond it a threshold has no meaning."""
 
 
 def diagnose(
-    run: Annotated[Path, typer.Argument(help="Run to be diagnosed, from `panto simulate --output`.")],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="Run to be diagnosed, from `panto simulate --output`; with --fit, a record of a train."
+        ),
+    ],
     more: Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)] = None,
     healthy: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="RUN...",
             help="Healthy runs over the same line at the same speed, three or more; better ten or more.",
+        ),
+    ] = None,
+    fit: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead of healthy runs: what a fit to earlier records knows of the healthy line, from "
+            "`panto fit --keep`."
         ),
     ] = None,
     again: Annotated[
@@ -39,6 +57,8 @@ def diagnose(
             "the run's, as designed."
         ),
     ] = None,
+    mass: Mass = None,
+    unit: Unit = None,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
@@ -48,13 +68,24 @@ def diagnose(
     The force is compared with that of healthy runs, place by place, from the tenth span on. It is not the
     simulated force, but the one that an estimator on the train finds, up to 20 Hz, from noisy displacements
     of collector head and frame, and from the pantograph as designed.
+
+    With --fit, the force of a record is compared with that of runs simulated on the fitted line.
     """
-    from ..diagnosis import diagnose as judge
     from ..diagnosis.tables import findings_table, verdict
     from ..diagnosis.threshold import FALSE_ALARMS
 
-    if not healthy:
-        raise InputError("Give the healthy runs: panto diagnose RUN --healthy RUN RUN RUN.")
+    if (healthy is None) == (fit is None):
+        raise InputError(
+            "Give either the healthy runs, panto diagnose RUN --healthy RUN RUN RUN, or a fit, "
+            "panto diagnose RECORD --fit FIT."
+        )
+    if fit is not None and (pantograph or more):
+        raise InputError(
+            "With --fit, the pantograph is the fit's and further records are given with --again; leave out "
+            "--pantograph and further arguments."
+        )
+    if fit is None and (mass is not None or unit):
+        raise InputError("--mass and --unit are of records, which are diagnosed with --fit; leave them out.")
     rate = FALSE_ALARMS if false_alarms is None else false_alarms
     if not 0 < rate <= MOST_FALSE_ALARMS:
         raise InputError(
@@ -63,16 +94,16 @@ def diagnose(
     if seed < 0:
         raise InputError(f"--seed must be a whole number from 0 up, not {seed}.")
     with progress_console.status("reading and diagnosing"):
-        runs = [Trajectory.load(path) for path in (run, *(again or []))]
-        reference = [Trajectory.load(path) for path in (*healthy, *(more or []))]
-        found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
+        files = (run, *(again or []))
+        if fit is not None:
+            title, found = _of_records(files, fit, pairs(unit or []), mass, rate, seed)
+        else:
+            title, found = _of_runs(files, (*(healthy or ()), *(more or ())), pantograph, rate, seed)
     with written_last() as later:
         if plot is not None:
             from ..analysis.plots import save
             from ..diagnosis.plots import plot_diagnosis
 
-            judged = f"{runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h"
-            title = f"{run.name}: {judged}, {len(reference)} healthy runs"
             later(save, plot_diagnosis(found, title), plot)
         if json:
             findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
@@ -90,3 +121,28 @@ def diagnose(
             print_table(findings_table(found))
         for note in found.notes:
             alert("Degraded:", note)
+
+
+def _of_runs(
+    files: Sequence[Path], healthy: Sequence[Path], pantograph: str | None, rate: float, seed: int
+) -> tuple[str, Diagnosis]:
+    """Title and diagnosis of simulated runs."""
+    from ..diagnosis import diagnose as judge
+
+    runs, reference = ([Trajectory.load(path) for path in paths] for paths in (files, healthy))
+    found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
+    judged = f"{runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h"
+    return f"{files[0].name}: {judged}, {len(reference)} healthy runs", found
+
+
+def _of_records(
+    files: Sequence[Path], fit: Path, units: dict[str, str], mass: float | None, rate: float, seed: int
+) -> tuple[str, Diagnosis]:
+    """Title and diagnosis of a measuring train's records."""
+    from ..diagnosis import diagnose_records
+    from ..fitting.stored import stored
+    from ..records.record_file import read_record
+
+    records = [read_record(file, units, mass_correction=mass) for file in files]
+    found = diagnose_records(records, stored(fit), false_alarms=rate, seed=seed)
+    return f"{files[0].name}, held against the line fitted in {fit.name}", found

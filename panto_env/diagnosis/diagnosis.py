@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,14 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.shown import beside
 from ..catalog import load_pantograph
+from ..fitting.stored import Stored
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
+from ..records.record import Record
 from .features import Sort
 from .healthy import Healthy
 from .kinds import Answer, Classifier, trained
+from .measured_passes import measured_passes
 from .passes import Passes, side_by_side
 from .places import Evidence, regions
 from .threshold import ENOUGH, FALSE_ALARMS, cautious_threshold
@@ -86,6 +89,24 @@ def diagnose(
     known = None if pantograph is None else load_pantograph(pantograph)
     passes, reference = side_by_side(runs, healthy, seed, known)
     return judge(passes, Healthy.of(reference), false_alarms, classifier)
+
+
+def diagnose_records(
+    records: Sequence[Record],
+    known: Stored,
+    *,
+    false_alarms: float = FALSE_ALARMS,
+    classifier: Classifier | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Hold records of a measuring train, or the mean of several, against the line of a fit.
+
+    known: what the fit knows. false_alarms, classifier: as of ``diagnose``. seed: of the healthy passes,
+    which are simulated. Raises InputError as ``measured_passes`` does.
+    """
+    passes, reference = measured_passes(records, known, seed)
+    found = judge(passes, Healthy.of(reference), false_alarms, classifier)
+    return replace(found, notes=(*known.notes, *found.notes))
 
 
 def judge(

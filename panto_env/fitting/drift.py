@@ -105,7 +105,7 @@ def _named(found: Sequence[Found]) -> list[bool]:
 
 
 def _check_alike(earlier: Stored, later: Stored) -> None:
-    if earlier.design != later.design:
+    if (earlier.line, earlier.pantograph) != (later.line, later.pantograph):
         raise InputError(
             f"The fits to {earlier.name} and {later.name} count from different lines or pantographs; fit "
             "both with the same --line and --pantograph."

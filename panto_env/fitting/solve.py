@@ -120,7 +120,7 @@ class Fitting:
         found = []
         for k, part in enumerate(self.parts):
             variant = self.values.variant(state.x[:count], float(state.static_forces[k]))
-            found.append(self._sampled(part, [variant])[0])
+            found.append(self.sampled(part, [variant])[0])
         return found
 
     def run(
@@ -215,7 +215,7 @@ class Fitting:
         for k, part in enumerate(self.parts):
             working(k / len(self.parts))
             variants = [self.values.variant(each, static[k]) for each in changed]
-            force, *others = self._sampled(part, variants, np.array(begins))
+            force, *others = self.sampled(part, variants, np.array(begins))
             by_value = np.linalg.solve(differences, np.array(others) - force)
             shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
@@ -234,7 +234,7 @@ class Fitting:
         left: list[list[Array]] = [[] for _ in tried]
         for k, part in enumerate(self.parts):
             variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
-            forces = self._sampled(part, variants)
+            forces = self.sampled(part, variants)
             for own, x, force in zip(left, tried, forces, strict=True):
                 own.append(part.measured.coefficients(part.measured.force(x[count + k]) - force))
         sums = [self._sum(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
@@ -247,7 +247,7 @@ class Fitting:
         misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
         return misfit + float(np.sum((x / self.prior) ** 2))
 
-    def _sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
+    def sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
         """Low-passed forces of variants at the places that are compared, (n, places) (N).
 
         begins: as ``Passes.forces`` takes them.

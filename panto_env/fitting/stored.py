@@ -12,11 +12,11 @@ from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .fit import Fit
+from .measured import BANDS
 from .solve import WHITE
 from .values import Value
 
-SUFFIXES = (".safetensors",)
-"""Of the file."""
+ARRAYS = ("difference", "covariance", "noise")
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +24,13 @@ class Stored:
     """Values of a fit, as differences from its design, and their covariance."""
 
     name: str  # of its records
-    design: str  # line and pantograph that they count from, as JSON
+    line: str  # that they count from, as JSON
+    pantograph: str  # likewise
     values: tuple[Value, ...]  # all of them, with places along the line (m)
     difference: Array  # (values,)
     covariance: Array  # (values, values)
     compared: tuple[float, float]  # stretch of the line that the records cover (m)
+    noise: Array  # (bands,): standard deviation of what each band of the records' forces has besides (N)
     notes: tuple[str, ...]  # why it is less sure than it says
 
 
@@ -36,7 +38,7 @@ def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
     fitting, before = fit.problem.fitting, fit.before
     design, count = fitting.values.design, len(fitting.values)
-    values = tuple(_along(each, before) for each in fitting.values.all)
+    values = tuple(along(each, before) for each in fitting.values.all)
     notes = []
     if not fit.solution.settled:
         notes.append(f"The fit to {records} has not settled.")
@@ -45,11 +47,13 @@ def knowledge(fit: Fit, records: str) -> Stored:
     begin, end = fit.problem.stretch
     return Stored(
         name=records,
-        design=f"{design.catenary.model_dump_json()}\n{design.pantograph.model_dump_json()}",
+        line=design.catenary.model_dump_json(),
+        pantograph=design.pantograph.model_dump_json(),
         values=values,
         difference=fit.solution.state.x[:count],
         covariance=fit.solution.covariance[:count, :count],
         compared=(begin + before, end + before),
+        noise=np.median(fit.solution.state.noise, axis=0),
         notes=tuple(notes),
     )
 
@@ -58,12 +62,13 @@ def store(known: Stored, path: str | Path) -> None:
     """Write what a fit knows, whole or not at all. Raises InputError where it cannot be written."""
     table = {
         "name": known.name,
-        "design": known.design,
+        "line": known.line,
+        "pantograph": known.pantograph,
         "values": [asdict(value) for value in known.values],
         "compared": list(known.compared),
         "notes": list(known.notes),
     }
-    arrays = {"difference": known.difference, "covariance": known.covariance}
+    arrays = {name: getattr(known, name) for name in ARRAYS}
     write_arrays(path, table, {name: np.ascontiguousarray(array) for name, array in arrays.items()})
 
 
@@ -74,23 +79,24 @@ def stored(path: str | Path) -> Stored:
         values = tuple(Value(**each | {"index": tuple(each["index"])}) for each in table["values"])
         found = Stored(
             name=table["name"],
-            design=table["design"],
+            line=table["line"],
+            pantograph=table["pantograph"],
             values=values,
-            difference=arrays["difference"],
-            covariance=arrays["covariance"],
             compared=_pair(table["compared"]),
+            **{name: arrays[name] for name in ARRAYS},
             notes=tuple(table["notes"]),
         )
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} does not hold a fit; give a file that `panto fit --keep` wrote.") from error
-    if found.covariance.shape != (len(values), len(values)) or found.difference.shape != (len(values),):
+    shapes = found.difference.shape, found.covariance.shape, found.noise.shape
+    if shapes != ((len(values),), (len(values), len(values)), (BANDS,)):
         raise InputError(f"{path} does not hold a whole fit; write it anew with `panto fit --keep`.")
     return found
 
 
-def _along(value: Value, before: float) -> Value:
+def along(value: Value, before: float) -> Value:
     """A value with its place on the line, of which some way lies before what was simulated (m)."""
     if value.place is not None:
         return replace(value, place=value.place + before)

@@ -33,7 +33,19 @@ def made_up(seed, change, forces=40, deviation=0.5):
         covariance = np.linalg.inv(slopes.T @ slopes / deviation**2 + np.eye(COUNT) / TOLERANCE**2)
         difference = covariance @ slopes.T @ force / deviation**2
         values = tuple(dropper(number) for number in range(COUNT))
-        fits.append(Stored(f"month {month}", "a line", values, difference, covariance, (500.0, 900.0), ()))
+        fits.append(
+            Stored(
+                f"month {month}",
+                "a line",
+                "a pantograph",
+                values,
+                difference,
+                covariance,
+                (500.0, 900.0),
+                np.ones(6),
+                (),
+            )
+        )
         records.append((slopes / deviation, force / deviation))
     return fits, records
 
@@ -100,7 +112,7 @@ def test_values_of_one_fit_only_are_no_changes():
 def test_fits_that_cannot_be_compared_are_refused(tmp_path):
     (earlier, later), _ = made_up(4, np.zeros(COUNT))
     with pytest.raises(InputError, match="count from different lines or pantographs"):
-        drift(earlier, replace(later, design="another line"))
+        drift(earlier, replace(later, line="another line"))
     looser = tuple(replace(value, tolerance=0.01) for value in later.values)
     with pytest.raises(InputError, match="free different values, or with different tolerances"):
         drift(earlier, replace(later, values=looser))
@@ -127,7 +139,7 @@ def folder(tmp_path):
 def test_what_is_stored_is_read_again(folder):
     known, (fits, _) = stored(folder / "month0.safetensors"), made_up(2, np.eye(COUNT)[4] * 6e-3)
     assert known.values == fits[0].values
-    assert (known.name, known.design, known.compared) == ("month 0", "a line", (500.0, 900.0))
+    assert (known.name, known.line, known.compared) == ("month 0", "a line", (500.0, 900.0))
     np.testing.assert_array_equal(known.covariance, fits[0].covariance)
 
 

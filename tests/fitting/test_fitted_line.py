@@ -105,7 +105,7 @@ def test_a_fitted_line_s_force_is_its_fit_s_and_goes_on_from_there(written, reco
     (before,) = again.fitting.as_designed()
     fitting = done.problem.fitting
     x = done.solution.state.x[: len(fitting.values)].copy()
-    (after,) = fitting._sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
+    (after,) = fitting.sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
     np.testing.assert_allclose(before, after, atol=0.2)
 
 

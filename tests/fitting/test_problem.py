@@ -26,7 +26,7 @@ def moved(record, by):
 
 def force_of(fitting, x):
     (part,) = fitting.parts
-    return fitting._sampled(part, [fitting.values.variant(x, 70.0)])[0]
+    return fitting.sampled(part, [fitting.values.variant(x, 70.0)])[0]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,127 @@
+"""Records of a measuring train side by side with healthy passes, which a fitted line gives.
+
+Healthy passes are simulated on lines that the fit may mean: each with values drawn from what the fit knows,
+and with the noise that its records had. So what the fit does not know is not taken for a defect.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.units import from_kmh
+from ..fitting.problem import Problem, problem
+from ..fitting.solve import Part
+from ..fitting.stored import Stored, along
+from ..fitting.values import FREE
+from ..metrics.low_pass import CUTOFF
+from ..plant.alignment import Alignment
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.pantograph.schema import PantographData
+from ..records.record import Record
+from .passes import LEAD, PER_WAVE, SPEEDS, STEP, Passes, places_of
+
+HEALTHY = 24
+"""Healthy passes that are simulated: enough to know how much they differ."""
+AWAY = 0.5
+"""Way (m) on each side of a record's rough place within which it is placed finely."""
+
+
+def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> tuple[Passes, Passes]:
+    """Records to be judged, and healthy passes over the line of a fit, as ``Passes`` hold them.
+
+    seed: of the healthy passes' lines and noise. Raises InputError for records of different speeds, for those
+    that cover no two spans of the fit's stretch together, and as ``fitting.problem.problem`` does.
+    """
+    line = FlexibleCatenaryData.model_validate_json(known.line)
+    pantograph = PantographData.model_validate_json(known.pantograph)
+    kinds = [kind for kind in FREE if any(value.kind == kind for value in known.values)]
+    tolerances = {value.kind: value.tolerance for value in known.values if value.kind != "unevenness"}
+    ready = problem(records, line, pantograph, free=kinds, tolerances=tolerances)
+    parts, plan = ready.fitting.parts, ready.fitting.values.design
+    speeds = np.array([part.measured.piece.speed_kmh for part in parts])
+    if np.ptp(speeds) > SPEEDS * speeds.min():
+        raise InputError(
+            f"Records at {speeds.min():.4g} and {speeds.max():.4g} km/h cannot be judged together: speeds "
+            f"may differ by {100 * SPEEDS:g} %."
+        )
+    before = 0.0 if line.ends else ready.first_span * line.span_length
+    alignment = line.alignment() if line.ends else line.alignment(ready.first_span + plan.spans)
+    first, per_span, position = _places(alignment, before, parts, known, float(speeds.mean()))
+    random = np.random.default_rng(seed)
+    mean, covariance = _values(ready, known)
+    drawn = random.multivariate_normal(mean, covariance, HEALTHY, method="eigh")
+    healthy, measured = np.zeros((HEALTHY, len(position))), []
+    for number, part in enumerate(parts):
+        static, usual = _usual(ready, part, mean)
+        seen = _finely(part, usual)
+        if number == 0:
+            variants = [ready.fitting.values.variant(x, static) for x in drawn]
+            forces = part.measured.coefficients(ready.fitting.sampled(part, variants))
+            forces += known.noise[part.measured.band] * random.standard_normal(forces.shape)
+            for own, force in zip(healthy, forces, strict=True):
+                own[:] = np.interp(position - before, part.measured.place, part.measured.back(force))
+        # What the first record's speed makes is the others', too: only what differs is the line's.
+        away = np.interp(position - before, part.measured.place, part.measured.back(seen - usual))
+        measured.append(healthy.mean(axis=0) + away)
+    facts = (alignment, first, per_span, plan.droppers + before, line.name, from_kmh(float(speeds.mean())))
+    wave_speed = line.contact_wire.wave_speed
+    return Passes(np.array(measured), *facts, wave_speed), Passes(healthy, *facts, wave_speed)
+
+
+def _places(
+    alignment: Alignment, before: float, parts: Sequence[Part], known: Stored, speed_kmh: float
+) -> tuple[int, int, Array]:
+    """Spans before the first place, places in a span, and positions (m) of all that records and fit share."""
+    begin = max(known.compared[0], *(before + part.measured.place[0] for part in parts))
+    end = min(known.compared[1], *(before + part.measured.place[-1] for part in parts))
+    first, last = math.ceil(alignment.in_spans(begin) - 1e-6), math.floor(alignment.in_spans(end) + 1e-6)
+    if last - first <= LEAD:
+        raise InputError(
+            f"Fit and records share {max(end - begin, 0.0):.0f} m from {begin:,.0f} m on; a diagnosis takes "
+            "two whole spans: give records of the fit's stretch."
+        )
+    wave = from_kmh(speed_kmh) / CUTOFF
+    per_span = math.ceil(alignment.mean_length / min(STEP, wave / PER_WAVE) - 1e-9)
+    return first, per_span, places_of(alignment, first, per_span, (last - first) * per_span)
+
+
+def _values(ready: Problem, known: Stored) -> tuple[Array, Array]:
+    """What a fit knows of the values of another one: means, (values,), and covariance."""
+    line = ready.fitting.values.design.catenary
+    before = 0.0 if line.ends else ready.first_span * line.span_length
+    numbers = {value.name: number for number, value in enumerate(known.values)}
+    own = [numbers.get(along(value, before).name, -1) for value in ready.fitting.values.all]
+    there = np.flatnonzero(np.array(own) >= 0)
+    which = np.array(own)[there]
+    mean, covariance = np.zeros(len(own)), np.zeros((len(own), len(own)))
+    mean[there] = known.difference[which]
+    covariance[np.ix_(there, there)] = known.covariance[np.ix_(which, which)]
+    return mean, covariance
+
+
+def _usual(ready: Problem, part: Part, mean: Array) -> tuple[float, Array]:
+    """Static force (N) with which a simulated pass has the record's mean force, and its coefficients."""
+    values = ready.fitting.values
+    static = values.design.pantograph.static_force
+    force = ready.fitting.sampled(part, [values.variant(mean, static)])[0]
+    static += float(part.measured.force().mean() - force.mean())
+    force = ready.fitting.sampled(part, [values.variant(mean, static)])[0]
+    return static, part.measured.coefficients(force)
+
+
+def _finely(part: Part, usual: Array) -> Array:
+    """Coefficients of a record at the place where it is most like the usual pass."""
+    from scipy.optimize import minimize_scalar  # slow to import
+
+    own = part.measured
+
+    def away(shift: float) -> float:
+        return float(np.sum((own.coefficients(own.force(shift)) - usual) ** 2))
+
+    best = minimize_scalar(away, bounds=(-AWAY, AWAY), method="bounded")
+    return own.coefficients(own.force(float(best.x)))

@@ -1,0 +1,110 @@
+"""Records held against the line of a fit: one as it was is healthy, a broken dropper is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_env import simulate
+from panto_env.base.errors import InputError
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.diagnosis import diagnose_records
+from panto_env.diagnosis.measured_passes import HEALTHY, measured_passes
+from panto_env.fitting import problem as preparing
+from panto_env.fitting.measured import BANDS
+from panto_env.fitting.stored import Stored, store
+from panto_env.plant.numerics import Numerics
+from panto_env.records.measured import measured
+from panto_env.records.record_file import write_record
+
+from ..command import panto
+
+LINE, PANTOGRAPH, SPANS = "en50318-2002", "dsa380", 15
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse():
+    """Healthy passes are computed with accuracy="fast", as these tests' records are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preparing, "NUMERICS", Numerics(accuracy="fast"))
+        yield
+
+
+def record_of(condition, speed=250.0, seed=0, position_error=0.3):
+    run = simulate(
+        LINE, PANTOGRAPH, speed, spans=2 * SPANS, distance=60.0 * SPANS, accuracy="fast",
+        line_condition=condition, record_droppers=False,
+    )  # fmt: skip
+    return measured(run, seed=seed, position_error=position_error, name=f"{speed:g} km/h")
+
+
+@pytest.fixture(scope="module")
+def healthy_record():
+    return record_of({"dropper_scatter": 0.0}, seed=1)
+
+
+@pytest.fixture(scope="module")
+def known(healthy_record, coarse):
+    """A fit that knows droppers to a tenth of a millimetre, and that the line is as designed."""
+    line, pantograph = load_catenary(LINE), load_pantograph(PANTOGRAPH)
+    values = preparing.problem([healthy_record], line, pantograph, free=("droppers",)).fitting.values.all
+    return Stored(
+        "earlier", line.model_dump_json(), pantograph.model_dump_json(), values, np.zeros(len(values)),
+        1e-8 * np.eye(len(values)), (540.0, 880.0), np.full(BANDS, 0.6), (),
+    )  # fmt: skip
+
+
+def test_healthy_passes_surround_a_healthy_record(healthy_record, known):
+    own, healthy = measured_passes([healthy_record], known)
+    assert healthy.force.shape == (HEALTHY, own.force.shape[1])
+    assert own.first == 9
+    assert own.position[0] == pytest.approx(540.0)
+    spread = healthy.force.std(axis=0, ddof=1)
+    away = (own.force[0] - healthy.force.mean(axis=0)) / spread
+    assert 0.6 < np.sqrt(np.mean(away**2)) < 1.6
+    assert 0.3 < spread.mean() < 3.0  # noise of 0.6 N a coefficient, and what the fit does not know
+
+
+def test_a_healthy_record_is_healthy_and_a_broken_dropper_is_found(healthy_record, known):
+    assert diagnose_records([healthy_record], known).healthy
+    broken = record_of({"broken_droppers": ((12, 4),)}, seed=2, position_error=-0.4)
+    (finding,) = diagnose_records([broken], known).findings
+    assert (finding.kind, finding.span, finding.dropper) == ("broken dropper", 12, 4)
+
+
+def test_lost_tension_is_a_changed_line(known):
+    assert diagnose_records([record_of({"lost_contact_tension": 0.03}, seed=3)], known).changed
+
+
+def test_the_mean_of_records_is_judged(healthy_record, known):
+    own, healthy = measured_passes([healthy_record, record_of({}, seed=4, position_error=0.0)], known)
+    assert own.force.shape[0] == 2
+    both, one = (np.std(force - healthy.force.mean(axis=0)) for force in (own.force.mean(axis=0), own.force))
+    assert both < 0.9 * one
+
+
+def test_what_cannot_be_judged_is_refused(healthy_record, known):
+    with pytest.raises(InputError, match=r"at 220 and 250 km/h cannot be judged together"):
+        measured_passes([healthy_record, record_of({}, speed=220.0)], known)
+    with pytest.raises(InputError, match=r"share 19 m .* takes two whole spans"):
+        measured_passes([healthy_record], replace(known, compared=(860.0, 900.0)))
+
+
+def test_the_command(healthy_record, known, tmp_path):
+    write_record(record_of({"broken_droppers": ((12, 4),)}, seed=2), tmp_path / "later.csv")
+    store(replace(known, notes=("The fit to earlier has not settled.",)), tmp_path / "earlier.safetensors")
+    done = panto("diagnose", "later.csv", "--fit", "earlier.safetensors", "--plot", "found.png", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "broken dropper" in done.stdout
+    assert "has not settled" in done.stdout
+    assert (tmp_path / "found.png").read_bytes().startswith(b"\x89PNG")
+    for words, sentence in (
+        ((), "Give either the healthy runs"),
+        (("--fit", "earlier.safetensors", "--healthy", "later.csv"), "Give either the healthy runs"),
+        (("--fit", "earlier.safetensors", "--pantograph", "dsa380"), "leave out --pantograph"),
+        (("--healthy", "a.parquet", "--unit", "force=kN"), "are of records, which are diagnosed with --fit"),
+        (("--fit", "later.csv"), "does not hold a fit"),
+    ):
+        refused = panto("diagnose", "later.csv", *words, cwd=tmp_path)
+        assert refused.returncode == 2
+        assert sentence in " ".join(refused.stderr.split())
