@@ -61,8 +61,11 @@ def plot_drift(drift: Drift, title: str) -> Figure:
     every = np.atleast_1d(figure.subplots(max(len(kinds), 1), 1, sharex=True)).tolist()
     figure.suptitle(title)
     for axes, kind in zip(every, kinds, strict=False):
-        _draw_values(axes, drift.of_kind(kind), 0.0, drift.changed)
-    every[-1].set_xlabel(marks.POSITION)
+        found = drift.of_kind(kind)
+        _draw_values(axes, found, 0.0, drift.changed)
+        what = "dropper longer" if kind == "droppers" else "support higher"
+        axes.set_ylabel(f"{what} than before ({found[0].value.unit})")
+    every[-1].set_xlabel("position (m)")
     return figure
 
 

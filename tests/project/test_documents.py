@@ -45,6 +45,8 @@ RULES = (
     Rule("panto family", "a pass for each of many seeds", "--seeds 2"),
     Rule("panto film", "hundreds of frames", "--seconds 0.1 --size 320 240"),
     Rule("panto film passive runs/demo", "wants an agent of `make demo`, which is run by hand"),
+    Rule("panto drift", "of two fits, which take minutes; tests/fitting/test_drift.py has made-up ones"),
+    Rule("panto diagnose month3-220.csv", "of a fit; tests/diagnosis/test_measured_passes.py has one"),
     Rule("panto fit", f"{MINUTES}; tests/fitting/test_commands.py has short ones"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
     Rule("panto oracle --stored", "as it stands", ""),
