@@ -29,6 +29,12 @@ OUTPUTS = {
     "compare --plot": (["compare", "a.csv", "a.parquet"], FILE, ".png"),
     "compare --html": (["compare", "a.csv", "a.parquet"], FILE, ".html"),
     "fit --output": (["fit", "a.csv", "--line", "re250", "--pantograph", "dsa380"], FILE, ".toml"),
+    "fit --values": (["fit", "a.csv", "--line", "re250", "--pantograph", "dsa380"], FILE, ".csv"),
+    "fit --pantograph-output": (
+        ["fit", "a.csv", "--line", "re250", "--pantograph", "dsa380"],
+        FILE,
+        ".toml",
+    ),
     "fit --plot": (["fit", "a.csv", "--line", "re250", "--pantograph", "dsa380"], FILE, ".png"),
     "fit --keep": (["fit", "a.csv", "--line", "re250", "--pantograph", "dsa380"], FILE, ".safetensors"),
     "drift --plot": (["drift", "a.safetensors", "b.safetensors"], FILE, ".png"),
@@ -133,6 +139,9 @@ def test_an_output_that_can_t_be_written_is_refused_before_the_work(option, trou
     assert sorted(folder.rglob("*")) == before
 
 
+NAMES = ("output", "plot", "html", "figures", "droppers", "values", "keep", "pantograph_output")
+
+
 def outputs(command, words=()):
     """Options and arguments of a command, and of those in its group, that name something to write."""
     if isinstance(command, typer.core.TyperGroup):
@@ -140,7 +149,7 @@ def outputs(command, words=()):
             yield from outputs(command.get_command(None, name), (*words, name))
         return
     for parameter in command.params:
-        if parameter.name in ("output", "plot", "html", "figures", "droppers"):
+        if parameter.name in NAMES:
             yield f"{' '.join(words)} {parameter.opts[0]}"
 
 
