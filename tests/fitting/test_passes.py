@@ -1,0 +1,61 @@
+"""Passes that go on from shortly before what differs give what passes from the line's start give."""
+
+import numpy as np
+import pytest
+
+from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.fitting.passes import Passes, Variant
+from panto_env.plant.line_condition import DrawnLine, LineCondition
+from panto_env.plant.numerics import Numerics
+
+from ..documents import ROOT
+
+ROOM = LineCondition(dropper_scatter=5e-3, support_scatter=5e-3, tension_scatter=0.017)
+NUMERICS = Numerics(accuracy="fast", precision="double")
+DROPPER_SPANS, SUPPORT_SPANS = 3, 6
+
+
+@pytest.fixture(params=["en50318-2002", "re250", ROOT / "examples" / "overlap.toml"], ids=str)
+def passes(request):
+    """On spans that are alike, with stitch wires, and with an overlap of two contact wires."""
+    line, pantograph = load_catenary(request.param), load_pantograph("dsa380")
+    spans = line.spans if line.ends else 18
+    distance = float(line.alignment(spans).support(spans - 2))
+    return line, pantograph, Passes(line, pantograph, ROOM, 65.0, distance, spans, NUMERICS)
+
+
+def test_they_give_what_whole_passes_give(passes):
+    line, pantograph, own = passes
+    random = np.random.default_rng(0)
+    scatter, heights = 2e-3 * random.standard_normal(len(own.droppers)), np.zeros(len(own.supports))
+
+    def variant(dropper=None, support=None):
+        droppers, supports = scatter.copy(), heights.copy()
+        if dropper is not None:
+            droppers[dropper] += 5e-3
+        if support is not None:
+            supports[support] += 5e-3
+        drawn = DrawnLine(ROOM, np.zeros((0, 3)), droppers, supports, (1.01, 0.99))
+        return Variant(line, drawn, pantograph, pantograph.static_force)
+
+    span = own.alignment.mean_length
+    which = np.flatnonzero(own.droppers > 4.5 * span)[[0, 5, 16, -25]]
+    support = int(np.flatnonzero(own.supports > 7 * span)[0])
+    variants = [variant(), *(variant(dropper=k) for k in which), variant(support=support)]
+    places = [*(own.droppers[which] - DROPPER_SPANS * span), own.supports[support] - SUPPORT_SPANS * span]
+    begins = np.array([0.0, *places])
+    assert (begins[1:] > 0).all()
+    whole, late = own.forces(variants), own.forces(variants, begins)
+    np.testing.assert_array_equal(late[0], whole[0])
+    change = np.abs(whole - whole[0]).max(axis=1)
+    assert (change > 1).sum() >= 4  # in an overlap, the train may not touch the wire of one
+    assert (np.abs(late - whole).max(axis=1) <= 2e-4 * np.maximum(change, 1)).all()
+
+
+def test_the_same_line_goes_on_bit_for_bit(passes):
+    line, pantograph, own = passes
+    drawn = DrawnLine(ROOM, np.zeros((0, 3)), np.zeros(len(own.droppers)), np.zeros(len(own.supports)))
+    same = Variant(line, drawn, pantograph, pantograph.static_force)
+    force = own.forces([same] * 3, np.array([0.0, 200.0, 350.0]))
+    np.testing.assert_array_equal(force[1], force[0])
+    np.testing.assert_array_equal(force[2], force[0])
