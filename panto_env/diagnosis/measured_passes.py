@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..base.arrays import Array
 from ..base.errors import InputError
@@ -37,8 +38,13 @@ def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> 
     seed: of the healthy passes' lines and noise. Raises InputError for records of different speeds, for those
     that cover no two spans of the fit's stretch together, and as ``fitting.problem.problem`` does.
     """
-    line = FlexibleCatenaryData.model_validate_json(known.line)
-    pantograph = PantographData.model_validate_json(known.pantograph)
+    try:
+        line = FlexibleCatenaryData.model_validate_json(known.line)
+        pantograph = PantographData.model_validate_json(known.pantograph)
+    except ValidationError as error:
+        raise InputError(
+            "The line or the pantograph of the fit is none that this version knows; fit the records anew."
+        ) from error
     kinds = [kind for kind in FREE if any(value.kind == kind for value in known.values)]
     tolerances = {value.kind: value.tolerance for value in known.values if value.kind != "unevenness"}
     ready = problem(records, line, pantograph, free=kinds, tolerances=tolerances)
@@ -49,8 +55,7 @@ def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> 
             f"Records at {speeds.min():.4g} and {speeds.max():.4g} km/h cannot be judged together: speeds "
             f"may differ by {100 * SPEEDS:g} %."
         )
-    before = 0.0 if line.ends else ready.first_span * line.span_length
-    alignment = line.alignment() if line.ends else line.alignment(ready.first_span + plan.spans)
+    before, alignment = ready.before, line.alignment(ready.first_span + plan.spans)
     first, per_span, position = _places(alignment, before, parts, known, float(speeds.mean()))
     random = np.random.default_rng(seed)
     mean, covariance = _values(ready, known)
@@ -92,10 +97,8 @@ def _places(
 
 def _values(ready: Problem, known: Stored) -> tuple[Array, Array]:
     """What a fit knows of the values of another one: means, (values,), and covariance."""
-    line = ready.fitting.values.design.catenary
-    before = 0.0 if line.ends else ready.first_span * line.span_length
     numbers = {value.name: number for number, value in enumerate(known.values)}
-    own = [numbers.get(along(value, before).name, -1) for value in ready.fitting.values.all]
+    own = [numbers.get(along(value, ready.before).name, -1) for value in ready.fitting.values.all]
     there = np.flatnonzero(np.array(own) >= 0)
     which = np.array(own)[there]
     mean, covariance = np.zeros(len(own)), np.zeros((len(own), len(own)))

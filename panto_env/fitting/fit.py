@@ -114,8 +114,7 @@ class Fit:
     @property
     def before(self) -> float:
         """Way along the line before the simulated spans (m)."""
-        line = self.problem.fitting.values.design.catenary
-        return 0.0 if line.ends else self.problem.first_span * line.span_length
+        return self.problem.before
 
     def _compared(self, value: Value) -> bool:
         begin, end = self.problem.stretch

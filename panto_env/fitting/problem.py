@@ -49,6 +49,12 @@ class Problem:
     shifts: tuple[float, ...]  # by how much positions of each record were short, roughly (m)
     notes: tuple[str, ...]
 
+    @property
+    def before(self) -> float:
+        """Way along the line before the simulated spans (m)."""
+        line = self.fitting.values.design.catenary
+        return 0.0 if line.ends else self.first_span * line.span_length
+
 
 def problem(
     records: Sequence[Record],

@@ -88,6 +88,8 @@ def test_what_cannot_be_judged_is_refused(healthy_record, known):
         measured_passes([healthy_record, record_of({}, speed=220.0)], known)
     with pytest.raises(InputError, match=r"share 19 m .* takes two whole spans"):
         measured_passes([healthy_record], replace(known, compared=(860.0, 900.0)))
+    with pytest.raises(InputError, match="none that this version knows; fit the records anew"):
+        measured_passes([healthy_record], replace(known, line='{"kind": "flexible"}'))
 
 
 def test_the_command(healthy_record, known, tmp_path):
