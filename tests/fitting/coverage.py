@@ -3,6 +3,7 @@
 python -m tests.fitting.coverage FOLDER --lines 200           # goes on where it was broken off
 python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong, in one of several ways
 python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
+python -m tests.fitting.coverage FOLDER --line section        # lines whose spans differ, each drawn
 python -m tests.fitting.coverage FOLDER --table
 """
 
@@ -18,27 +19,55 @@ import numpy as np
 
 from panto_env import simulate
 from panto_env.base.files import write_whole
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.fitting.fit import fit
+from panto_env.plant.catenary.flexible.attached import dropper_positions
+from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, draw
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
 
 LINE, PANTOGRAPH, SPANS, BEYOND = "en50318-2002", "dsa380", 16, 12
+SECTION, SECTION_SPANS = "fast-line", 22
 SPEEDS = (180.0, 220.0, 250.0, 200.0)
-"""Of the passes (km/h), as many as are asked for, from the end of this list on backwards."""
+"""Of the passes on that line (km/h), as many as are asked for, from the end of this list on backwards; on
+others as large a share of the wave speed."""
 NOISE, RATE, PLACE = 2.0, 500.0, 0.3
 """Of sensors: rms of a sample (N), samples a second, and standard deviation of the odometer's error (m)."""
+LINES = ("uniform", "section")
+HEADINGS = (
+    "line",
+    "model",
+    "passes",
+    "lines",
+    "tension (%), inside",
+    "dropper (mm)",
+    "support (mm)",
+    "unlike noise",
+)
 WRONG = ("nothing", "damping", "pantograph", "drift", "window")
 
 
-def records_of(seed: int, passes: int, wrong: str) -> list[Record]:
+def design_of(seed: int, line: str) -> FlexibleCatenaryData:
+    """A line as designed: the uniform one, or a section drawn by seed."""
+    if line == "uniform":
+        found = load_catenary(LINE)
+        assert isinstance(found, FlexibleCatenaryData)
+        return found
+    section = load_section(SECTION).model_copy(update={"spans": (SECTION_SPANS, SECTION_SPANS)})
+    return section.draw(np.random.default_rng(seed))[0]
+
+
+def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
     """Records of passes over one line; wrong: what the fit will not know."""
     random = np.random.default_rng([seed, passes])
-    line, pantograph = load_catenary(LINE), load_pantograph(PANTOGRAPH)
+    line, pantograph = design_of(seed, kind), load_pantograph(PANTOGRAPH)
+    faster = line.contact_wire.wave_speed / design_of(0, "uniform").contact_wire.wave_speed
     settings: dict[str, Any] = {}
+    if not line.ends:
+        settings = {"spans": SPANS + BEYOND, "distance": SPANS * line.span_length}
     if wrong == "damping":
-        damping = line.damping  # type: ignore[attr-defined]
+        damping = line.damping
         other = damping.model_copy(update={"alpha": 2 * damping.alpha, "beta": 2 * damping.beta})
         line = line.model_copy(update={"damping": other})
     if wrong == "pantograph":
@@ -47,17 +76,15 @@ def records_of(seed: int, passes: int, wrong: str) -> list[Record]:
         springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
         pantograph = pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
     if wrong == "window":
-        settings = {"window": 0}
+        settings["window"] = 0
     found = []
-    for k, speed in enumerate(SPEEDS[-passes:]):
+    for k, speed in enumerate(faster * np.array(SPEEDS[-passes:])):
         run = simulate(
             line,
             pantograph,
-            speed,
+            float(speed),
             line_condition="as-built",
             seed=seed,
-            spans=SPANS + BEYOND,
-            distance=SPANS * 60.0,
             record_droppers=False,
             **settings,
         )
@@ -77,47 +104,51 @@ def records_of(seed: int, passes: int, wrong: str) -> list[Record]:
     return found
 
 
-def judge(seed: int, passes: int, wrong: str) -> dict[str, Any]:
+def judge(seed: int, passes: int, wrong: str, kind: str) -> dict[str, Any]:
     """Errors and standard deviations of one fit by kind, in the values' own units."""
-    records = records_of(seed, passes, wrong)
-    found = fit(records, load_catenary(LINE), load_pantograph(PANTOGRAPH))
-    true = draw(
-        (LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), 9 * (SPANS + BEYOND), SPANS + BEYOND - 1
-    )
+    records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
+    found = fit(records, line, load_pantograph(PANTOGRAPH))
+    spans = line.spans if line.ends else SPANS + BEYOND
+    droppers = len(dropper_positions(line, spans))
+    true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
     assert true.heights is not None
     truths = {"tensions": np.array(true.tensions) - 1, "droppers": true.scatter, "supports": true.heights}
-    rows: dict[str, Any] = {"seed": seed, "passes": passes, "wrong": wrong, "settled": found.solution.settled}
+    rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
+    rows["settled"] = found.solution.settled
     rows["left"] = [left for _, left in found.left]
     rows["as_noise"] = [white.probability for white in found.whiteness]
-    for kind, truth in truths.items():
-        own = found.of_kind(kind)
-        rows[kind] = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
+    for name, truth in truths.items():
+        own = found.of_kind(name)
+        rows[name] = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
     return rows
 
 
-def write(folder: Path, seed: int, passes: int, wrong: str) -> None:
+def write(path: Path, seed: int, passes: int, wrong: str, kind: str) -> None:
     """Judge one line, and write what was found."""
-    with write_whole(folder / f"{wrong}-{passes}-{seed}.json") as temporary:
-        temporary.write_text(json.dumps(judge(seed, passes, wrong)), encoding="utf-8")
+    with write_whole(path) as temporary:
+        temporary.write_text(json.dumps(judge(seed, passes, wrong, kind)), encoding="utf-8")
 
 
 def table(folder: Path) -> Iterator[str]:
-    """Rows of a table in Markdown: coverage and errors by what is wrong and the number of passes."""
-    paths = sorted(path for wrong in WRONG for path in folder.glob(f"{wrong}-*.json"))
-    results = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-    yield "| model | passes | lines | tension (%), inside | dropper (mm) | support (mm) | unlike noise |"
-    yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
-    for wrong, passes in sorted({(each["wrong"], each["passes"]) for each in results}):
-        own = [each for each in results if (each["wrong"], each["passes"]) == (wrong, passes)]
+    """Rows of a table in Markdown: coverage and errors by line, what is wrong, and the number of passes."""
+    results = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*-*-*-*.json"))]
+    yield f"| {' | '.join(HEADINGS)} |"
+    yield f"| --- | --- |{' ---: |' * (len(HEADINGS) - 2)}"
+    groups: dict[Any, list[Any]] = {}
+    for each in results:
+        order = LINES.index(each["line"]), WRONG.index(each["wrong"]), each["passes"]
+        groups.setdefault(order, []).append(each)
+    for (line, number, passes), own in sorted(groups.items()):
         cells = []
         for kind, scale in (("tensions", 100.0), ("droppers", 1e3), ("supports", 1e3)):
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < 1.96 * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2f}, {inside:.0f} %")
         unlike = np.mean([min(each["as_noise"]) < 0.01 for each in own])
-        what = "right" if wrong == "nothing" else f"wrong: {wrong}"
-        yield f"| {what} | {passes} | {len(own)} | {' | '.join(cells)} | {100 * unlike:.0f} % |"
+        what = f"wrong: {WRONG[number]}" if number else "right"
+        cells = [LINES[line], what, f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
+        yield f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
@@ -128,14 +159,16 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--lines", type=int, default=20)
     parser.add_argument("--passes", type=int, default=4, choices=range(1, len(SPEEDS) + 1))
+    parser.add_argument("--line", choices=LINES, default=LINES[0])
     parser.add_argument("--wrong", choices=WRONG, default=WRONG[0])
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     if not given.table:
         for seed in range(given.lines):
-            if not (given.folder / f"{given.wrong}-{given.passes}-{seed}.json").is_file():
-                write(given.folder, seed, given.passes, given.wrong)
+            path = given.folder / f"{given.line}-{given.wrong}-{given.passes}-{seed}.json"
+            if not path.is_file():
+                write(path, seed, given.passes, given.wrong, given.line)
                 print(f"line {seed + 1} of {given.lines}", flush=True)
     for row in table(given.folder):
         print(row)
