@@ -1,5 +1,6 @@
 """Records held against the line of a fit: one as it was is healthy, a broken dropper is found."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -30,9 +31,9 @@ def coarse():
         yield
 
 
-def record_of(condition, speed=250.0, seed=0, position_error=0.3):
+def record_of(condition, speed=250.0, seed=0, position_error=0.3, accuracy="fast"):
     run = simulate(
-        LINE, PANTOGRAPH, speed, spans=2 * SPANS, distance=60.0 * SPANS, accuracy="fast",
+        LINE, PANTOGRAPH, speed, spans=2 * SPANS, distance=60.0 * SPANS, accuracy=accuracy,
         line_condition=condition, record_droppers=False,
     )  # fmt: skip
     return measured(run, seed=seed, position_error=position_error, name=f"{speed:g} km/h")
@@ -92,13 +93,19 @@ def test_what_cannot_be_judged_is_refused(healthy_record, known):
         measured_passes([healthy_record], replace(known, line='{"kind": "flexible"}'))
 
 
-def test_the_command(healthy_record, known, tmp_path):
-    write_record(record_of({"broken_droppers": ((12, 4),)}, seed=2), tmp_path / "later.csv")
+def test_the_command(known, tmp_path, monkeypatch):
+    """At full accuracy, which a command has whatever these tests changed."""
+    monkeypatch.setattr(preparing, "NUMERICS", Numerics())
+    record = record_of({"broken_droppers": ((12, 4),)}, seed=2, accuracy="full")
+    write_record(record, tmp_path / "later.csv")
     store(replace(known, notes=("The fit to earlier has not settled.",)), tmp_path / "earlier.safetensors")
     done = panto("diagnose", "later.csv", "--fit", "earlier.safetensors", "--plot", "found.png", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "broken dropper" in done.stdout
     assert "has not settled" in done.stdout
+    told = json.loads(
+        panto("diagnose", "later.csv", "--fit", "earlier.safetensors", "--json", cwd=tmp_path).stdout
+    )
+    assert [finding["kind"] for finding in told["findings"]] == ["broken dropper"]
     assert (tmp_path / "found.png").read_bytes().startswith(b"\x89PNG")
     for words, sentence in (
         ((), "Give either the healthy runs"),

@@ -6,6 +6,8 @@ import shutil
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from panto_agents.stored import FOLDER as MODELS
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import load_benchmark
@@ -15,6 +17,9 @@ from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of
 from panto_env.estimation.motion import measure
 from panto_env.estimation.motion_file import write_motion
+from panto_env.fitting.measured import BANDS
+from panto_env.fitting.stored import Stored, store
+from panto_env.fitting.values import Value
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
 from panto_env.records.measured import measured
 from panto_env.records.record_file import write_record as write_measured
@@ -160,6 +165,8 @@ def write_made_files(folder: Path) -> None:
         run = simulate("en50318-2002", "dsa250", speed, accuracy="fast", distance=1200.0)
         run.save(folder / "passes" / f"{k}.parquet")
     write_measured(measured(run, position_error=0.3), folder / "measured.csv")
+    for name in ("month1", "month2"):
+        store(made_up_fit(name), folder / f"{name}.safetensors")
     shutil.copy(next(MODELS.glob("*.safetensors")), folder / "agent.safetensors")
     shutil.copy(DOCS / "benchmark" / "head.json", folder / "benchmark.json")
     run_benchmark(load_benchmark(folder / "small.toml"), workers=1).save(folder / "result.json")
@@ -168,6 +175,15 @@ def write_made_files(folder: Path) -> None:
     (folder / "set").mkdir()
     shutil.copy(folder / "rig.csv", folder / "set" / "rig.csv")
     write_checksums(folder / "set")
+
+
+def made_up_fit(name: str) -> Stored:
+    """What a fit knows of ten droppers."""
+    values = tuple(
+        Value("droppers", f"dropper {k}", "mm", 1e3, 5e-3, 600.0 + 6.0 * k, (k,)) for k in range(10)
+    )
+    known = np.zeros(10), 1e-6 * np.eye(10), (540.0, 900.0), np.ones(BANDS), ()
+    return Stored(name, "{}", "{}", values, *known)
 
 
 def marked(text: str, description: str, name: str) -> str:

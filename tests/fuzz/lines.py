@@ -52,6 +52,7 @@ USUAL: dict[tuple[str, ...], tuple[str, ...]] = {
         "--free",
         "tensions",
     ),
+    ("drift",): ("month1.safetensors", "month2.safetensors"),
     ("diagnose",): (
         "passes/1.parquet",
         "--healthy",
