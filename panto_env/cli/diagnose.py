@@ -17,8 +17,8 @@ from .record import Mass, Unit
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
-MOST_FALSE_ALARMS = 20.0
-"""Maximum false alarms per km, about one per span: beyond it a threshold has no meaning."""
+LEAST_FALSE_ALARMS, MOST_FALSE_ALARMS = 1e-6, 20.0
+"""Minimum false alarms per km: healthy passes say nothing of spans so rare. Maximum false alarms per km, about one per span: beyond it a threshold has no meaning."""
 
 
 def diagnose(
@@ -87,9 +87,10 @@ def diagnose(
     if fit is None and (mass is not None or unit):
         raise InputError("--mass and --unit are of records, which are diagnosed with --fit; leave them out.")
     rate = FALSE_ALARMS if false_alarms is None else false_alarms
-    if not 0 < rate <= MOST_FALSE_ALARMS:
+    if not LEAST_FALSE_ALARMS <= rate <= MOST_FALSE_ALARMS:
         raise InputError(
-            f"--false-alarms must lie above 0 and up to {MOST_FALSE_ALARMS:g} per km, not {rate:g}."
+            f"--false-alarms must lie between {LEAST_FALSE_ALARMS:g} and {MOST_FALSE_ALARMS:g} per km, not "
+            f"{rate:g}."
         )
     if seed < 0:
         raise InputError(f"--seed must be a whole number from 0 up, not {seed}.")

@@ -48,8 +48,8 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         "false_alarms": 0.1, "notes": ["first note", "second note"], "findings": [],
     }  # fmt: skip
     for wrong, sentence in (
-        (("--false-alarms", 0), "--false-alarms must lie above 0 and up to 20 per km, not 0."),
-        (("--false-alarms", 20.1), "--false-alarms must lie above 0 and up to 20 per km, not 20.1."),
+        (("--false-alarms", 0), "--false-alarms must lie between 1e-06 and 20 per km, not 0."),
+        (("--false-alarms", 20.1), "--false-alarms must lie between 1e-06 and 20 per km, not 20.1."),
         (("--seed", -1), "--seed must be a whole number from 0 up, not -1."),
     ):
         refused = panto("diagnose", "run", "--healthy", "a", *wrong)
