@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
 LEAST_FALSE_ALARMS, MOST_FALSE_ALARMS = 1e-6, 20.0
-"""Minimum false alarms per km: healthy passes say nothing of spans so rare. Maximum false alarms per km, about one per span: beyond it a threshold has no meaning."""
+"""False alarms per km: healthy passes say nothing of rarer ones, and with more, about one per span, a
+threshold has no meaning."""
 
 
 def diagnose(

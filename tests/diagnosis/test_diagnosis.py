@@ -384,7 +384,7 @@ def test_command_prints_json(files):
     [
         ([], "Give either the healthy runs"),
         (["--healthy", "none.parquet"], "none.parquet does not exist"),
-        (["--healthy", "a.parquet", "--false-alarms", "0"], "must lie above 0 and up to 20 per km, not 0"),
+        (["--healthy", "a.parquet", "--false-alarms", "0"], "must lie between 1e-06 and 20 per km, not 0"),
         (["--healthy", "a.parquet", "--seed", "-1"], "--seed must be a whole number from 0 up, not -1"),
     ],
 )
