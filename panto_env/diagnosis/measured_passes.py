@@ -19,12 +19,11 @@ from ..fitting.problem import Problem, problem
 from ..fitting.solve import Part
 from ..fitting.stored import Stored, along
 from ..fitting.values import FREE
-from ..metrics.low_pass import CUTOFF
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
-from .passes import LEAD, PER_WAVE, SPEEDS, STEP, Passes, places_of
+from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
 
 HEALTHY = 24
 """Healthy passes that are simulated: enough to know how much they differ."""
@@ -90,8 +89,7 @@ def _places(
             f"Fit and records share {max(end - begin, 0.0):.0f} m from {begin:,.0f} m on; a diagnosis takes "
             "two whole spans: give records of the fit's stretch."
         )
-    wave = from_kmh(speed_kmh) / CUTOFF
-    per_span = math.ceil(alignment.mean_length / min(STEP, wave / PER_WAVE) - 1e-9)
+    per_span = places_per_span(alignment.mean_length, speed_kmh)
     return first, per_span, places_of(alignment, first, per_span, (last - first) * per_span)
 
 

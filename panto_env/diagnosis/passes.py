@@ -72,6 +72,11 @@ class Passes:
         return self.span / self.per_span
 
 
+def places_per_span(span: float, speed_kmh: float) -> int:
+    """Number of places in a span (m), so many that a train's force is known between them."""
+    return math.ceil(span / min(STEP, from_kmh(speed_kmh) / CUTOFF / PER_WAVE) - 1e-9)
+
+
 def places_of(alignment: Alignment, first: int, per_span: int, count: int) -> Array:
     """Positions (m), (count,), of places, so many in each span, from a number of spans on."""
     return np.asarray(alignment.support(first + np.arange(count) / per_span))
@@ -120,7 +125,7 @@ def side_by_side(
             f"felt up to span {FIRST_SETTLED - 1}, and a whole span after it is required: run "
             f"{alignment.support(FIRST_SETTLED) + END:g} m or more."
         )
-    per_span = math.ceil(span / min(STEP, from_kmh(speed) / CUTOFF / PER_WAVE) - 1e-9)
+    per_span = places_per_span(span, speed)
     before = FIRST_SETTLED - 1 - LEAD
     places = places_of(alignment, before, per_span, (last - before) * per_span)
     force = np.zeros((len(everything), len(places)))
