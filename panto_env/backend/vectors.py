@@ -132,8 +132,42 @@ _comparison(">=", operator.ge)
 _comparison("==", operator.eq)
 
 
+def _number(k: int) -> Any:
+    return ir.Constant(ir.IntType(32), k)
+
+
+def _vector(builder: Any, numbers: list[Any]) -> Any:
+    """A vector of eight numbers, or another count of them."""
+    vector = ir.Constant(ir.VectorType(numbers[0].type, len(numbers)), ir.Undefined)
+    for k, number in enumerate(numbers):
+        vector = builder.insert_element(vector, number, _number(k))
+    return vector
+
+
+def _numbers(context: Any, builder: Any, array_type: Any, array: Any, places: list[Any]) -> list[Any]:
+    """Addresses of the numbers of a table at places, counted row by row.
+
+    In C's order they follow each other; in columns of lanes side by side, ``Columns``, each is one stride after
+    the one before.
+    """
+    table = make_array(array_type)(context, builder, array)
+    if array_type.layout == "C":
+        return [builder.gep(table.data, [place]) for place in places]
+    stride = builder.extract_value(table.strides, array_type.ndim - 1)
+    start = builder.ptrtoint(table.data, stride.type)
+    return [
+        builder.inttoptr(builder.add(start, builder.mul(place, stride)), table.data.type) for place in places
+    ]
+
+
+def _in_row(builder: Any, i: Any, count: int) -> list[Any]:
+    """Places of the numbers of row ``i`` of ``count``."""
+    first = builder.mul(i, ir.Constant(i.type, count))
+    return [builder.add(first, ir.Constant(i.type, k)) for k in range(count)]
+
+
 def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -> Any:
-    """Address of a row of ``count`` numbers."""
+    """Address of a row of ``count`` numbers in C's order."""
     array, i = values
     data = make_array(array_type)(context, builder, array).data
     first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, count))])
@@ -141,7 +175,7 @@ def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -
 
 
 def _is_table(array: Any, dimensions: tuple[int, ...] = (2,)) -> bool:
-    return isinstance(array, types.Array) and array.ndim in dimensions and array.layout == "C"
+    return isinstance(array, types.Array) and array.ndim in dimensions and array.layout in "CA"
 
 
 def _load_plain(rows: Any, i: int) -> Any:
@@ -161,8 +195,11 @@ def row_access(count: int) -> tuple[Any, Any]:
             return None
 
         def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            place = _row(context, builder, sig.args[0], values, count)
-            return builder.load(place, align=rows.dtype.bitwidth // 8)
+            if rows.layout == "C":
+                place = _row(context, builder, sig.args[0], values, count)
+                return builder.load(place, align=rows.dtype.bitwidth // 8)
+            places = _numbers(context, builder, sig.args[0], values[0], _in_row(builder, values[1], count))
+            return _vector(builder, [builder.load(place) for place in places])
 
         return VectorType(rows.dtype, count)(rows, types.intp), build
 
@@ -172,8 +209,14 @@ def row_access(count: int) -> tuple[Any, Any]:
             return None
 
         def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            place = _row(context, builder, sig.args[0], values[:2], count)
-            builder.store(values[2], place, align=rows.dtype.bitwidth // 8)
+            array, i, vector = values
+            if rows.layout == "C":
+                place = _row(context, builder, sig.args[0], (array, i), count)
+                builder.store(vector, place, align=rows.dtype.bitwidth // 8)
+                return context.get_dummy_value()
+            places = _numbers(context, builder, sig.args[0], array, _in_row(builder, i, count))
+            for k, place in enumerate(places):
+                builder.store(builder.extract_element(vector, _number(k)), place)
             return context.get_dummy_value()
 
         return types.void(rows, types.intp, VectorType(rows.dtype, count)), build
@@ -209,29 +252,22 @@ shift_down: Any = _shift(up=False)
 
 
 def _gather_plain(rows: Any, places: Any, i: int) -> Any:
-    return rows.reshape(-1)[places[i]]
+    return rows[np.unravel_index(places[i], rows.shape)]
 
 
 def _scatter_plain(rows: Any, places: Any, i: int, vector: Any) -> None:
-    np.add.at(rows.reshape(-1), places[i], vector)
+    np.add.at(rows, np.unravel_index(places[i], rows.shape), vector)
 
 
 def _are_places(array: Any) -> bool:
     return _is_table(array) and isinstance(array.dtype, types.Integer)
 
 
-def _offsets(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> list[Any]:
-    """The numbers in row ``i`` of ``places``."""
-    table = make_array(kind)(context, builder, places).data
-    first = builder.mul(i, ir.Constant(i.type, WIDTH))
+def _read_places(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> list[Any]:
+    """The numbers in row ``i`` of ``places``, as a stride counts."""
     # Read one by one: taken from a vector they would cost a second instruction each.
-    return [
-        builder.load(builder.gep(table, [builder.add(first, ir.Constant(i.type, k))])) for k in range(WIDTH)
-    ]
-
-
-def _number(k: int) -> Any:
-    return ir.Constant(ir.IntType(32), k)
+    found = _numbers(context, builder, kind, places, _in_row(builder, i, WIDTH))
+    return [builder.sext(builder.load(each), i.type) for each in found]
 
 
 @in_python(_gather_plain)
@@ -243,12 +279,10 @@ def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        data = make_array(sig.args[0])(context, builder, values[0]).data
-        vector = ir.Constant(ir.VectorType(context.get_value_type(rows.dtype), WIDTH), ir.Undefined)
-        for k, offset in enumerate(_offsets(context, builder, sig.args[1], *values[1:])):
-            item = builder.load(builder.gep(data, [offset]))
-            vector = builder.insert_element(vector, item, _number(k))
-        return vector
+        table, places, i = values
+        at = _read_places(context, builder, sig.args[1], places, i)
+        found = _numbers(context, builder, sig.args[0], table, at)
+        return _vector(builder, [builder.load(each) for each in found])
 
     return VectorType(rows.dtype)(rows, places, types.intp), build
 
@@ -262,9 +296,10 @@ def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        data = make_array(sig.args[0])(context, builder, values[0]).data
-        for k, offset in enumerate(_offsets(context, builder, sig.args[1], *values[1:3])):
-            item, address = builder.extract_element(values[3], _number(k)), builder.gep(data, [offset])
+        table, places, i, vector = values
+        at = _read_places(context, builder, sig.args[1], places, i)
+        for k, address in enumerate(_numbers(context, builder, sig.args[0], table, at)):
+            item = builder.extract_element(vector, _number(k))
             builder.store(builder.fadd(builder.load(address), item, flags=FLAGS), address)
         return context.get_dummy_value()
 

@@ -60,9 +60,14 @@ class Stepping:
         """The named tuples that the kernels take after those of the plant."""
         return self.sensors, self.samples, self.episode, self.running
 
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """All named tuples that the kernels take, in their order."""
+        return *self.plant.arrays, *self._arrays
+
     def _bind(self) -> None:
         """Bind the kernels to the arrays."""
-        packed = pack(*self.plant.arrays, *self._arrays)
+        packed = pack(*self.arrays)
         run = bind(control_steps, packed, *self.results, 0, self.lanes)
         self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
         alone = partial(run, *self.results, 0, 1)

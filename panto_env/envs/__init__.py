@@ -1,13 +1,35 @@
 """Gymnasium environments."""
 
+from typing import Any
+
 import gymnasium
 
+from ..base.errors import InputError
 from .driven import DrivenByPolicies
 from .ids import BARE, IDS
 from .single import PantographEnv
 from .vector import PantographVectorEnv
 
-__all__ = ["BARE", "IDS", "DrivenByPolicies", "PantographEnv", "PantographVectorEnv", "register"]
+__all__ = ["BARE", "IDS", "DrivenByPolicies", "PantographEnv", "PantographVectorEnv", "register", "vector_env"]
+
+
+def vector_env(**settings: Any) -> Any:
+    """The vector environment: `PantographVectorEnv`, or with a ``device`` `PantographTensorEnv`.
+
+    Raises InputError for a value that is not valid, and with a device where PyTorch is missing.
+    """
+    if settings.get("device") is None:
+        settings.pop("device", None)
+        return PantographVectorEnv(**settings)
+    try:
+        from .tensors import PantographTensorEnv  # PyTorch is an extra
+    except ModuleNotFoundError as error:
+        if error.name != "torch":
+            raise
+        raise InputError(
+            "A vector environment on a device needs PyTorch; install it: pip install 'panto-env[cuda]'."
+        ) from error
+    return PantographTensorEnv(**settings)
 
 
 def register() -> None:
@@ -17,6 +39,6 @@ def register() -> None:
             gymnasium.register(
                 name,
                 entry_point="panto_env.envs:PantographEnv",
-                vector_entry_point="panto_env.envs:PantographVectorEnv",
+                vector_entry_point="panto_env.envs:vector_env",
                 kwargs=settings,
             )

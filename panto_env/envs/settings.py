@@ -15,6 +15,8 @@ from ..control.settings import RunSettings
 
 MOST_LANES = 10_000_000
 """Lanes that fit into a large machine's memory with a massless wire; with others fewer do."""
+USUAL_STARTS = 1024
+"""Starts of episodes that are drawn for a device, at most: drawing and running in a start takes milliseconds."""
 Pixels = Annotated[int, Between(64, 4096)]
 SlowMotion = Field(
     1.0, description="factor by which a film of the frames is slowed down, included in `render_fps` (-)"
@@ -121,6 +123,27 @@ class VectorSettings(RunSettings):
         beyond = [lane for lane in self.render_lanes or () if lane >= self.num_envs]
         if beyond:
             raise InputError(f"render_lanes has lane {beyond[0]}, but lanes are 0 to {self.num_envs - 1}.")
+        return self
+
+
+class TensorSettings(VectorSettings):
+    """Arguments of ``PantographTensorEnv``."""
+
+    device: str = Field("cuda", description='where the tensors are: "cuda", "cuda:1" and so on, or "cpu"')
+    starts: Annotated[int, Between(2, MOST_LANES)] | None = Field(
+        None,
+        description="starts of episodes that are drawn at a reset; by default as many as lanes, 1024 at most",
+    )
+
+    @property
+    def used_starts(self) -> int:
+        """Number of starts."""
+        return self.starts or max(2, min(self.trains, USUAL_STARTS))
+
+    @model_validator(mode="after")
+    def _no_pictures(self) -> TensorSettings:
+        if self.render_mode is not None:
+            raise InputError("On a device there are no pictures; leave out render_mode, or device.")
         return self
 
 

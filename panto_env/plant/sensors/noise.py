@@ -15,7 +15,7 @@ class Noise:
 
     def __init__(self, rms: tuple[float, ...], lanes: int) -> None:
         """rms: of each reading, in its unit. Each lane must be started."""
-        self._rms = np.array(rms)
+        self.rms = np.array(rms)
         self._random = [np.random.default_rng(0)] * lanes
         self._enough = 0  # minimum number of readings that are prepared in every lane
 
@@ -37,5 +37,5 @@ class Noise:
 
     def _draw(self, sensors: Any, lane: int) -> None:
         drawn = sensors.noise[lane]
-        drawn[:] = self._rms * self._random[lane].standard_normal(drawn.shape)
+        drawn[:] = self.rms * self._random[lane].standard_normal(drawn.shape)
         sensors.noise_used[lane] = 0

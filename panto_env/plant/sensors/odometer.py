@@ -74,7 +74,7 @@ class Odometers:
         self.errors, self.drawn, self._lanes, self._alignment = errors, errors.drawn, lanes, alignment
         length = alignment.mean_length
         walk = errors.walk * math.sqrt(length / WALK) / length
-        self._noise = Noise((walk, errors.mast / length, errors.speed), lanes)
+        self.noise = Noise((walk, errors.mast / length, errors.speed), lanes)
 
     def arrays(self) -> OdometerArrays:
         """Odometers of all lanes, for kernels."""
@@ -98,11 +98,11 @@ class Odometers:
         scale, mast = own.standard_normal(2)
         first = self.errors.mast / float(self._alignment.lengths[0]) * mast
         arrays.table[lane] = 0.0, 0.0, first, self.errors.scale * scale
-        self._noise.start(arrays, lane, own)
+        self.noise.start(arrays, lane, own)
 
     def prepare(self, arrays: OdometerArrays, skip: Any = None) -> None:
         """Make sure that all lanes, except those to skip, have the numbers of their next reading."""
-        self._noise.prepare(arrays, skip)
+        self.noise.prepare(arrays, skip)
 
 
 @inlined
