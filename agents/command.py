@@ -60,6 +60,9 @@ def train(
     ] = False,
     seed: Annotated[int | None, typer.Option(help="Seed, instead of the file's.")] = None,
     steps: Annotated[int | None, typer.Option(help="Environment steps, instead of the file's.")] = None,
+    device: Annotated[
+        str | None, typer.Option(help='"cuda": environments and network on a GPU; the processor by default.')
+    ] = None,
     json: Json = False,
 ) -> None:
     """Train a model; the benchmark takes its file as a policy."""
@@ -68,7 +71,7 @@ def train(
     from .settings import load_training
     from .trainings import run_name
 
-    training = load_training(config, seed=seed, total_steps=steps)
+    training = load_training(config, seed=seed, total_steps=steps, device=device)
     folder = output or Path("runs") / run_name(config, training)
     if resume:
         RunFolder(folder).check_resumable(training)

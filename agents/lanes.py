@@ -30,6 +30,10 @@ def make_lanes(training: Training) -> Any:
         from .pass_lanes import PassLanes
 
         return PassLanes(training, training.hyperparameters.pulsing())
+    if training.device is not None:
+        from .device_ppo import DeviceLanes
+
+        return DeviceLanes(training)
     parts = [_part(training, changes) for changes in training.variants or ({},)]
     return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
 

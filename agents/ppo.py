@@ -47,7 +47,11 @@ class PPO(Algorithm):
             )
 
     def make_learner(self, lanes: Any, seed: int) -> Any:
-        """Learner for a ``VecEnv``."""
+        """Learner for a ``VecEnv``, or for lanes on a device."""
+        from .device_ppo import DeviceLanes, DevicePPO
+
+        if isinstance(lanes, DeviceLanes):
+            return DevicePPO(self, lanes, seed)
         import stable_baselines3
 
         return stable_baselines3.PPO(
@@ -92,4 +96,8 @@ class PPO(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mean of the action, clipped."""
+        from .device_ppo import DevicePPO
+
+        if isinstance(model, DevicePPO):
+            return self.actor_from_layers(model.network.actor)
         return self.actor_from_layers(model.policy.mlp_extractor.policy_net, model.policy.action_net)

@@ -61,6 +61,11 @@ class Training(Settings):
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
         8, description="number of environments stepped together"
     )
+    device: str | None = Field(
+        None,
+        description='"cuda" for environments and network on a GPU, with algorithm "ppo"; by default the '
+        "processor",
+    )
     lines: Count | None = Field(
         None,
         description="lines side by side where the environment's catenary is a list, a family or a section; "
@@ -127,7 +132,7 @@ def speeds(own: Mapping[str, Any]) -> tuple[float, ...]:
 def load_training(path: str | Path, **changes: Any) -> Training:
     """Read a training from a TOML file, given by its path or by a name of ``configs/``.
 
-    ``changes`` (seed, total_steps) replace the file's values unless None.
+    ``changes`` (seed, total_steps, device) replace the file's values unless None.
 
     Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
@@ -157,11 +162,27 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training)
+        _check_device(training)
         _check_environment(training)
         _check_policies(training)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removesuffix('.')}.") from error
     return training
+
+
+def _check_device(training: Training) -> None:
+    """Raise InputError for what a training on a device cannot do."""
+    if training.device is None:
+        return
+    if training.algorithm != "ppo":
+        raise InputError(f"on a device only ppo learns, not {training.algorithm}; leave out device")
+    unused = "start_from", "residual_of", "washout", "variants", "lines"
+    given = [name for name in unused if getattr(training, name)]
+    if given:
+        raise InputError(
+            f"on a device an agent acts alone, on one line; leave out {', '.join(given)}, or device. The "
+            "environment has a washout of its own"
+        )
 
 
 def _check_environment(training: Training) -> None:

@@ -1,8 +1,8 @@
 """Arrays of kernels in the memory of a PyTorch device, the numbers of neighbouring lanes side by side.
 
-A thread of a GPU computes a lane, and what neighbouring threads read at once should lie side by side. So the last
-axis of everything that differs from lane to lane is the lane: each lane is a column. Kernels index the same
-arrays with the same axes as ever; only the strides differ.
+A thread of a GPU computes a lane, and what neighbouring threads read at once should lie side by side. So
+the last axis of everything that differs from lane to lane is the lane: each lane is a column. Kernels index
+the same arrays with the same axes as ever; only the strides differ.
 """
 
 from __future__ import annotations
@@ -33,18 +33,24 @@ class Block(NamedTuple):
 class Columns:
     """Named tuples of tensors with room for a number of lanes, on one device.
 
-    Lanes lie in tiles: a tile has the columns of lanes that are stepped together, so that all that they read and
-    write lies close together.
+    Lanes lie in tiles: a tile has the columns of lanes that are stepped together, so that all that they
+    read and write lies close together.
     """
 
     def __init__(
-        self, one: Sequence[Any], several: Sequence[Any], count: int, lanes: int, tile: int, device: torch.device
+        self,
+        one: Sequence[Any],
+        several: Sequence[Any],
+        count: int,
+        lanes: int,
+        tile: int,
+        device: torch.device,
     ) -> None:
         """Make room for ``lanes``, all zero; what is alike in all lanes is copied from ``several``.
 
-        one, several: the same named tuples of NumPy arrays, made for one lane and for ``count`` lanes, at least two:
-        the axis in which their shapes differ is that of the lanes. tile: lanes of a tile; the last one has room to
-        spare where they do not divide ``lanes``.
+        one, several: the same named tuples of NumPy arrays, made for one lane and for ``count`` lanes, at
+        least two: the axis in which their shapes differ is that of the lanes. tile: lanes of a tile; the
+        last one has room to spare where they do not divide ``lanes``.
         """
         self.lanes, self.tile, self.tiles = lanes, tile, -(-lanes // tile)
         self.device, self._count = device, count
@@ -59,9 +65,7 @@ class Columns:
         for axes, each in zip(self._axes, several, strict=True):
             map_arrays(counted, axes, each)
         self.blocks = {
-            block: torch.zeros(
-                (self.tiles, n, tile * block.per_lane), dtype=KINDS[block.kind], device=device
-            )
+            block: torch.zeros((self.tiles, n, tile * block.per_lane), dtype=KINDS[block.kind], device=device)
             for block, n in rows.items()
         }
         """All that differs from lane to lane: (tiles, numbers, columns) of each kind."""
@@ -80,15 +84,16 @@ class Columns:
         self.tuples = tuple(
             map_arrays(placed, axes, each) for axes, each in zip(self._axes, several, strict=True)
         )
-        """The named tuples. What differs from lane to lane has an axis of tiles, then those of its array; all such
-        are views of ``blocks``.
+        """The named tuples. What differs from lane to lane has an axis of tiles, then those of its array;
+        all such are views of ``blocks``.
         """
 
     def _block(self, axis: int, array: Any) -> Block:
         return Block(array.dtype, array.shape[axis] // self._count)
 
     def tile_of(self, number: int) -> tuple[Any, Any]:
-        """The tuple with this number in the first tile, and how far apart each tensor is in neighbouring ones (bytes).
+        """The tuple with this number in the first tile, and how far apart each tensor is in neighbouring
+        ones (bytes).
 
         What is alike in all lanes is 0 apart.
         """
@@ -103,7 +108,9 @@ class Columns:
         return map_arrays(first, axes, ours), map_arrays(apart, axes, ours)
 
     def of_lanes(self, tensor: torch.Tensor) -> torch.Tensor:
-        """A copy of a tensor whose lanes are on its first axis after that of tiles, without that: (lanes, ...)."""
+        """A copy of a tensor whose lanes are on its first axis after that of tiles, without that: (lanes,
+        ...).
+        """
         return tensor.reshape(-1, *tensor.shape[2:])[: self.lanes * tensor.shape[1] // self.tile].clone()
 
     def write(self, tensor: torch.Tensor, values: torch.Tensor) -> None:
@@ -149,7 +156,9 @@ class Columns:
         if per_lane == 1:
             return lanes // self.tile, columns
         each = torch.arange(per_lane, device=lanes.device)
-        return (lanes // self.tile).repeat_interleave(per_lane), (columns[:, None] * per_lane + each).flatten()
+        return (lanes // self.tile).repeat_interleave(per_lane), (
+            columns[:, None] * per_lane + each
+        ).flatten()
 
 
 def map_arrays(function: Callable[..., Any], *tuples: Any) -> Any:
@@ -157,7 +166,7 @@ def map_arrays(function: Callable[..., Any], *tuples: Any) -> Any:
 
     Numbers, and tuples of numbers, stay as they are in the last one.
     """
-    first, last = tuples[0], tuples[-1]
+    last = tuples[-1]
     if hasattr(last, "_fields"):
         return type(last)(*(map_arrays(function, *fields) for fields in zip(*tuples, strict=True)))
     return function(*tuples) if isinstance(last, np.ndarray | torch.Tensor) else last
@@ -165,7 +174,9 @@ def map_arrays(function: Callable[..., Any], *tuples: Any) -> Any:
 
 def _axis(one: Any, several: Any) -> int | None:
     """Axis of the lanes of an array, None where it is alike in all."""
-    differ = [axis for axis, pair in enumerate(zip(one.shape, several.shape, strict=True)) if pair[0] != pair[1]]
+    differ = [
+        axis for axis, pair in enumerate(zip(one.shape, several.shape, strict=True)) if pair[0] != pair[1]
+    ]
     return differ[0] if differ else None
 
 

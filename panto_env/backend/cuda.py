@@ -1,11 +1,15 @@
 """Kernels on a GPU: a part of kernels, compiled by numba-cuda, with a thread for each lane.
 
-The source is that of the processor's kernels. numba-cuda comes with the extra "cuda".
+The source is that of the processor's kernels, and so are the results, bit for bit, as far as was seen. What
+is compiled is kept on disk: it takes a minute. The extra "cuda" brings what this needs.
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -16,13 +20,20 @@ from llvmlite import ir
 from numba import types
 from numba.core.extending import intrinsic
 
+from ..base.checksums import checksum, read_checked, write_checked
+from ..base.errors import InputError
+from .cache import cache_folder, kernel_hash
 from .columns import Columns
 from .packed import PackedType, open_packed
 
-REGISTERS = 128
-"""Registers of a thread: 16 warps then share a multiprocessor's, and while some wait for memory others go on. With
-all that a thread can get, 255, a step takes a tenth longer, on an H100.
+TILE = 32
+"""Lanes in a tile, and threads in a block: those of a warp."""
+BLOCKS = 16
+"""Blocks that share a multiprocessor: while some wait for memory others go on. A thread then has 128
+registers; with all that it can get, 255, a step takes a tenth longer, on an H100.
 """
+POINTER_WORD = 4
+"""Word of an array's compiled form that is the address of its numbers."""
 
 
 class PackedTiles:
@@ -38,7 +49,9 @@ class PackedTiles:
             table[:, begin : begin + len(place)] = place + far * np.arange(columns.tiles)[:, None]
         self._table = torch.empty(table.shape, dtype=torch.int64, device=columns.device)
         self.address, self.apart = self._table.data_ptr(), 8 * table.shape[1]
-        table[:, : len(tiles)] = self.address + self.apart * np.arange(columns.tiles)[:, None] + 8 * begins[:-1]
+        table[:, : len(tiles)] = (
+            self.address + self.apart * np.arange(columns.tiles)[:, None] + 8 * begins[:-1]
+        )
         self._table.copy_(torch.from_numpy(table))
         self.type = PackedType(tuple(_type_of(tuple_) for tuple_, _ in tiles))
 
@@ -52,14 +65,20 @@ def _words(value: Any, apart: Any) -> Any:
         return np.concatenate([_words(*fields) for fields in zip(value, apart, strict=True)], axis=1)
     if isinstance(value, torch.Tensor):  # no owner, no parent
         size, strides = value.element_size(), value.stride()
-        words = [0, 0, value.numel(), size, value.data_ptr(), *value.shape, *(size * each for each in strides)]
+        words = [
+            0,
+            0,
+            value.numel(),
+            size,
+            value.data_ptr(),
+            *value.shape,
+            *(size * each for each in strides),
+        ]
         return np.array([words, np.where(np.arange(len(words)) == POINTER_WORD, apart, 0)], dtype=np.int64)
-    words = np.array([value], dtype=float).view(np.int64) if isinstance(value, float) else np.array([int(value)])
-    return np.stack([words, 0 * words])
-
-
-POINTER_WORD = 4
-"""Word of an array's compiled form that is the address of its numbers."""
+    number = (
+        np.array([value], dtype=float).view(np.int64) if isinstance(value, float) else np.array([int(value)])
+    )
+    return np.stack([number, 0 * number])
 
 
 def _type_of(value: Any) -> Any:
@@ -72,8 +91,8 @@ def _type_of(value: Any) -> Any:
     return types.Array(number, value.ndim, "C" if value.is_contiguous() else "A")
 
 
-def _opened(form: PackedType) -> Any:
-    """A function of kernels that opens packed arguments of one form at an address."""
+def _packed_at(form: PackedType) -> Any:
+    """A function of kernels that takes the address of packed arguments of one form for these."""
 
     @intrinsic
     def packed_at(typing: Any, address: Any) -> Any:
@@ -85,12 +104,16 @@ def _opened(form: PackedType) -> Any:
     return packed_at
 
 
-@lru_cache
-def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType) -> Any:
-    """A kernel that calls ``part`` in each of the first lanes, one tile in each block."""
+def compiled(
+    part: Callable[..., Any], form: PackedType, results: PackedType, capability: tuple[int, int]
+) -> str:
+    """PTX of a kernel that calls ``part(packed, results, lane)`` in each lane, a tile in each block.
+
+    capability: the compute capability of the GPU; none need be there.
+    """
     from numba import cuda
 
-    packed_at, results_at = _opened(form), _opened(results)
+    packed_at, results_at = _packed_at(form), _packed_at(results)
 
     def each_lane(arguments: int, apart: int, answers: int, answers_apart: int, lanes: int) -> None:
         tile, lane = cuda.blockIdx.x, cuda.threadIdx.x
@@ -98,22 +121,80 @@ def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType) -> 
             (result,) = open_packed(results_at(answers + tile * answers_apart))
             part(packed_at(arguments + tile * apart), result, lane)
 
-    return cuda.jit(types.void(*[types.int64] * 5), max_registers=REGISTERS)(each_lane)
+    signature = types.void(*[types.int64] * 5)
+    bounds = TILE, BLOCKS
+    text, _ = cuda.compile(
+        each_lane, signature, device=False, abi="numba", cc=capability, launch_bounds=bounds
+    )
+    return str(text)
+
+
+def _kept(
+    part: Callable[..., Any], form: PackedType, results: PackedType, capability: tuple[int, int]
+) -> str:
+    """As ``compiled``; from the disk where it is there already."""
+    import numba_cuda  # type: ignore[import-not-found]
+
+    name = getattr(part, "py_func", part).__name__
+    made_of = checksum(
+        [kernel_hash(), name, str(form), str(results), list(capability), numba_cuda.__version__]
+    )
+    folder = cache_folder()
+    file = None if folder is None else folder / "gpu" / f"{made_of}.json"
+    if file is not None:
+        with suppress(InputError):  # the file does not exist, or is damaged
+            found = read_checked(file)
+            if found["made_of"] == made_of:
+                return str(found["ptx"])
+    if sys.stderr is not None and sys.stderr.isatty():
+        print(
+            "Compiling for the GPU, a minute or two, once per version and kind of line ...", file=sys.stderr
+        )
+    ptx = compiled(part, form, results, capability)
+    if file is not None:
+        with suppress(InputError, OSError):  # no room: the next process compiles it again
+            file.parent.mkdir(exist_ok=True)
+            write_checked(file, {"made_of": made_of, "ptx": ptx})
+    return ptx
+
+
+@lru_cache
+def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
+    """A kernel on the GPU with this number."""
+    from cuda.core import Device, ObjectCode  # type: ignore[import-not-found]
+
+    Device(index).set_current()
+    ptx = _kept(part, form, results, torch.cuda.get_device_capability(index))
+    found = re.search(r"\.entry\s+(\w+)", ptx)
+    assert found is not None  # each kernel has an entry
+    return ObjectCode.from_ptx(ptx.encode()).get_kernel(found.group(1))
 
 
 def bind_on_gpu(part: Callable[..., Any], columns: Columns, results: int, beyond: int) -> Callable[[], None]:
     """A kernel that calls ``part(packed, results, lane)`` for all lanes of columns.
 
-    packed: the tuples before the one with number ``results``. Compiled here, which takes about a minute.
+    packed: the tuples before the one with number ``results``. Compiled where it is not kept on disk. Raises
+    InputError where numba-cuda is missing.
     """
-    from numba import cuda
-
+    try:
+        import numba_cuda  # noqa: F401
+        from cuda.core import LaunchConfig, Stream, launch
+    except ImportError as error:
+        raise InputError(
+            "Kernels for a GPU are compiled by numba-cuda, which is missing; install it: "
+            "pip install 'panto-env[cuda]'."
+        ) from error
     packed, answers = PackedTiles(columns, 0, results), PackedTiles(columns, results, beyond)
-    compiled = _kernel(part, packed.type, answers.type)
+    index = columns.device.index or 0
+    kernel = _kernel(part, packed.type, answers.type, index)
+    numbers = packed.address, packed.apart, answers.address, answers.apart, columns.lanes
+    given, config = [np.int64(each) for each in numbers], LaunchConfig(grid=columns.tiles, block=TILE)
 
-    def launch() -> None:
-        stream = cuda.external_stream(torch.cuda.current_stream().cuda_stream)
-        places = packed.address, packed.apart, answers.address, answers.apart
-        compiled[columns.tiles, columns.tile, stream](*places, columns.lanes)
+    def step() -> None:
+        # ``packed`` and ``answers`` own the memory behind the addresses.
+        assert packed.address
+        assert answers.address
+        stream = Stream.from_handle(torch.cuda.current_stream(index).cuda_stream)
+        launch(stream, config, kernel, *given)
 
-    return launch
+    return step

@@ -147,8 +147,8 @@ def _vector(builder: Any, numbers: list[Any]) -> Any:
 def _numbers(context: Any, builder: Any, array_type: Any, array: Any, places: list[Any]) -> list[Any]:
     """Addresses of the numbers of a table at places, counted row by row.
 
-    In C's order they follow each other; in columns of lanes side by side, ``Columns``, each is one stride after
-    the one before.
+    In C's order they follow each other; in columns of lanes side by side, ``Columns``, each is one stride
+    after the one before.
     """
     table = make_array(array_type)(context, builder, array)
     if array_type.layout == "C":

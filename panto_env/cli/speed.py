@@ -22,6 +22,12 @@ def speed(
         typer.Argument(help="Results stored with --json, to print next to each other instead of measuring."),
     ] = None,
     repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            help='Measure the vector environments on this device instead: "cuda", or "cpu" to try it.'
+        ),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
     markdown: Annotated[
@@ -37,6 +43,13 @@ def speed(
     """
     if json and markdown:
         raise InputError("Give one of --json and --markdown, not both.")
+    if device is not None:
+        if results or plot is not None or markdown:
+            raise InputError(
+                "--device measures anew and prints one table; leave out results, --plot and --markdown."
+            )
+        _on_device(device, repeats, json)
+        return
     from ..studies.throughput import study, tables
 
     if plot is not None:
@@ -62,6 +75,18 @@ def speed(
                     console.print(part)
                 else:
                     print_table(_plain(part))
+
+
+def _on_device(name: str, repeats: int, json: bool) -> None:
+    """Measure and print the speed of lanes on a device."""
+    from ..studies.throughput import device  # needs PyTorch
+
+    with progress_console.status("measuring") as status:
+        found = device.run(name, repeats, report=lambda what: status.update(f"measuring {what}"))
+    if json:
+        print_json(found)
+    else:
+        print_table(_plain(device.table(found)))
 
 
 def _plain(table: Table) -> Table:

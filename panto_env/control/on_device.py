@@ -21,10 +21,6 @@ from .step import control_lane, control_steps
 from .task import Task
 
 
-TILE = 32
-"""Lanes that a GPU steps in one block of threads."""
-
-
 class Begun(NamedTuple):
     """What is told of each lane's episode."""
 
@@ -54,11 +50,13 @@ class TensorLanes:
         self.lanes, self.device = lanes, device
         one = Task(settings, keep_samples=False)
         self.task = Task(settings, lanes=starts, keep_samples=False, trim=one.trim)
-        """The same task on the processor, which draws the starts, and works out the figures of ended episodes."""
+        """The same task on the processor, which draws the starts, and works out the figures of ended
+        episodes.
+        """
         self.agents, self.starts = one.agents, starts
         arrays = _arrays(one), _arrays(self.task)
         self._bank = Columns(*arrays, starts, starts, starts, device)
-        self._columns = Columns(*arrays, starts, lanes, TILE if device.type == "cuda" else lanes, device)
+        self._columns = Columns(*arrays, starts, lanes, _tile(lanes, device), device)
         tuples = self._columns.tuples
         self._episode, self._results, self._begun = tuples[EPISODE], tuples[RESULTS], tuples[BEGUN]
         self._step = _bound(self._columns)
@@ -105,6 +103,15 @@ class TensorLanes:
         return self.task.figures_of(slice(0, len(lanes) * self.agents))
 
 
+def _tile(lanes: int, device: torch.device) -> int:
+    """Lanes in a tile: on the processor all lie in one."""
+    if device.type != "cuda":
+        return lanes
+    from ..backend.cuda import TILE
+
+    return TILE
+
+
 def _bound(columns: Columns) -> Callable[[], Any]:
     """A control step of all lanes that are not idle."""
     if columns.device.type == "cuda":
@@ -118,5 +125,7 @@ def _bound(columns: Columns) -> Callable[[], Any]:
 
 
 def _arrays(task: Task) -> tuple[Any, ...]:
-    """Named tuples of the arrays of a task, in the order of the kernels' arguments; then those of its results."""
+    """Named tuples of the arrays of a task, in the order of the kernels' arguments; then those of its
+    results.
+    """
     return (*task.arrays, task.results, Begun(task.speed))

@@ -10,7 +10,15 @@ from .ids import BARE, IDS
 from .single import PantographEnv
 from .vector import PantographVectorEnv
 
-__all__ = ["BARE", "IDS", "DrivenByPolicies", "PantographEnv", "PantographVectorEnv", "register", "vector_env"]
+__all__ = [
+    "BARE",
+    "IDS",
+    "DrivenByPolicies",
+    "PantographEnv",
+    "PantographVectorEnv",
+    "register",
+    "vector_env",
+]
 
 
 def vector_env(**settings: Any) -> Any:

@@ -16,7 +16,9 @@ from ..control.settings import RunSettings
 MOST_LANES = 10_000_000
 """Lanes that fit into a large machine's memory with a massless wire; with others fewer do."""
 USUAL_STARTS = 1024
-"""Starts of episodes that are drawn for a device, at most: drawing and running in a start takes milliseconds."""
+"""Starts of episodes that are drawn for a device, at most: drawing and running in a start takes
+milliseconds.
+"""
 Pixels = Annotated[int, Between(64, 4096)]
 SlowMotion = Field(
     1.0, description="factor by which a film of the frames is slowed down, included in `render_fps` (-)"
@@ -133,6 +135,12 @@ class TensorSettings(VectorSettings):
     starts: Annotated[int, Between(2, MOST_LANES)] | None = Field(
         None,
         description="starts of episodes that are drawn at a reset; by default as many as lanes, 1024 at most",
+    )
+
+    figures: bool = Field(
+        True,
+        description="whether infos have the figures of ended episodes, which the processor works out: with "
+        "many lanes it takes a good part of the time",
     )
 
     @property

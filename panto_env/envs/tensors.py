@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -33,13 +32,13 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
     """Many pantographs stepped together on a GPU; actions, observations, rewards and flags are tensors there.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=65536, device="cuda")`; other arguments as for
-    `PantographVectorEnv`, and the same source computes a step, so a lane does what it would do on the processor.
-    `device="cpu"` is the same environment without a GPU, to try it.
+    `PantographVectorEnv`, and the same source computes a step, so a lane does what it would do on the
+    processor. `device="cpu"` is the same environment without a GPU, to try it.
 
     Episodes begin from `starts` that the processor draws at `reset`: speed, line, pantograph, run-in. After
-    `reset(seed=s)` start i is that of a single environment with seed s + i, and lane i begins from start i, or where
-    there are fewer starts from i modulo their number. Each later episode begins from any of them, chosen at random;
-    noise of sensors is drawn anew.
+    `reset(seed=s)` start i is that of a single environment with seed s + i, and lane i begins from start i,
+    or where there are fewer starts from i modulo their number. Each later episode begins from any of them,
+    chosen at random; noise of sensors is drawn anew.
 
     `infos` has the content of `PantographVectorEnv`'s, as tensors; "final_obs" is one tensor of all lanes.
     """
@@ -53,13 +52,13 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         self.device = usable_device(settings.device)
         if draws_line(settings):
             raise InputError(
-                "On a device all lanes share one line, and a list, a family or a section gives several; name one "
-                "line as catenary, or leave out device."
+                "On a device all lanes share one line, and a list, a family or a section gives several; "
+                "name one line as catenary, or leave out device."
             )
         self.autoreset_mode = settings.autoreset_mode
         self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
         self.num_envs, self.render_mode = settings.num_envs, None
-        self._limit = settings.max_episode_steps
+        self._limit, self._with_figures = settings.max_episode_steps, settings.figures
         try:
             self._lanes = TensorLanes(settings, settings.trains, settings.used_starts, self.device)
         except torch.OutOfMemoryError as error:
@@ -91,13 +90,13 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
 
-    def reset(  # type: ignore[override]
+    def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[torch.Tensor, dict[str, Any]]:
         """Draw all starts, and begin an episode in each lane; see the class.
 
-        With ``options={"reset_mask": mask}``, a tensor (num_envs,) of bool, episodes begin from the present starts,
-        and only in the marked lanes. Raises InputError, and changes nothing, for anything else.
+        With ``options={"reset_mask": mask}``, a tensor (num_envs,) of bool, episodes begin from the present
+        starts, and only in the marked lanes. Raises InputError, and changes nothing, for anything else.
         """
         seed, options = checked_seed(seed), checked_options(options)
         mask = options.pop("reset_mask", None)
@@ -115,7 +114,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         else:
             self._begin(self._checked_mask(mask))
         answer = self._answer(~self._none if mask is None else mask)
-        return answer.results.observation, lane_infos(answer)  # type: ignore[arg-type]
+        return answer.results.observation, lane_infos(answer)
 
     def step(
         self, actions: torch.Tensor
@@ -136,7 +135,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         self._lanes.step(actions, waiting[:: self._agents], self._random)
         self._begin(waiting)
         answer = self._answer(~self._none)
-        results = answer.results
+        results: Any = answer.results
         terminated, truncated = results.terminated, results.truncated
         if self._limit is not None:
             self._steps += 1
@@ -149,7 +148,12 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
             if self.autoreset_mode == AutoresetMode.SAME_STEP:
                 last = self._of(answer, ended)
                 final = lane_infos(last) | self._figures(ended)
-                own = {"final_obs": observation, "_final_obs": ended, "final_info": final, "_final_info": ended}
+                own = {
+                    "final_obs": observation,
+                    "_final_obs": ended,
+                    "final_info": final,
+                    "_final_info": ended,
+                }
                 self._begin(ended)
                 begun = self._answer(~self._none)
                 observation, infos = begun.results.observation, lane_infos(begun) | own
@@ -158,7 +162,9 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         return observation, reward, terminated, truncated, infos
 
     def context(self, lane: int) -> Context:
-        """What a policy may know of a lane's line and train; of the speed, that of the start with its number."""
+        """What a policy may know of a lane's line and train; of the speed, that of the start with its
+        number.
+        """
         return self.task.context(lane % (self._lanes.starts * self._agents))
 
     @property
@@ -182,9 +188,9 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
             self._ended = self._ended & ~ended
             self._steps[ended] = 0
 
-    def _answer(self, lanes: torch.Tensor) -> Answer:
+    def _answer(self, lanes: torch.Tensor) -> Any:
         speed_kmh = to_kmh(self._lanes.speeds()).repeat_interleave(self._agents)
-        answer: Any = Answer(self._lanes.results(), speed_kmh, lanes)  # type: ignore[arg-type]
+        answer: Any = Answer(self._lanes.results(), speed_kmh, lanes)
         return answer if bool(lanes.all()) else self._of(answer, lanes)
 
     def _of(self, answer: Any, lanes: torch.Tensor) -> Any:
@@ -194,6 +200,8 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
 
     def _figures(self, ended: torch.Tensor) -> dict[str, Any]:
         """Figures of the lanes whose episodes have ended, which the processor works out."""
+        if not self._with_figures:
+            return {}
         values: dict[str, Any] = {}
         trains, agents = ended[:: self._agents].nonzero()[:, 0], np.arange(self._agents)
         for some in trains.split(self._lanes.starts):
@@ -213,7 +221,9 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
     def _check(self, actions: Any) -> None:
         """Raise InputError unless these are actions."""
         if not (isinstance(actions, torch.Tensor) and actions.device == self.device):
-            raise InputError(f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}.")
+            raise InputError(
+                f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}."
+            )
         if tuple(actions.shape) != self._shape or not actions.is_floating_point():
             raise InputError(
                 f"Actions must be floating-point numbers of shape {self._shape}, not {actions.dtype} of "
@@ -222,13 +232,16 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         wrong = ~torch.isfinite(actions).all(dim=1)
         if wrong.any():
             lane = int(wrong.nonzero()[0])
-            raise InputError(f"The action of lane {lane} must be finite, not {actions[lane].tolist()}; check the policy.")
+            raise InputError(
+                f"The action of lane {lane} must be finite, not {actions[lane].tolist()}; check the policy."
+            )
 
     def _checked_mask(self, mask: Any) -> torch.Tensor:
         valid = isinstance(mask, torch.Tensor) and mask.dtype == torch.bool and mask.shape == (self.num_envs,)
         if not (valid and mask.device == self.device and bool(mask.any())):
             raise InputError(
-                f"reset_mask must be {self.num_envs} booleans, a tensor on {self.device} with one true or more."
+                f"reset_mask must be {self.num_envs} booleans, a tensor on {self.device} with one true or "
+                "more."
             )
         if not self._running:
             raise InputError("The first reset must begin episodes in all lanes; leave out reset_mask.")
@@ -248,10 +261,12 @@ def usable_device(name: str) -> torch.device:
         raise InputError(f"device must be 'cuda', 'cuda:0' or 'cpu', not {shown(name)}.")
     if not torch.cuda.is_available():
         raise InputError(
-            f"device='{name}' needs a GPU of NVIDIA and a PyTorch built for it, which this machine has not; leave "
-            "device out to run on the processor."
+            f"device='{name}' needs a GPU of NVIDIA and a PyTorch built for it, which this machine has "
+            "not; leave device out to run on the processor."
         )
     device = torch.device("cuda", torch.cuda.current_device() if device.index is None else device.index)
     if device.index >= torch.cuda.device_count():
-        raise InputError(f"device='{name}' is not there: this machine has {torch.cuda.device_count()} GPUs, from cuda:0.")
+        raise InputError(
+            f"device='{name}' is not there: this machine has {torch.cuda.device_count()} GPUs, from cuda:0."
+        )
     return device
