@@ -159,6 +159,7 @@ pythons:
 PTX := .venv-ptx
 ptx:
 	$(PYTHON) -m venv $(PTX)
+	$(PTX)/bin/pip install -qq --constraint constraints.txt torch
 	$(PTX)/bin/pip install -qq --constraint constraints.txt numba-cuda==0.30.4 nvidia-cuda-nvrtc==13.5.37 \
 	  nvidia-nvvm==13.5.37 nvidia-cuda-cccl==13.3.5.0.6 pytest --editable .
 	$(PTX)/bin/pytest tests/backend/test_ptx.py

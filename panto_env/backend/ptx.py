@@ -26,13 +26,13 @@ def ptx_of(function: Callable[..., Any], *arguments: Any) -> str:
 
     signature = tuple(numba.typeof(argument) for argument in arguments)
     source = getattr(function, "py_func", function)
-    with _without_device():
+    with without_device():
         text, _ = cuda.compile_ptx(source, signature, device=True, cc=COMPUTE_CAPABILITY)
     return str(text)
 
 
 @contextmanager
-def _without_device() -> Iterator[None]:
+def without_device() -> Iterator[None]:
     """Within the body called functions are compiled for the same GPU, although the machine has none."""
     from numba.cuda import dispatcher
 

@@ -28,7 +28,7 @@ class Begun(NamedTuple):
 
 
 RUN, SENSORS, EPISODE, RUNNING, RESULTS, BEGUN = 4, 5, 7, 8, 9, 10
-"""Numbers of named tuples among those of ``_arrays``."""
+"""Numbers of named tuples among those of ``arrays_of``."""
 
 
 @inlined
@@ -54,7 +54,7 @@ class TensorLanes:
         episodes.
         """
         self.agents, self.starts = one.agents, starts
-        arrays = _arrays(one), _arrays(self.task)
+        arrays = arrays_of(one), arrays_of(self.task)
         self._bank = Columns(*arrays, starts, starts, starts, device)
         self._columns = Columns(*arrays, starts, lanes, _tile(lanes, device), device)
         tuples = self._columns.tuples
@@ -67,7 +67,7 @@ class TensorLanes:
     def draw_starts(self, random: Callable[[int], np.random.Generator]) -> None:
         """Draw all starts, each from its own generator, and run them in."""
         self.task.reset(np.arange(self.starts), random)
-        self._bank.fill(_arrays(self.task))
+        self._bank.fill(arrays_of(self.task))
 
     def begin(self, lanes: torch.Tensor, starts: torch.Tensor) -> None:
         """Begin episodes in lanes, (n,), from starts, (n,), and write their results."""
@@ -97,7 +97,7 @@ class TensorLanes:
 
     def figures(self, lanes: torch.Tensor) -> tuple[dict[str, Array], Flags]:
         """Figures of lanes, (n,), of which there are at most as many as starts, as ``Task.figures_of``."""
-        arrays = _arrays(self.task)
+        arrays = arrays_of(self.task)
         for number in (RUN, EPISODE, RUNNING):
             self._columns.read(number, lanes, arrays[number])
         return self.task.figures_of(slice(0, len(lanes) * self.agents))
@@ -124,7 +124,7 @@ def _bound(columns: Columns) -> Callable[[], Any]:
     return partial(threads.step, *results)
 
 
-def _arrays(task: Task) -> tuple[Any, ...]:
+def arrays_of(task: Task) -> tuple[Any, ...]:
     """Named tuples of the arrays of a task, in the order of the kernels' arguments; then those of its
     results.
     """

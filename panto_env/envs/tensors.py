@@ -63,7 +63,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
             self._lanes = TensorLanes(settings, settings.trains, settings.used_starts, self.device)
         except torch.OutOfMemoryError as error:
             raise InputError(
-                f"{self.num_envs} lanes do not fit into the memory of {self.device}; take fewer. {error}"
+                f"{self.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."
             ) from error
         self.task = task = self._lanes.task
         """The task of all lanes, on the processor; its own lanes are the starts."""

@@ -1,27 +1,51 @@
 """The kernels' own source compiles for a GPU; without one, and where the compiler is installed."""
 
+import numpy as np
 import pytest
 
 pytest.importorskip("numba_cuda", reason="numba-cuda is not installed; `make ptx` installs it apart")
+torch = pytest.importorskip("torch")
 
-from panto_env.backend.ptx import ptx_of
-from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.contact import contact_force
-from panto_env.plant.plant import Plant
-from panto_env.plant.step import step_lane
-from panto_env.plant.train import Train
+from panto_env.backend.columns import Columns  # noqa: E402
+from panto_env.backend.cuda import TILE, PackedTiles, compiled  # noqa: E402
+from panto_env.backend.ptx import COMPUTE_CAPABILITY, ptx_of, without_device  # noqa: E402
+from panto_env.control import Task  # noqa: E402
+from panto_env.control.on_device import BEGUN, RESULTS, arrays_of, control_unless_idle  # noqa: E402
+from panto_env.control.settings import run_settings  # noqa: E402
+from panto_env.envs import IDS  # noqa: E402
+from panto_env.plant.contact import contact_force  # noqa: E402
 
-LINES = {"en50318-2002": "en50318-2002", "ohl-three-span": "own-two-mass", "periodic-stiffness": "three-mass"}
 
-
-def plant(line):
-    return Plant(load_catenary(line), Train.of(load_pantograph(LINES[line])))
+def columns(name, lanes):
+    """Columns of lanes of an environment, in the processor's memory."""
+    settings = run_settings(IDS[name])
+    one, two = (arrays_of(Task(settings, lanes=count, keep_samples=False)) for count in (1, 2))
+    return Columns(one, two, 2, lanes, TILE, torch.device("cpu"))
 
 
 def test_contact_law():
     assert "fma.rn.f64" in ptx_of(contact_force, *[1.0] * 7)
 
 
-@pytest.mark.parametrize("line", LINES)
-def test_whole_step(line):
-    assert "fma.rn.f64" in ptx_of(step_lane, *plant(line).arrays, 0)
+@pytest.mark.parametrize("name", IDS)
+def test_whole_control_step(name):
+    own = columns(name, TILE)
+    packed, answers = PackedTiles(own, 0, RESULTS), PackedTiles(own, RESULTS, BEGUN)
+    with without_device():
+        ptx = compiled(control_unless_idle, packed.type, answers.type, COMPUTE_CAPABILITY)
+    assert ptx.count(".entry") == 1
+    assert f".maxntid {TILE}" in ptx
+    assert "fma.rn.f64" in ptx
+    assert "call.uni" not in ptx  # every part stands in the place of its call
+
+
+def test_packed_tiles():
+    own = columns("PantographStiffness-v0", 3 * TILE)
+    packed = PackedTiles(own, 0, RESULTS)
+    words = packed._table.numpy()
+    assert words.shape[0] == 3
+    assert (words[:, 0] == packed.address + packed.apart * np.arange(3) + 8 * RESULTS).all()
+    # The table of a task is the tuple of episodes' fourth field; its address moves on by a tile each time.
+    table = own.tuples[7].table
+    addresses = [table[tile].data_ptr() for tile in range(3)]
+    assert all((words == address).any(axis=1).argmax() == tile for tile, address in enumerate(addresses))
