@@ -133,7 +133,7 @@ def _kept(
     part: Callable[..., Any], form: PackedType, results: PackedType, capability: tuple[int, int]
 ) -> str:
     """As ``compiled``; from the disk where it is there already."""
-    import numba_cuda  # type: ignore[import-not-found]
+    import numba_cuda
 
     name = getattr(part, "py_func", part).__name__
     made_of = checksum(
@@ -161,7 +161,7 @@ def _kept(
 @lru_cache
 def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
     """A kernel on the GPU with this number."""
-    from cuda.core import Device, ObjectCode  # type: ignore[import-not-found]
+    from cuda.core import Device, ObjectCode
 
     Device(index).set_current()
     ptx = _kept(part, form, results, torch.cuda.get_device_capability(index))
