@@ -15,6 +15,7 @@ import torch
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
 from ..backend.columns import Columns, map_arrays
 from ..base.arrays import Array
+from .context import Context
 from .episode import Flags, Results
 from .settings import RunSettings
 from .step import control_lane, control_steps
@@ -60,9 +61,10 @@ class TensorLanes:
         tuples = self._columns.tuples
         self._episode, self._results, self._begun = tuples[EPISODE], tuples[RESULTS], tuples[BEGUN]
         self._step = _bound(self._columns)
-        self._noises = [(self.task.noise, tuples[SENSORS])] if self.task.noise is not None else []
+        noises = [(self.task.noise, tuples[SENSORS])] if self.task.noise is not None else []
         if self.task.odometers.drawn:
-            self._noises.append((self.task.odometers.noise, self._episode.odometer))
+            noises.append((self.task.odometers.noise, self._episode.odometer))
+        self._noises = [(torch.tensor(noise.rms, device=device), arrays) for noise, arrays in noises]
 
     def draw_starts(self, random: Callable[[int], np.random.Generator]) -> None:
         """Draw all starts, each from its own generator, and run them in."""
@@ -80,9 +82,8 @@ class TensorLanes:
         """
         self._columns.write(self._episode.action, action)
         self._columns.write(self._episode.idle, waiting)
-        for noise, arrays in self._noises:
+        for rms, arrays in self._noises:
             now = arrays.noise[..., 0, :]  # drawn for one control step at a time
-            rms = torch.tensor(noise.rms, device=self.device)
             now.copy_(rms * torch.randn(now.shape, generator=random, dtype=rms.dtype, device=self.device))
             arrays.noise_used.zero_()
         self._step()
@@ -95,12 +96,22 @@ class TensorLanes:
         """Mean speed of each lane's train (m/s), (lanes,)."""
         return self._columns.of_lanes(self._begun.speed)
 
+    def context(self, row: int) -> Context:
+        """Information about an episode that a policy may use; row: of results, that of a collector."""
+        lane, agent = divmod(row, self.agents)
+        self._read(torch.tensor([lane], device=self.device), RUN, BEGUN)
+        return self.task.context(agent)
+
     def figures(self, lanes: torch.Tensor) -> tuple[dict[str, Array], Flags]:
         """Figures of lanes, (n,), of which there are at most as many as starts, as ``Task.figures_of``."""
-        arrays = arrays_of(self.task)
-        for number in (RUN, EPISODE, RUNNING):
-            self._columns.read(number, lanes, arrays[number])
+        self._read(lanes, RUN, EPISODE, RUNNING)
         return self.task.figures_of(slice(0, len(lanes) * self.agents))
+
+    def _read(self, lanes: torch.Tensor, *numbers: int) -> None:
+        """Copy some tuples of lanes, (n,), to the first ones of the task on the processor."""
+        arrays = arrays_of(self.task)
+        for number in numbers:
+            self._columns.read(number, lanes, arrays[number])
 
 
 def _tile(lanes: int, device: torch.device) -> int:

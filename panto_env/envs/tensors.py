@@ -162,10 +162,8 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         return observation, reward, terminated, truncated, infos
 
     def context(self, lane: int) -> Context:
-        """What a policy may know of a lane's line and train; of the speed, that of the start with its
-        number.
-        """
-        return self.task.context(lane % (self._lanes.starts * self._agents))
+        """Information about a lane's episode that a policy may use."""
+        return self._lanes.context(lane)
 
     @property
     def _none(self) -> torch.Tensor:

@@ -120,6 +120,19 @@ def test_seeds_and_starts():
     assert len(set(first)) == 3
 
 
+def test_context_is_that_of_the_lane():
+    make = {"num_envs": 3, "device": DEVICE, "distance": 300.0, "speed_kmh": (100, 300)}
+    env = gymnasium.make_vec("panto_env:PantographStiffness-v0", **make)
+    env.reset(seed=7)
+    still = torch.zeros(3, 1, device=env.unwrapped.device)
+    while "figures" not in (
+        info := env.step(still)[-1]
+    ):  # which the processor works out in the lanes of starts
+        pass
+    for lane, speed_kmh in enumerate(info["speed_kmh"].tolist()):
+        assert env.unwrapped.context(lane).speed * 3.6 == pytest.approx(speed_kmh)
+
+
 def test_noise_is_drawn_anew():
     env = gymnasium.make_vec(
         "panto_env:PantographStiffness-v0", num_envs=2, device=DEVICE, sensors="realistic"
