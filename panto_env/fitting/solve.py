@@ -21,7 +21,7 @@ from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .measured import BANDS, Measured
-from .normal import noise_of, normal
+from .normal import CLOSE, noise_of, normal
 from .passes import Passes, Variant
 from .values import Values
 
@@ -44,6 +44,11 @@ FRESH = 10.0
 FIRST = 0.1
 """Differences from which derivatives are taken at first, as a share of tolerances. A dropper 0.1 mm shorter
 pulls with 10 N more, and goes slack later: they lead near the end, but are no ground for intervals."""
+COOL = 0.75
+"""Least share of its noise that a band keeps from one set of derivatives to the next. Where it falls at once,
+droppers settle side by side in lengths of which each makes up for its neighbour's, and single steps do not
+lead out.
+"""
 WIDE = 1.0
 """Standard deviations of the differences from which derivatives are taken, once it is known how uncertain
 values are. Droppers that go slack bend the course of the force; small differences only see the nearest bend.
@@ -170,11 +175,13 @@ class Fitting:
             np.diag(FIRST * self.values.tolerances) if covariance is None else self._uncertain(covariance)
         )
         while True:
+            held = COOL * state.noise
             state, blocks, left = self._derivatives(state, differences, working)
             first = None  # expected decrease by the first step with these derivatives
             while True:
-                noise = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
-                noise = np.minimum(noise, most)
+                found = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
+                noise = np.minimum(np.fmax(found, held), most)  # nothing is held at first, where held is nan
+                cooling = bool((noise > (1 + CLOSE) * found).any())
                 precision, pull = normal(blocks, left, self._weights(noise), self.prior, state.x)
                 covariance = np.linalg.inv(precision)
                 step = covariance @ pull
@@ -182,7 +189,7 @@ class Fitting:
                 state = State(state.x, state.static_forces, noise, state.steps)
                 report(state, gain)
                 first = gain if first is None else first
-                settled = known and gain < self._done and first < FRESH * self._done
+                settled = known and not cooling and gain < self._done and first < FRESH * self._done
                 if settled or state.steps >= begin + steps:
                     return Solution(state, covariance, tuple(left), settled)
                 before = self._sum(left, noise, state.x)
