@@ -76,9 +76,7 @@ def test_what_is_left_is_the_sensors_noise(fitted):
     assert 0.2 < after < 0.7
     (white,) = fitted.whiteness
     assert white.probability > 0.001
-    assert np.median(fitted.solution.state.noise) == pytest.approx(
-        0.63, rel=0.5
-    )  # known from few coefficients
+    assert 0.3 < np.median(fitted.solution.state.noise) < 0.9  # known from few coefficients
 
 
 def test_the_position_error_is_found(fitted):

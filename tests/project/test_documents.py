@@ -54,6 +54,8 @@ RULES = (
     Rule("panto reproduce paper3-parameters", "ten seconds", ""),
     Rule("panto speed --json", f"{MINUTES}, and means nothing on a busy machine"),
     Rule("panto train agent-ppo", MINUTES, "--steps 1000"),
+    Rule("panto train agent-ppo-gpu", "wants a GPU; tests/agents/test_device_ppo.py has a short one without"),
+    Rule("panto speed --device cuda", "wants a GPU, and means nothing on a busy machine"),
     Rule("panto train agent-clone", "clones a million steps first; tests/agents/test_agents.py clones fewer"),
     Rule("panto train agent-residual", f"{MINUTES}; tests/agents/test_agents.py has a short one"),
     Rule("panto train ppo --output runs/ppo", "what follows needs its model", "--steps 1000"),
