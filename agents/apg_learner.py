@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.logger import Logger
 from torch import nn
 
 from panto_baselines.benchmark.statistics import MOVED
@@ -15,6 +14,7 @@ from panto_env.backend import WIDTH
 
 from .linear_rollout import Group
 from .network import Network
+from .own_learner import OwnLearner
 
 if TYPE_CHECKING:
     from .apg import APG
@@ -26,47 +26,22 @@ SHIFT_FREE = MOVED / 3
 """Relative shift of the mean force that costs nothing: a third of what a benchmark allows."""
 
 
-class APGLearner:
+class APGLearner(OwnLearner["PassLanes"]):
     """Measures passes in rounds, and descends the variance of the contact force through the latest ones."""
-
-    ep_info_buffer = None  # there are no episodes to average
 
     def __init__(self, settings: APG, lanes: PassLanes, seed: int) -> None:
         """lanes: where passes are measured. seed: of network and minibatches."""
-        self._settings, self._lanes = settings, lanes
-        self.num_timesteps, self._n_updates = 0, 0
-        self.set_random_seed(seed)
-        torch.manual_seed(seed)
+        super().__init__(lanes, seed)
+        self._settings = settings
         kwargs = settings.policy_kwargs()
         shape = tuple(kwargs["net_arch"]), kwargs["activation_fn"]
         self.network = Network(lanes.entries, *shape, settings.recurrent_units)
         self._optimiser = torch.optim.Adam(self.network.parameters())
-        self.logger: Logger
         self._rounds: deque[list[Group]] = deque(maxlen=settings.rounds_kept)
-
-    def get_env(self) -> PassLanes:
-        """Where passes are measured."""
-        return self._lanes
-
-    def set_logger(self, logger: Logger) -> None:
-        """Where figures of the training go."""
-        self.logger = logger
 
     def set_random_seed(self, seed: int) -> None:
         """Seed of the minibatches."""
         self._random = np.random.default_rng(seed)
-
-    def get_parameters(self) -> dict[str, Any]:
-        """State of network and optimiser."""
-        return {"network": self.network.state_dict(), "optimiser": self._optimiser.state_dict()}
-
-    def set_parameters(self, parameters: dict[str, Any]) -> None:
-        """Restore what ``get_parameters`` gave."""
-        self.network.load_state_dict(parameters["network"])
-        self._optimiser.load_state_dict(parameters["optimiser"])
-
-    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
-        return ["network", "optimiser"], []
 
     def learn(self, total_timesteps: int, callback: Any, **_: Any) -> None:
         """Learn for so many environment steps in whole rounds."""

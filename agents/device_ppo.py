@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import torch
-from stable_baselines3.common.logger import Logger
 from torch import nn
 from torch.distributions import Independent, Normal
+
+from .own_learner import OwnLearner
 
 if TYPE_CHECKING:
     from panto_env.envs.tensors import PantographTensorEnv
@@ -108,49 +109,23 @@ class ActorCritic(nn.Module):  # type: ignore[misc]
         return values
 
 
-class DevicePPO:
-    """The learner."""
-
-    ep_info_buffer = None  # episodes are not logged: their figures would have to leave the device
+class DevicePPO(OwnLearner[DeviceLanes]):
+    """The learner. It logs no episodes: their figures would have to leave the device."""
 
     def __init__(self, settings: PPO, lanes: DeviceLanes, seed: int) -> None:
         """lanes: where it learns. seed: of network, exploration and minibatches."""
-        self._settings, self._lanes, self._device = settings, lanes, lanes.env.device
-        self.num_timesteps, self._n_updates = 0, 0
-        torch.manual_seed(seed)
-        env = lanes.env
-        entries, actions = (
-            space.shape or (1,) for space in (env.single_observation_space, env.single_action_space)
-        )
+        self._device = lanes.env.device
+        self._random = torch.Generator(self._device)
+        super().__init__(lanes, seed)
+        self._settings = settings
+        spaces = lanes.env.single_observation_space, lanes.env.single_action_space
+        entries, actions = (space.shape or (1,) for space in spaces)
         self.network = ActorCritic(settings, entries[0], actions[0]).to(self._device)
         self._optimiser = torch.optim.Adam(self.network.parameters(), eps=1e-5)
-        self._random = torch.Generator(self._device)
-        self.set_random_seed(seed)
-        self.logger: Logger
-
-    def get_env(self) -> DeviceLanes:
-        """Where it learns."""
-        return self._lanes
-
-    def set_logger(self, logger: Logger) -> None:
-        """Where figures of the training go."""
-        self.logger = logger
 
     def set_random_seed(self, seed: int) -> None:
         """Seed of exploration and minibatches."""
         self._random.manual_seed(seed)
-
-    def get_parameters(self) -> dict[str, Any]:
-        """State of network and optimiser."""
-        return {"network": self.network.state_dict(), "optimiser": self._optimiser.state_dict()}
-
-    def set_parameters(self, parameters: dict[str, Any]) -> None:
-        """Restore what ``get_parameters`` gave."""
-        self.network.load_state_dict(parameters["network"])
-        self._optimiser.load_state_dict(parameters["optimiser"])
-
-    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
-        return ["network", "optimiser"], []
 
     def learn(self, total_timesteps: int, callback: Any, **_: Any) -> None:
         """Learn for so many environment steps, in whole rollouts."""
