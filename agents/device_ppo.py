@@ -163,10 +163,10 @@ class DevicePPO(OwnLearner[DeviceLanes]):
         probabilities, rewards, values, ended = (torch.empty(shape, device=self._device) for _ in range(4))
         for k in range(settings.n_steps):
             observations[k] = observation
-            mean, std = own.actor(observation), own.log_std.exp()
-            noise = torch.randn(mean.shape, generator=self._random, device=self._device)
-            actions[k] = mean + std * noise
-            probabilities[k] = own.actions(observation).log_prob(actions[k])
+            chosen = own.actions(observation)
+            noise = torch.randn(actions[k].shape, generator=self._random, device=self._device)
+            actions[k] = chosen.mean + chosen.stddev * noise
+            probabilities[k] = chosen.log_prob(actions[k])
             values[k] = own.values(observation)
             observation, rewards[k], terminated, truncated, infos = self._lanes.step(actions[k])
             ended[k] = terminated | truncated
