@@ -24,7 +24,7 @@ from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
 from .cache import cache_folder, kernel_hash
 from .columns import Columns
-from .packed import PackedType, open_packed
+from .packed import ADDRESS, PackedType, array_form, open_packed, words_of
 
 TILE = 32
 """Lanes in a tile, and threads in a block: those of a warp."""
@@ -32,8 +32,6 @@ BLOCKS = 16
 """Blocks that share a multiprocessor: while some wait for memory others go on. A thread then has 128
 registers; with all that it can get, 255, a step takes a tenth longer, on an H100.
 """
-POINTER_WORD = 4
-"""Word of an array's compiled form that is the address of its numbers."""
 
 
 class PackedTiles:
@@ -63,21 +61,12 @@ def _words(value: Any, apart: Any) -> Any:
     """
     if isinstance(value, tuple):
         return np.concatenate([_words(*fields) for fields in zip(value, apart, strict=True)], axis=1)
-    if isinstance(value, torch.Tensor):  # no owner, no parent
-        size, strides = value.element_size(), value.stride()
-        words = [
-            0,
-            0,
-            value.numel(),
-            size,
-            value.data_ptr(),
-            *value.shape,
-            *(size * each for each in strides),
-        ]
-        return np.array([words, np.where(np.arange(len(words)) == POINTER_WORD, apart, 0)], dtype=np.int64)
-    number = (
-        np.array([value], dtype=float).view(np.int64) if isinstance(value, float) else np.array([int(value)])
-    )
+    if isinstance(value, torch.Tensor):
+        item = value.element_size()
+        strides = tuple(item * each for each in value.stride())
+        words = array_form(value.numel(), item, value.data_ptr(), tuple(value.shape), strides)
+        return np.stack([words, np.where(np.arange(len(words)) == ADDRESS, apart, 0)])
+    number = words_of(value)
     return np.stack([number, 0 * number])
 
 

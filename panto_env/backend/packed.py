@@ -41,19 +41,30 @@ class Packed:
     def __init__(self, arguments: tuple[Any, ...]) -> None:
         """Pack ``arguments``, which stay alive with this object."""
         self.arguments = arguments
-        self._memory = [_words(each) for each in arguments]
+        self._memory = [words_of(each) for each in arguments]
         self._table = np.array([memory.ctypes.data for memory in self._memory], dtype=np.intp)
         self.address = self._table.ctypes.data
         self.type = PackedType(tuple(type_of(argument) for argument in arguments))
 
 
-def _words(value: Any) -> NDArray[np.int64]:
+def words_of(value: Any) -> NDArray[np.int64]:
     """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
     if isinstance(value, tuple):
-        return np.concatenate([_words(field) for field in value])
-    if isinstance(value, np.ndarray):  # no owner, no parent
-        return np.array([0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides])
+        return np.concatenate([words_of(field) for field in value])
+    if isinstance(value, np.ndarray):
+        return array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
     return np.array([float(value)]).view(np.int64) if isinstance(value, float) else np.array([int(value)])
+
+
+ADDRESS = 4
+"""Word of an array's compiled form that is the address of its numbers."""
+
+
+def array_form(
+    size: int, item: int, address: int, shape: tuple[int, ...], strides: tuple[int, ...]
+) -> NDArray[np.int64]:
+    """The compiled form of an array; item, strides: bytes."""
+    return np.array([0, 0, size, item, address, *shape, *strides], dtype=np.int64)  # no owner, no parent
 
 
 _types: dict[Any, Any] = {}
