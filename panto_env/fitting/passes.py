@@ -20,8 +20,8 @@ from ..plant.plant import Plant
 from ..plant.state import SAMPLE_ROWS, Row, Samples
 from ..plant.train import Train
 
-LANES = 16
-"""Lanes of a plant, of which there is one for each core: memory is what more would cost."""
+LANES = 8
+"""Lanes of a plant, of which there is one for each core. They begin together, so fewer lanes compute less."""
 LARGEST_FORCE = 2e3
 """Contact force (N) beyond which a computation has diverged."""
 

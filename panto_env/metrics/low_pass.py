@@ -79,13 +79,17 @@ def zero_phase_low_pass(force: Array, time_step: float) -> Array:
     Its σ equals that of ``low_pass``; single peaks differ, because a causal filter also shifts phases.
     Raises InputError where the samples, ``time_step`` (s) apart, are too far apart.
     """
+    from scipy.fft import irfft, next_fast_len, rfft  # slow to import
+
     count = force.shape[-1]
     beyond = min(count - 1, round(MIRRORED / time_step))
-    around = [(0, 0)] * (force.ndim - 1) + [(beyond, beyond)]
+    more = next_fast_len(count + 2 * beyond, real=True) - count - 2 * beyond
+    after = beyond + more if beyond + more < count else beyond
+    around = [(0, 0)] * (force.ndim - 1) + [(beyond, after)]
     mirrored = np.pad(force, around, mode="reflect", reflect_type="odd")
     whole = mirrored.shape[-1]
-    filtered = np.fft.irfft(_attenuation(whole, time_step) * np.fft.rfft(mirrored), whole)
-    return np.asarray(filtered[..., beyond : whole - beyond])
+    filtered = irfft(_attenuation(whole, time_step) * rfft(mirrored), whole)
+    return np.asarray(filtered[..., beyond : beyond + count])
 
 
 @lru_cache(maxsize=16)

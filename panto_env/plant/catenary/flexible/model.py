@@ -16,7 +16,7 @@ from ..schema import FEWEST_SPANS
 from ..view import LineView
 from .attached import dropper_positions
 from .blown import air_about, start_wind
-from .build import at_rest, constants, of_tension, settle
+from .build import Tensioned, at_rest, constants, of_tension, settle
 from .defective_parts import DefectiveParts
 from .defects import DefectiveLine
 from .fixed_wires import tensions_of_fixed
@@ -32,6 +32,10 @@ from .wire_defects import locate
 
 DESIGNED = -1
 """Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
+
+
+Own = tuple[StaticShape, Tensioned, DefectiveLine | DefectiveParts | None]
+"""What depends on tensions: shape, stencil, and the line with its defects, None for the nominal ones."""
 
 
 class FlexibleCatenary:
@@ -95,6 +99,8 @@ class FlexibleCatenary:
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
+        # Of the line drawn last: lanes of a fit mostly share their tensions.
+        self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
         self._defective: dict[LineCondition, DefectiveLine | DefectiveParts] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
@@ -131,11 +137,12 @@ class FlexibleCatenary:
     def _write_defects(self, row: int, drawn: DrawnLine) -> None:
         defective = self._defective[drawn.condition]
         if self._designed is not None:
-            self._write_tension(row, drawn)
-        if drawn.tensions != (1.0, 1.0):
-            assert self._designed is not None
-            tensions = self._tensions(drawn)
-            defective = _defective(self._designed, self.alignment.spans, drawn.condition, tensions)
+            key = drawn.condition, drawn.tensions
+            if self._latest is None or self._latest[0] != key:
+                self._latest = key, self._tensioned(self._designed, drawn)
+            shape, tensioned, own = self._latest[1]
+            self._write_tension(row, shape, tensioned)
+            defective = own or defective
         state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
 
@@ -154,12 +161,20 @@ class FlexibleCatenary:
         (contact, messenger), fixed = drawn.tensions, self._fixed
         return contact * fixed[0], messenger * fixed[1]
 
-    def _write_tension(self, row: int, drawn: DrawnLine) -> None:
+    def _tensioned(
+        self, designed: FlexibleCatenaryData, drawn: DrawnLine
+    ) -> Own:
+        """What depends on the tensions of a drawn line."""
+        tensions = self._tensions(drawn)
+        own = with_tension_left(designed, drawn.condition, tensions)
+        shape = shape_left(designed, own)
+        defective = None
+        if drawn.tensions != (1.0, 1.0):
+            defective = _defective(designed, self.alignment.spans, drawn.condition, tensions)
+        return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
+
+    def _write_tension(self, row: int, shape: StaticShape, tensioned: Tensioned) -> None:
         """Write the stencil and the static shape for a lane's own tensions."""
-        assert self._designed is not None
-        own = with_tension_left(self._designed, drawn.condition, self._tensions(drawn))
-        shape = shape_left(self._designed, own)
-        tensioned = of_tension(own, shape, self.line.spacing, self.time_step)
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
         self._shapes[row] = shape
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
