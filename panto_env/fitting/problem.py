@@ -22,7 +22,7 @@ from ..records.samples import is_low_passed
 from .measured import Measured, measured
 from .passes import Passes
 from .solve import Fitting, Part
-from .values import TOLERANCES, USUAL, Design, Values
+from .values import AS_BUILT, TOLERANCES, USUAL, Design, Values
 
 END = 20.0
 """Way (m) before the end of a record that is not compared: a low-pass without delay does not know how it goes
@@ -154,6 +154,7 @@ def _condition(
         )
     room = LineCondition(
         irregularity=1.0 if "unevenness" in free else 0.0,
+        wear_depth=AS_BUILT.wear_depth if "unevenness" in free else 0.0,
         dropper_scatter=TOLERANCES["droppers"],
         support_scatter=TOLERANCES["supports"],
         tension_scatter=known["tensions"] if "tensions" in free else 0.0,

@@ -13,7 +13,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.line_condition import IRREGULARITY, DrawnLine, LineCondition
+from ..plant.line_condition import IRREGULARITY, LINE_CONDITIONS, DrawnLine, LineCondition
 from ..plant.pantograph.schema import PantographData
 from .passes import Variant
 
@@ -31,6 +31,11 @@ TOLERANCES = {
 }
 """Standard deviations of values about the design, before any record is seen: those of a line as built
 (``LINE_CONDITIONS``); of damping and pantograph own choice."""
+AS_BUILT = LINE_CONDITIONS["as-built"]
+WAVES = (*IRREGULARITY, (AS_BUILT.wear_wavelength, AS_BUILT.wear_depth / 2))
+"""Wavelengths and amplitudes (m) of the running surface of a line as built. Droppers send waves of wear back with
+other frequencies, so that they are in the low-passed force, too: 0.2 to 0.3 N of it.
+"""
 LEAD = {"droppers": 3, "supports": 6}
 """Spans ahead of the train from which on a value acts on the force: before, by less than a millionth."""
 CHAIN = ("masses", "stiffnesses", "dampings")
@@ -108,7 +113,7 @@ class Values:
         """The line and pantograph with these differences, (values,), from the design."""
         design = self.design
         scatter, heights = np.zeros(len(design.droppers)), np.zeros(len(design.supports))
-        tensions, waves = [1.0, 1.0], np.zeros((len(IRREGULARITY), 2))
+        tensions, waves = [1.0, 1.0], np.zeros((len(WAVES), 2))
         damping = {"alpha": 1.0, "beta": 1.0}
         chain = {name: list(getattr(design.pantograph, name)) for name in CHAIN}
         for value, difference in zip(self.all, differences.tolist(), strict=True):
@@ -174,7 +179,7 @@ class Values:
 
     def _unevenness(self, stretch: tuple[float, float]) -> list[Value]:
         found = []
-        for k, (length, amplitude) in enumerate(IRREGULARITY):
+        for k, (length, amplitude) in enumerate(WAVES):
             for part, name in enumerate(("cosine", "sine")):
                 words = f"{name} of waves of {length:g} m"
                 value = self._value("unevenness", words, "mm", 1e3, None, k, part)
@@ -192,4 +197,4 @@ def _rows(waves: Array) -> Array:
     """Cosine and sine parts of waves, (waves, 2), as rows of ``DrawnLine.waves``."""
     amplitude = np.hypot(waves[:, 0], waves[:, 1])
     phase = np.arctan2(-waves[:, 1], waves[:, 0]) / (2 * np.pi)
-    return np.stack([amplitude, [1 / length for length, _ in IRREGULARITY], phase], axis=1)
+    return np.stack([amplitude, [1 / length for length, _ in WAVES], phase], axis=1)

@@ -8,15 +8,13 @@ import pytest
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.fitting import problem
-from panto_env.plant.line_condition import DrawnLine, LineCondition, draw
+from panto_env.plant.line_condition import LINE_CONDITIONS, DrawnLine, draw
 from panto_env.plant.numerics import Numerics
 from panto_env.records.measured import measured
 
 LINE, PANTOGRAPH = "en50318-2002", "dsa380"
 SPANS, SEED = 14, 3
-# As built, without its waves of wear: they are above what a fit compares, but ask for shorter time steps. So
-# the true line gives the record but for the sensors' noise.
-BUILT = LineCondition(irregularity=1.0, dropper_scatter=5e-3, support_scatter=5e-3, tension_scatter=0.017)
+BUILT = LINE_CONDITIONS["as-built"]
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,8 @@ def judge(seed: int, passes: int, wrong: str, kind: str) -> dict[str, Any]:
     rows["as_noise"] = [white.probability for white in found.whiteness]
     for name, truth in truths.items():
         own = found.of_kind(name)
-        rows[name] = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
+        pairs = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
+        rows[name] = [[float(f"{number:.4g}") for number in pair] for pair in pairs]
     return rows
 
 

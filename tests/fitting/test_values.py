@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.values import FREE, TOLERANCES, USUAL, Design, Values
-from panto_env.plant.line_condition import IRREGULARITY, LineCondition
+from panto_env.fitting.values import FREE, TOLERANCES, USUAL, WAVES, Design, Values
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 
 SPANS = 14
 
@@ -33,7 +33,7 @@ def at(values, name, difference):
 def test_names_and_places(plan):
     values = everything(plan)
     by_name = {value.name: value for value in values.all}
-    assert len(by_name) == len(values) == 2 + 9 * SPANS + (SPANS - 1) + 2 + 7 + 6
+    assert len(by_name) == len(values) == 2 + 9 * SPANS + (SPANS - 1) + 2 + 7 + 2 * len(WAVES)
     dropper = by_name["dropper 4 of span 12"]
     assert dropper.place == 11 * 60.0 + 23.5
     assert dropper.index == (11 * 9 + 3,)
@@ -74,7 +74,7 @@ def test_tolerances(plan):
     assert own["dropper 1 of span 1"] == 0.01
     assert own["support 1"] == TOLERANCES["supports"]
     # Parts of a wave of a drawn phase: cosine and sine of it have half its power each.
-    assert own["sine of waves of 5 m"] == IRREGULARITY[1][1] / np.sqrt(2)
+    assert own["sine of waves of 5 m"] == WAVES[1][1] / np.sqrt(2)
 
 
 def test_the_design_is_the_variant_of_zeros(plan):
@@ -116,10 +116,18 @@ def test_waves_have_their_cosine_and_sine_parts(plan):
     x = np.linspace(0, 30, 200)
     differences = at(values, "cosine of waves of 5 m", 2e-4) + at(values, "sine of waves of 12 m", -3e-4)
     waves = values.variant(differences, 70.0).line.waves
-    assert waves.shape == (len(IRREGULARITY), 3)
+    assert waves.shape == (len(WAVES), 3)
     height = sum(a * np.cos(2 * np.pi * (x * turns + phase)) for a, turns, phase in waves)
     expected = 2e-4 * np.cos(2 * np.pi * x / 5) - 3e-4 * np.sin(2 * np.pi * x / 12)
     np.testing.assert_allclose(height, expected, atol=1e-12)
+
+
+def test_waves_are_those_of_a_line_as_built(plan):
+    """One more or less of them would be waves that droppers explain."""
+    drawn = draw([LINE_CONDITIONS["as-built"]], np.random.default_rng(0))
+    amplitudes, turns, _ = drawn.waves.T
+    np.testing.assert_allclose(WAVES, np.stack([1 / turns, amplitudes], axis=1))
+    assert everything(plan).variant(np.zeros(len(everything(plan))), 70.0).line.waves.shape == (4, 3)
 
 
 def test_usual_values_leave_line_and_pantograph_as_they_are(plan):
