@@ -161,9 +161,7 @@ class FlexibleCatenary:
         (contact, messenger), fixed = drawn.tensions, self._fixed
         return contact * fixed[0], messenger * fixed[1]
 
-    def _tensioned(
-        self, designed: FlexibleCatenaryData, drawn: DrawnLine
-    ) -> Own:
+    def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
         """What depends on the tensions of a drawn line."""
         tensions = self._tensions(drawn)
         own = with_tension_left(designed, drawn.condition, tensions)
