@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
+from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..catalog.loader import file_of
+from ..catalog.loader import file_of, parse_catenary
 from .fit import INTERVAL, Fit, Found
 from .toml_text import with_table, with_value
 
@@ -20,8 +22,8 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     base: the design, a name of the catalogue or a TOML file, whose text is kept. The table ``as_found`` holds
     by how much droppers, supports and tensions differ: together the most likely values, also where the
     records hardly tell one alone, which sources count. records: their names, for the sources. Raises
-    InputError for another suffix, for a design whose values cannot be replaced, or where it cannot
-    be written.
+    InputError for another suffix, for a design whose values cannot be replaced, for values that no line may
+    have, or where it cannot be written.
     """
     check_output(path, SUFFIXES)
     text = file_of(base).read_text(encoding="utf-8-sig")
@@ -35,7 +37,15 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     needed = fit.problem.first_span + design.spans
     if not design.catenary.ends and needed > design.catenary.spans:
         text = with_value(text, "spans", needed, f"as long as {records}", str(base))
-    _write(path, with_table(text, "as_found", values, sources, str(base)))
+    text = with_table(text, "as_found", values, sources, str(base))
+    try:
+        parse_catenary(tomllib.loads(text), Path(path))
+    except InputError as error:
+        raise InputError(
+            f"The fit found values that no line may have, so none is written: {error} Check the line, the "
+            "pantograph and the places of the records."
+        ) from error
+    _write(path, text)
 
 
 def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:

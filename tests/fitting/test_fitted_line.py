@@ -143,6 +143,16 @@ def test_a_file_that_cannot_be_written_leaves_none(done, tmp_path):
     assert not (tmp_path / "a.toml").exists()
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"tension of the contact wire": 0.12}, {"dropper 4 of span 12": 0.21}, {"support 12": -0.3}]
+)
+def test_values_that_no_line_may_have_are_not_written(ready, tmp_path, wrong):
+    """So no file is left that the next command would refuse."""
+    with pytest.raises(InputError, match=r"no line may have, so none is written: .*a\.toml is not"):
+        write_line(made_up(ready, wrong), LINE, tmp_path / "a.toml", "run.csv")
+    assert not (tmp_path / "a.toml").exists()
+
+
 def test_tables_say_what_was_found(done):
     rows = {row["name"]: row for row in rows_of(done.found, done.before)}
     dropper = rows["dropper 4 of span 12"]
