@@ -20,7 +20,7 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
-from .measured import BANDS, Measured, between
+from .measured import BANDS, Measured
 from .normal import CLOSE, noise_of, normal
 from .passes import Passes, Variant
 from .values import Values
@@ -264,7 +264,7 @@ class Fitting:
         if part.low_passed:
             forces = low_pass(forces, passes.time_step)
         smooth = zero_phase_low_pass(forces, passes.time_step)
-        return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
+        return np.array([np.interp(place, passes.position, force) for force in smooth])
 
     @property
     def _bands(self) -> list[Index]:
