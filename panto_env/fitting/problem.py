@@ -155,6 +155,7 @@ def _condition(
     room = LineCondition(
         irregularity=1.0 if "unevenness" in free else 0.0,
         wear_depth=AS_BUILT.wear_depth if "unevenness" in free else 0.0,
+        wear_wavelength=AS_BUILT.wear_wavelength,
         dropper_scatter=TOLERANCES["droppers"],
         support_scatter=TOLERANCES["supports"],
         tension_scatter=known["tensions"] if "tensions" in free else 0.0,

@@ -32,10 +32,8 @@ from .wire_defects import locate
 
 DESIGNED = -1
 """Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
-
-
-Own = tuple[StaticShape, Tensioned, DefectiveLine | DefectiveParts | None]
-"""What depends on tensions: shape, stencil, and the line with its defects, None for the nominal ones."""
+Own = tuple[StaticShape, Tensioned, DefectiveLine | DefectiveParts]
+"""What depends on tensions: shape, stencil, and the line with its defects."""
 
 
 class FlexibleCatenary:
@@ -135,14 +133,14 @@ class FlexibleCatenary:
         self._write_defects(0, DrawnLine(first))
 
     def _write_defects(self, row: int, drawn: DrawnLine) -> None:
-        defective = self._defective[drawn.condition]
-        if self._designed is not None:
+        if self._designed is None:
+            defective = self._defective[drawn.condition]
+        else:
             key = drawn.condition, drawn.tensions
             if self._latest is None or self._latest[0] != key:
                 self._latest = key, self._tensioned(self._designed, drawn)
-            shape, tensioned, own = self._latest[1]
+            shape, tensioned, defective = self._latest[1]
             self._write_tension(row, shape, tensioned)
-            defective = own or defective
         state = defective.write(self.line, row, drawn.scatter, drawn.heights)
         self._tension[row] = state.tension
 
@@ -166,7 +164,7 @@ class FlexibleCatenary:
         tensions = self._tensions(drawn)
         own = with_tension_left(designed, drawn.condition, tensions)
         shape = shape_left(designed, own)
-        defective = None
+        defective = self._defective[drawn.condition]
         if drawn.tensions != (1.0, 1.0):
             defective = _defective(designed, self.alignment.spans, drawn.condition, tensions)
         return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
