@@ -47,7 +47,8 @@ class Measured:
 
     def force(self, shift: float = 0.0) -> Array:
         """Measured force (N), (places,); shift: by which the record's positions are too small (m)."""
-        return np.interp(self.place, self.piece.position - self.offset + shift, self.smooth)
+        position = self.piece.position - self.offset + shift
+        return between(self.smooth, np.interp(self.place, position, np.arange(len(position))))
 
     @cached_property
     def kept(self) -> Index:
@@ -106,3 +107,19 @@ def measured(piece: Piece, offset: float, stretch: tuple[float, float], span: fl
         )
     place = np.arange(begin, end, piece.speed / PER_SECOND)
     return Measured(piece, place, offset, max(piece.speed / (LONGEST * span), 0.2))
+
+
+def between(samples: Array, number: Array) -> Array:
+    """Values of smooth samples, (..., n), at fractional numbers of them, (places,); cubic, by Lagrange.
+
+    Linear ones would be 0.4 % too low at 18 Hz and 500 samples a second: too much for tensions.
+    """
+    first = np.clip(number.astype(int) - 1, 0, samples.shape[-1] - 4)
+    t = number - first
+    weights = (
+        (1 - t) * (2 - t) * (3 - t) / 6,
+        t * (2 - t) * (3 - t) / 2,
+        t * (t - 1) * (3 - t) / 2,
+        t * (t - 1) * (t - 2) / 6,
+    )
+    return np.asarray(sum(samples[..., first + k] * weight for k, weight in enumerate(weights)))

@@ -13,14 +13,14 @@ everything that a record has, so that first steps are careful; then it falls to 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
-from .measured import BANDS, Measured
+from .measured import BANDS, Measured, between
 from .normal import CLOSE, noise_of, normal
 from .passes import Passes, Variant
 from .values import Values
@@ -32,11 +32,9 @@ STEPS = 40
 DONE = 0.05
 """Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
 moves by a fifth of its standard deviation."""
-PUSHES, PUSHED, PUSH_STEPS, LESS = 2, (0.5, 0.25), 5, 0.9
-"""How often values are pushed on, with which shares of the noise and steps with each; and what share of what
-was left must be left at most for that to go on."""
-HOPED = 0.5
-"""Least standard deviation of a coefficient (N) to which noise is held down: of a white noise of 2 N."""
+JUMP, JUMPS, LESS = 2.0, 10, 0.9
+"""Tolerances by which single droppers are made longer and shorter where steps lead no further, how often at
+most, and what share of what is minimised, or left, must remain at most for that to count."""
 WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 FRESH = 10.0
@@ -65,6 +63,7 @@ class Part:
 
     measured: Measured
     passes: Passes
+    coarse: Passes  # from which derivatives are taken at first
     name: str
     low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
 
@@ -139,19 +138,15 @@ class Fitting:
         report: called after each step with the state and the expected decrease of a further one. working:
         called with the finished share of all derivatives while they are computed.
 
-        Where what is left is not like noise, values may have settled where only small steps lead to nothing
-        better. Then the noise is held down for some steps, which lets values move further, and found anew.
+        As long as noise is held above what is left, derivatives come from coarse passes. Where what is left
+        at the end is not like noise, single droppers jump, for one may be on the wrong side of going slack.
         """
-        best = self._settle(state, None, np.inf, report, working)
-        for _ in range(PUSHES):
-            if best.like_noise(self._bands):
+        best = self._settle(state, None, report, working)
+        while not best.like_noise(self._bands):
+            jumped = self._jumped(best)
+            if jumped is None:
                 break
-            level = float(np.median(best.state.noise))
-            pushed = best
-            for share in PUSHED:
-                most = max(share * level, HOPED)
-                pushed = self._settle(pushed.state, pushed.covariance, most, report, working)
-            found = self._settle(pushed.state, pushed.covariance, np.inf, report, working)
+            found = self._settle(jumped, best.covariance, report, working)
             if not found.size < LESS * best.size:
                 break
             best = found
@@ -161,26 +156,26 @@ class Fitting:
         self,
         state: State,
         covariance: Array | None,
-        most: float,
         report: Callable[[State, float], None],
         working: Callable[[float], None],
     ) -> Solution:
-        """Iterate until a further step would change little, with a noise of up to ``most`` (N).
+        """Iterate until a further step would change little.
 
         covariance: of the values, where it is known how uncertain they are.
         """
-        begin, steps = state.steps, STEPS if most == np.inf else PUSH_STEPS
+        begin = state.steps
         known = covariance is not None
+        coarse = not known
         differences = (
             np.diag(FIRST * self.values.tolerances) if covariance is None else self._uncertain(covariance)
         )
         while True:
             held = COOL * state.noise
-            state, blocks, left = self._derivatives(state, differences, working)
+            state, blocks, left = self._derivatives(state, differences, coarse, working)
             first = None  # expected decrease by the first step with these derivatives
             while True:
                 found = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
-                noise = np.minimum(np.fmax(found, held), most)  # nothing is held at first, where held is nan
+                noise = np.fmax(found, held)  # nothing is held at first, where held is nan
                 cooling = bool((noise > (1 + CLOSE) * found).any())
                 precision, pull = normal(blocks, left, self._weights(noise), self.prior, state.x)
                 covariance = np.linalg.inv(precision)
@@ -189,14 +184,32 @@ class Fitting:
                 state = State(state.x, state.static_forces, noise, state.steps)
                 report(state, gain)
                 first = gain if first is None else first
+                coarse = coarse and (cooling or bool(np.isnan(held).any()))
                 settled = known and not cooling and gain < self._done and first < FRESH * self._done
-                if settled or state.steps >= begin + steps:
+                if settled or state.steps >= begin + STEPS:
                     return Solution(state, covariance, tuple(left), settled)
                 before = self._sum(left, noise, state.x)
                 state, left, after = self._step(state, step)
                 if gain < self._done or before - after < KEPT * gain:
                     differences, known = self._uncertain(covariance), True
                     break
+
+    def _jumped(self, solution: Solution) -> State | None:
+        """The state after single droppers have jumped; None where that makes nothing better."""
+        found, state = None, solution.state
+        droppers = self.values.of_kind("droppers")
+        jumps = np.zeros((2 * len(droppers), len(state.x)))
+        for k, each in enumerate(droppers):
+            jumps[2 * k : 2 * k + 2, each] = JUMP * self.values.tolerances[each] * np.array([-1, 1])
+        begins = np.append(0.0, np.repeat(self.values.begins[droppers], 2))
+        for _ in range(JUMPS):
+            tried = [state.x, *(state.x + jumps)]
+            _, sums = self._tried(state, tried, begins)
+            best = int(np.argmin(sums))
+            if not sums[best] < LESS * sums[0]:
+                break
+            found = state = replace(state, x=tried[best])
+        return found
 
     def _uncertain(self, covariance: Array) -> Array:
         """Differences, (values, values), a row each, along which values are uncertain, by as much.
@@ -211,7 +224,7 @@ class Fitting:
         return found
 
     def _derivatives(
-        self, state: State, differences: Array, working: Callable[[float], None]
+        self, state: State, differences: Array, coarse: bool, working: Callable[[float], None]
     ) -> tuple[State, list[Array], list[Array]]:
         """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part."""
         blocks, left = [], []
@@ -222,8 +235,10 @@ class Fitting:
         for k, part in enumerate(self.parts):
             working(k / len(self.parts))
             variants = [self.values.variant(each, static[k]) for each in changed]
-            force, *others = self.sampled(part, variants, np.array(begins))
-            by_value = np.linalg.solve(differences, np.array(others) - force)
+            force = self.sampled(part, variants[:1])[0]
+            own = replace(part, passes=part.coarse) if coarse else part
+            near_by, *others = self.sampled(own, variants, np.array(begins))
+            by_value = np.linalg.solve(differences, np.array(others) - near_by)
             shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()
@@ -236,17 +251,23 @@ class Fitting:
 
     def _step(self, state: State, step: Array) -> tuple[State, list[Array], float]:
         """The state after the share of a step that gives the least sum, what is left there, and the sum."""
-        count = len(self.values)
         tried = [state.x + share * step for share in SHORTER]
+        left, sums = self._tried(state, tried)
+        best = int(np.argmin(sums))
+        return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
+
+    def _tried(
+        self, state: State, tried: Sequence[Array], begins: Array | None = None
+    ) -> tuple[list[list[Array]], list[float]]:
+        """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
+        count = len(self.values)
         left: list[list[Array]] = [[] for _ in tried]
         for k, part in enumerate(self.parts):
             variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
-            forces = self.sampled(part, variants)
+            forces = self.sampled(part, variants, begins)
             for own, x, force in zip(left, tried, forces, strict=True):
                 own.append(part.measured.coefficients(part.measured.force(x[count + k]) - force))
-        sums = [self._sum(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
-        best = int(np.argmin(sums))
-        return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
+        return left, [self._sum(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
 
     def _sum(self, left: Sequence[Array], noise: Array, x: Array) -> float:
         """What is minimised."""
@@ -264,7 +285,7 @@ class Fitting:
         if part.low_passed:
             forces = low_pass(forces, passes.time_step)
         smooth = zero_phase_low_pass(forces, passes.time_step)
-        return np.array([np.interp(place, passes.position, force) for force in smooth])
+        return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
 
     @property
     def _bands(self) -> list[Index]:

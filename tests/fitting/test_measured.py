@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.measured import BANDS, HIGHEST, PER_SECOND, Measured, measured
+from panto_env.fitting.measured import BANDS, HIGHEST, PER_SECOND, Measured, between, measured
 from panto_env.records.record import Piece
 
 SPEED, SPAN = 60.0, 60.0
@@ -112,3 +112,13 @@ def test_a_speed_that_changes_is_refused(change, refused):
         taken(uneven, (300.0, 600.0))  # its middle has one speed
     else:
         taken(uneven, (100.0, 800.0))
+
+
+def test_between_samples_a_wave_keeps_its_amplitude():
+    """Of 18 Hz at 500 samples a second, at the ends as well; cubic courses exactly."""
+    number = np.linspace(0, 39, 400)
+    turn = 2 * np.pi * 18 / 500
+    samples = np.stack([np.sin(turn * np.arange(40.0)), np.arange(40.0) ** 3])
+    found = between(samples, number)
+    np.testing.assert_allclose(found[0], np.sin(turn * number), atol=1e-4)
+    np.testing.assert_allclose(found[1], number**3, rtol=1e-12, atol=1e-9)
