@@ -184,14 +184,15 @@ class Fitting:
                 state = State(state.x, state.static_forces, noise, state.steps)
                 report(state, gain)
                 first = gain if first is None else first
-                coarse = coarse and (cooling or bool(np.isnan(held).any()))
-                settled = known and not cooling and gain < self._done and first < FRESH * self._done
+                sure = known and not coarse and not cooling
+                settled = sure and gain < self._done and first < FRESH * self._done
                 if settled or state.steps >= begin + STEPS:
                     return Solution(state, covariance, tuple(left), settled)
                 before = self._sum(left, noise, state.x)
                 state, left, after = self._step(state, step)
                 if gain < self._done or before - after < KEPT * gain:
                     differences, known = self._uncertain(covariance), True
+                    coarse = coarse and (cooling or bool(np.isnan(held).any()))
                     break
 
     def _jumped(self, solution: Solution) -> State | None:
