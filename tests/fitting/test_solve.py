@@ -1,0 +1,57 @@
+"""Droppers that jump where steps lead no further, and derivatives from coarse passes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_env.fitting import problem as preparing
+from panto_env.fitting.measured import BANDS
+from panto_env.fitting.problem import problem
+from panto_env.fitting.solve import Solution
+from panto_env.plant.numerics import Numerics
+
+LEFT = 0.7
+"""Noise of a coefficient (N), as a record of these tests has it."""
+
+
+@pytest.fixture(scope="module")
+def end(ready, truth):
+    """A fit that has ended at the truth."""
+    fitting = ready.fitting
+    x = np.array([*(truth.of(value) for value in fitting.values.all), 0.0])
+    state = replace(fitting.start(), x=x, noise=np.full((1, BANDS), LEFT))
+    return Solution(state, np.eye(len(x)), (), settled=True)
+
+
+@pytest.mark.parametrize("by", [0.009, -0.011])
+def test_droppers_that_are_far_off_jump_back(ready, end, by):
+    """Both of two, by the distance of a jump each, and no other."""
+    values = ready.fitting.values
+    off = [values.of_kind("droppers")[k] for k in (90, 110)]
+    assert all(ready.stretch[0] < values.all[k].place < ready.stretch[1] for k in off)
+    wrong = end.state.x.copy()
+    wrong[off] += by
+    jumped = ready.fitting._jumped(replace(end, state=replace(end.state, x=wrong)))
+    moved = jumped.x - wrong
+    np.testing.assert_allclose(moved[off], -np.sign(by) * 0.01)
+    assert np.flatnonzero(moved).tolist() == off
+
+
+def test_no_dropper_jumps_where_that_makes_nothing_better(ready, end):
+    assert ready.fitting._jumped(end) is None
+
+
+def test_derivatives_from_coarse_passes_are_like_those_from_fine_ones(record, design, pantograph):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preparing, "NUMERICS", Numerics())
+        fitting = problem([record], design, pantograph, free=("supports",)).fitting
+    small = np.diag(0.1 * fitting.values.tolerances)
+    (_, (fine,), (left,)), (_, (coarse,), (same,)) = (
+        fitting._derivatives(fitting.start(), small, coarse, lambda share: None) for coarse in (False, True)
+    )
+    np.testing.assert_array_equal(left, same)  # of the fine passes
+    assert np.linalg.norm(left) > 0
+    away = np.linalg.norm(coarse - fine, axis=0) / np.linalg.norm(fine, axis=0)
+    np.testing.assert_array_equal(coarse[:, -1], fine[:, -1])  # by the shift, from the record
+    assert 0.0 < np.median(away[:-1]) < 0.5
