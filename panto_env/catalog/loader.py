@@ -202,6 +202,12 @@ def parse_catenary(table: Mapping[str, Any], path: Path) -> CatenaryData:
     return _checked(line, path)
 
 
+def parse_pantograph(table: Mapping[str, Any], path: Path) -> PantographData:
+    """Pantograph from the table of a TOML file, as ``parse_catenary`` does for lines."""
+    pantograph: PantographData = _entry("pantograph", table, path)
+    return _checked(pantograph, path)
+
+
 def file_of(source: str | Path, family: str = "catenary") -> Path:
     """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..catalog.loader import file_of, parse_catenary
+from ..catalog.loader import file_of, parse_catenary, parse_pantograph
 from .fit import INTERVAL, Fit, Found
 from .toml_text import with_table, with_value
 
@@ -38,14 +39,7 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     if not design.catenary.ends and needed > design.catenary.spans:
         text = with_value(text, "spans", needed, f"as long as {records}", str(base))
     text = with_table(text, "as_found", values, sources, str(base))
-    try:
-        parse_catenary(tomllib.loads(text), Path(path))
-    except InputError as error:
-        raise InputError(
-            f"The fit found values that no line may have, so none is written: {error} Check the line, the "
-            "pantograph and the places of the records."
-        ) from error
-    _write(path, text)
+    _write(path, text, "line", parse_catenary)
 
 
 def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:
@@ -63,7 +57,7 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
             values[each.value.index[1]] *= 1 + each.difference
         numbers = ", ".join(str(each.value.index[1] + 1) for each in found)
         text = with_value(text, name, values, f"number {numbers} {source(found, records)}", str(base))
-    _write(path, text)
+    _write(path, text, "pantograph", parse_pantograph)
 
 
 def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
@@ -113,6 +107,14 @@ def source(found: list[Found], records: str) -> str:
     return f"fitted to {records}; 95 % intervals of ±{size} {found[0].value.unit}{more}"
 
 
-def _write(path: str | Path, text: str) -> None:
+def _write(path: str | Path, text: str, what: str, parse: Callable[[dict[str, Any], Path], Any]) -> None:
+    """Write the text of a line or a pantograph, unless it is one that could not be read back."""
+    try:
+        parse(tomllib.loads(text), Path(path))
+    except InputError as error:
+        raise InputError(
+            f"The fit found values that no {what} may have, so none is written: {error} Check the line, the "
+            "pantograph and the places of the records."
+        ) from error
     with write_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

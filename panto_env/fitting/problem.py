@@ -32,8 +32,8 @@ BEYOND = 1.5
 NUMERICS = Numerics()
 """Of simulated passes."""
 COARSE = Numerics(accuracy="fast")
-"""Of those from which derivatives are taken at first, in half the time: their window of 8 spans leaves out some
-waves that come back, so that derivatives by droppers differ by a quarter, and by tensions by much more."""
+"""Of those from which derivatives are taken at first, in half the time: their window of 8 spans leaves out
+some waves that come back, so that derivatives by droppers differ by a quarter, and by tensions by more."""
 MOST_LOOSE = 0.1
 """Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0

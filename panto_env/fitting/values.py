@@ -21,17 +21,17 @@ FREE = ("tensions", "droppers", "supports", "damping", "pantograph", "unevenness
 """What can be freed."""
 USUAL = ("tensions", "droppers", "supports", "unevenness")
 """What is freed by default; the last, waves of the running surface, so that droppers don't explain them."""
+AS_BUILT = LINE_CONDITIONS["as-built"]
 TOLERANCES = {
-    "tensions": 0.017,  # relative
-    "droppers": 5e-3,  # m
-    "supports": 5e-3,  # m
+    "tensions": AS_BUILT.tension_scatter,  # relative
+    "droppers": AS_BUILT.dropper_scatter,  # m
+    "supports": AS_BUILT.support_scatter,  # m
     "damping": 0.3,  # relative
     "pantograph": 0.05,  # relative
     "unevenness": 1.0,  # as a multiple of a smooth wire's
 }
 """Standard deviations of values about the design, before any record is seen: those of a line as built
 (``LINE_CONDITIONS``); of damping and pantograph own choice."""
-AS_BUILT = LINE_CONDITIONS["as-built"]
 WAVES = (*IRREGULARITY, (AS_BUILT.wear_wavelength, AS_BUILT.wear_depth / 2))
 """Wavelengths and amplitudes (m) of the running surface of a line as built. Droppers send waves of wear back
 with other frequencies, so that they are in the low-passed force, too: 0.2 to 0.3 N of it.

@@ -153,6 +153,14 @@ def test_values_that_no_line_may_have_are_not_written(ready, tmp_path, wrong):
     assert not (tmp_path / "a.toml").exists()
 
 
+def test_values_that_no_pantograph_may_have_are_not_written(record, design, pantograph, tmp_path):
+    ready = problem([record], design, pantograph, free=("pantograph",))
+    wrong = made_up(ready, {"masses 2 of the pantograph": -1.2})
+    with pytest.raises(InputError, match=r"no pantograph may have, so none is written: .*p\.toml is not"):
+        write_pantograph(wrong, PANTOGRAPH, tmp_path / "p.toml", "run.csv")
+    assert not (tmp_path / "p.toml").exists()
+
+
 def test_tables_say_what_was_found(done):
     rows = {row["name"]: row for row in rows_of(done.found, done.before)}
     dropper = rows["dropper 4 of span 12"]
