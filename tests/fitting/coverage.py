@@ -1,6 +1,6 @@
-"""Coverage of the intervals of ``panto fit`` on lines as built, and what the errors are; a line is a file.
+"""Coverage of the intervals of ``panto fit`` on lines as built, and what the errors are.
 
-python -m tests.fitting.coverage FOLDER --lines 200           # goes on where it was broken off
+python -m tests.fitting.coverage FOLDER --lines 100           # goes on where it was broken off
 python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong, in one of several ways
 python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
 python -m tests.fitting.coverage FOLDER --line section        # lines whose spans differ, each drawn
@@ -45,7 +45,7 @@ HEADINGS = (
     "support (mm)",
     "unlike noise",
 )
-WRONG = ("nothing", "damping", "pantograph", "drift", "window")
+WRONG = ("nothing", "grid", "damping", "pantograph", "drift")
 
 
 def design_of(seed: int, line: str) -> FlexibleCatenaryData:
@@ -75,8 +75,8 @@ def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
         masses = tuple(float(m * (1 + 0.05 * s)) for m, s in zip(pantograph.masses, signs, strict=True))
         springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
         pantograph = pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
-    if wrong == "window":
-        settings["window"] = 0
+    if wrong == "grid":
+        settings |= {"window": 0, "spacing": 0.25, "time_step": 5e-4, "precision": "double"}
     found = []
     for k, speed in enumerate(faster * np.array(SPEEDS[-passes:])):
         run = simulate(
@@ -116,24 +116,34 @@ def judge(seed: int, passes: int, wrong: str, kind: str) -> dict[str, Any]:
     truths = {"tensions": np.array(true.tensions) - 1, "droppers": true.scatter, "supports": true.heights}
     rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
     rows["settled"] = found.solution.settled
-    rows["left"] = [left for _, left in found.left]
-    rows["as_noise"] = [white.probability for white in found.whiteness]
+    rows["left"] = [_short(left) for _, left in found.left]
+    rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
     for name, truth in truths.items():
         own = found.of_kind(name)
         pairs = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
-        rows[name] = [[float(f"{number:.4g}") for number in pair] for pair in pairs]
+        rows[name] = [[_short(number) for number in pair] for pair in pairs]
     return rows
 
 
-def write(path: Path, seed: int, passes: int, wrong: str, kind: str) -> None:
-    """Judge one line, and write what was found."""
+def _short(number: float) -> float:
+    return float(f"{number:.3g}")
+
+
+def known(path: Path) -> list[dict[str, Any]]:
+    """What was found before of lines of a group."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Write what was found of lines of a group, a row for each line."""
+    text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
     with write_whole(path) as temporary:
-        temporary.write_text(json.dumps(judge(seed, passes, wrong, kind)), encoding="utf-8")
+        temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
 
 
 def table(folder: Path) -> Iterator[str]:
     """Rows of a table in Markdown: coverage and errors by line, what is wrong, and the number of passes."""
-    results = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*-*-*-*.json"))]
+    results = [row for path in sorted(folder.glob("*-*-*.json")) for row in known(path)]
     yield f"| {' | '.join(HEADINGS)} |"
     yield f"| --- | --- |{' ---: |' * (len(HEADINGS) - 2)}"
     groups: dict[Any, list[Any]] = {}
@@ -166,11 +176,12 @@ def main() -> None:
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     if not given.table:
-        for seed in range(given.lines):
-            path = given.folder / f"{given.line}-{given.wrong}-{given.passes}-{seed}.json"
-            if not path.is_file():
-                write(path, seed, given.passes, given.wrong, given.line)
-                print(f"line {seed + 1} of {given.lines}", flush=True)
+        path = given.folder / f"{given.line}-{given.wrong}-{given.passes}.json"
+        done = {row["seed"] for row in known(path)}
+        for seed in sorted(set(range(given.lines)) - done):
+            row = judge(seed, given.passes, given.wrong, given.line)
+            write(path, [*known(path), row])
+            print(f"line {seed + 1} of {given.lines}", flush=True)
     for row in table(given.folder):
         print(row)
 
