@@ -25,12 +25,20 @@ def normal(
     blocks: derivatives of coefficients, (coefficients, n), of each part; left: measured less simulated
     coefficients; weights: 1 / variance of each. prior: standard deviations of x, (n,), about 0.
     """
-    precision, pull = np.diag(1 / prior**2), -x / prior**2
+    precision = np.diag(1 / prior**2)
+    for block, weight in zip(blocks, weights, strict=True):
+        precision += (block * weight[:, None]).T @ block
+    return precision, pull_of(blocks, weights, prior, left, x)
+
+
+def pull_of(
+    blocks: Sequence[Array], weights: Sequence[Array], prior: Array, left: Sequence[Array], x: Array
+) -> Array:
+    """Right side, (n,), of a Gauss-Newton step, as ``normal`` takes its arguments."""
+    pull = -x / prior**2
     for block, own, weight in zip(blocks, left, weights, strict=True):
-        weighted = block * weight[:, None]
-        precision += weighted.T @ block
-        pull += weighted.T @ own
-    return precision, pull
+        pull += block.T @ (weight * own)
+    return pull
 
 
 def noise_of(

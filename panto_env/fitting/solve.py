@@ -21,20 +21,21 @@ from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .measured import BANDS, Measured, between
-from .normal import CLOSE, noise_of, normal
+from .normal import CLOSE, noise_of, normal, pull_of
 from .passes import Passes, Variant
 from .values import Values
 
 SHIFT = 0.5
 """Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
-STEPS = 40
-"""Most steps."""
+STEPS, SETS, ROUNDS = 80, 6, 10
+"""Most steps, and sets of derivatives once noise is no longer held, until single droppers are looked at; and
+how often they are at most."""
 DONE = 0.05
 """Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
 moves by a fifth of its standard deviation."""
-JUMP, JUMPS, LESS = 2.0, 10, 0.9
-"""Tolerances by which single droppers are made longer and shorter where steps lead no further, how often at
-most, and what share of what is minimised, or left, must remain at most for that to count."""
+JUMPS, LESS = (-2.0, -1.0, 1.0, 2.0), 0.95
+"""Tolerances by which single droppers are made longer or shorter where steps lead no further, and what share
+of what is minimised, or left, must remain at most for that to count."""
 WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 FRESH = 10.0
@@ -85,6 +86,7 @@ class Solution:
 
     state: State
     covariance: Array  # (values + parts, values + parts)
+    blocks: tuple[Array, ...]  # of each part: derivatives, (coefficients, values + parts)
     left: tuple[Array, ...]  # of each part, (coefficients,): measured less simulated (N)
     settled: bool  # whether a further step would change little
 
@@ -142,12 +144,12 @@ class Fitting:
         at the end is not like noise, single droppers jump, for one may be on the wrong side of going slack.
         """
         best = self._settle(state, None, report, working)
-        while not best.like_noise(self._bands):
-            jumped = self._jumped(best)
-            if jumped is None:
+        for _ in range(ROUNDS):
+            jumped = None if best.like_noise(self._bands) else self._jumped(best)
+            if best.settled and jumped is None:
                 break
-            found = self._settle(jumped, best.covariance, report, working)
-            if not found.size < LESS * best.size:
+            found = self._settle(jumped or best.state, best.covariance, report, working)
+            if jumped and not found.size < LESS * best.size:
                 break
             best = found
         return best
@@ -159,11 +161,11 @@ class Fitting:
         report: Callable[[State, float], None],
         working: Callable[[float], None],
     ) -> Solution:
-        """Iterate until a further step would change little.
+        """Iterate until a further step would change little, or steps lead nowhere.
 
         covariance: of the values, where it is known how uncertain they are.
         """
-        begin = state.steps
+        begin, sets = state.steps, 0
         known = covariance is not None
         coarse = not known
         differences = (
@@ -186,30 +188,42 @@ class Fitting:
                 first = gain if first is None else first
                 sure = known and not coarse and not cooling
                 settled = sure and gain < self._done and first < FRESH * self._done
-                if settled or state.steps >= begin + STEPS:
-                    return Solution(state, covariance, tuple(left), settled)
+                if settled or sets > SETS or state.steps >= begin + STEPS:
+                    return Solution(state, covariance, tuple(blocks), tuple(left), settled)
                 before = self._sum(left, noise, state.x)
                 state, left, after = self._step(state, step)
                 if gain < self._done or before - after < KEPT * gain:
                     differences, known = self._uncertain(covariance), True
                     coarse = coarse and (cooling or bool(np.isnan(held).any()))
+                    sets += sure
                     break
 
     def _jumped(self, solution: Solution) -> State | None:
-        """The state after single droppers have jumped; None where that makes nothing better."""
+        """The state after single droppers have jumped; None where that makes nothing better.
+
+        What a jump makes better shows when all other values have followed, for they have made up for what was
+        wrong; that they would follow is expected of the last derivatives.
+        """
         found, state = None, solution.state
-        droppers = self.values.of_kind("droppers")
-        jumps = np.zeros((2 * len(droppers), len(state.x)))
-        for k, each in enumerate(droppers):
-            jumps[2 * k : 2 * k + 2, each] = JUMP * self.values.tolerances[each] * np.array([-1, 1])
-        begins = np.append(0.0, np.repeat(self.values.begins[droppers], 2))
-        for _ in range(JUMPS):
-            tried = [state.x, *(state.x + jumps)]
-            _, sums = self._tried(state, tried, begins)
-            best = int(np.argmin(sums))
-            if not sums[best] < LESS * sums[0]:
+        weights, covariance = self._weights(state.noise), solution.covariance
+        jumping = np.repeat(self.values.of_kind("droppers"), len(JUMPS))
+        far = self.values.tolerances[jumping] * np.resize(JUMPS, len(jumping))
+        while len(jumping):
+            tried = np.repeat(state.x[None], 1 + len(jumping), axis=0)
+            tried[np.arange(1, len(tried)), jumping] += far
+            left, sums = self._tried(state, tried, np.append(0.0, self.values.begins[jumping]))
+            facts = solution.blocks, weights, self.prior
+            pulls = np.array([pull_of(*facts, own, x) for own, x in zip(left, tried, strict=True)])
+            expected = sums - np.sum((pulls @ covariance) * pulls, axis=1)
+            back = np.sum(covariance[jumping] * pulls[1:], axis=1) ** 2 / np.diag(covariance)[jumping]
+            expected[1:] += back  # what a dropper would gain by going back; it stays
+            better = np.flatnonzero(expected[1:] < LESS * expected[0])
+            if not len(better):
                 break
-            found = state = replace(state, x=tried[best])
+            best = int(np.argmin(expected[1:]))
+            found = state = replace(state, x=tried[1 + best])
+            others = better[jumping[better] != jumping[best]]
+            jumping, far = jumping[others], far[others]
         return found
 
     def _uncertain(self, covariance: Array) -> Array:
@@ -258,7 +272,7 @@ class Fitting:
         return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
 
     def _tried(
-        self, state: State, tried: Sequence[Array], begins: Array | None = None
+        self, state: State, tried: Sequence[Array] | Array, begins: Array | None = None
     ) -> tuple[list[list[Array]], list[float]]:
         """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
         count = len(self.values)

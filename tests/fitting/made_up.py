@@ -19,4 +19,4 @@ def made_up(ready, differences, shift=0.0, silent=()):
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
     random = np.random.default_rng(0)
     left = tuple(random.standard_normal(len(part.measured.kept)) for part in fitting.parts)
-    return Fit(ready, Solution(state, np.diag(deviation**2), left, True))
+    return Fit(ready, Solution(state, np.diag(deviation**2), (), left, True))

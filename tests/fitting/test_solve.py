@@ -21,7 +21,8 @@ def end(ready, truth):
     fitting = ready.fitting
     x = np.array([*(truth.of(value) for value in fitting.values.all), 0.0])
     state = replace(fitting.start(), x=x, noise=np.full((1, BANDS), LEFT))
-    return Solution(state, np.eye(len(x)), (), settled=True)
+    blocks = np.zeros((len(ready.fitting.parts[0].measured.kept), len(x)))
+    return Solution(state, np.diag(fitting.prior**2), (blocks,), (), settled=True)
 
 
 @pytest.mark.parametrize("by", [0.009, -0.011])
