@@ -7,6 +7,7 @@ import pytest
 
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.measured import BANDS
+from panto_env.fitting.normal import normal
 from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import Solution
 from panto_env.plant.numerics import Numerics
@@ -56,3 +57,26 @@ def test_derivatives_from_coarse_passes_are_like_those_from_fine_ones(record, de
     away = np.linalg.norm(coarse - fine, axis=0) / np.linalg.norm(fine, axis=0)
     np.testing.assert_array_equal(coarse[:, -1], fine[:, -1])  # by the shift, from the record
     assert 0.0 < np.median(away[:-1]) < 0.5
+
+
+def test_a_dropper_jumps_for_which_others_make_up(ready, end):
+    """Its whole return, alone, would make it worse."""
+    fitting = ready.fitting
+    k = fitting.values.of_kind("droppers")[100]
+    state = replace(end.state, x=end.state.x + 0.01 * (np.arange(len(end.state.x)) == k))
+    for _ in range(3):  # steps of all values but this one
+        differences = np.diag(0.1 * fitting.values.tolerances)
+        _, blocks, left = fitting._derivatives(state, differences, False, lambda share: None)
+        facts = blocks, left, fitting._weights(state.noise), fitting.prior, state.x
+        precision, pull = normal(*facts)
+        found = Solution(state, np.linalg.inv(precision), tuple(blocks), tuple(left), settled=True)
+        others = np.delete(np.arange(len(state.x)), k)
+        x = state.x.copy()
+        x[others] += np.linalg.solve(precision[np.ix_(others, others)], pull[others])
+        state = replace(state, x=x)
+    wrong = found.state.x
+    jumped = fitting._jumped(found).x - wrong
+    assert jumped[k] < -0.004
+    alone = np.where(np.arange(len(wrong)) == k, wrong - 0.01, wrong)
+    _, (before, after) = fitting._tried(found.state, [wrong, alone])
+    assert after > before
