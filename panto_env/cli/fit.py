@@ -109,8 +109,8 @@ def fit(
             if place is not None:
                 keep_state(place, state, identity)
 
-        def working(share: float) -> None:
-            progress.update(bar, description=f"derivatives, {100 * share:.0f} %")
+        def working(doing: str) -> None:
+            progress.update(bar, description=doing)
 
         found = fits.fit(
             records,

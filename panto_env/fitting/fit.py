@@ -130,7 +130,7 @@ def fit(
     tolerances: Mapping[str, float] | None = None,
     begin: State | None = None,
     report: Callable[[State, float], None] = lambda state, gain: None,
-    working: Callable[[float], None] = lambda share: None,
+    working: Callable[[str], None] = lambda doing: None,
 ) -> Fit:
     """Fit ``free`` values of a line, and of the pantograph, to records of the contact force.
 

@@ -133,19 +133,19 @@ class Fitting:
         self,
         state: State,
         report: Callable[[State, float], None] = lambda state, gain: None,
-        working: Callable[[float], None] = lambda share: None,
+        working: Callable[[str], None] = lambda doing: None,
     ) -> Solution:
         """Iterate to the end.
 
         report: called after each step with the state and the expected decrease of a further one. working:
-        called with the finished share of all derivatives while they are computed.
+        called now and then with what is being computed.
 
         As long as noise is held above what is left, derivatives come from coarse passes. Where what is left
         at the end is not like noise, single droppers jump, for one may be on the wrong side of going slack.
         """
         best = self._settle(state, None, report, working)
         for _ in range(ROUNDS):
-            jumped = None if best.like_noise(self._bands) else self._jumped(best)
+            jumped = None if best.like_noise(self._bands) else self._jumped(best, working)
             if best.settled and jumped is None:
                 break
             found = self._settle(jumped or best.state, best.covariance, report, working)
@@ -159,7 +159,7 @@ class Fitting:
         state: State,
         covariance: Array | None,
         report: Callable[[State, float], None],
-        working: Callable[[float], None],
+        working: Callable[[str], None],
     ) -> Solution:
         """Iterate until a further step would change little, or steps lead nowhere.
 
@@ -198,7 +198,7 @@ class Fitting:
                     sets += sure
                     break
 
-    def _jumped(self, solution: Solution) -> State | None:
+    def _jumped(self, solution: Solution, working: Callable[[str], None]) -> State | None:
         """The state after single droppers have jumped; None where that makes nothing better.
 
         What a jump makes better shows when all other values have followed, for they have made up for what was
@@ -209,6 +209,7 @@ class Fitting:
         jumping = np.repeat(self.values.of_kind("droppers"), len(JUMPS))
         far = self.values.tolerances[jumping] * np.resize(JUMPS, len(jumping))
         while len(jumping):
+            working("single droppers")
             tried = np.repeat(state.x[None], 1 + len(jumping), axis=0)
             tried[np.arange(1, len(tried)), jumping] += far
             left, sums = self._tried(state, tried, np.append(0.0, self.values.begins[jumping]))
@@ -239,7 +240,7 @@ class Fitting:
         return found
 
     def _derivatives(
-        self, state: State, differences: Array, coarse: bool, working: Callable[[float], None]
+        self, state: State, differences: Array, coarse: bool, working: Callable[[str], None]
     ) -> tuple[State, list[Array], list[Array]]:
         """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part."""
         blocks, left = [], []
@@ -248,7 +249,7 @@ class Fitting:
         changed = [now, *(now + each for each in differences)]
         begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences)]
         for k, part in enumerate(self.parts):
-            working(k / len(self.parts))
+            working(f"derivatives, {100 * k / len(self.parts):.0f} %")
             variants = [self.values.variant(each, static[k]) for each in changed]
             force = self.sampled(part, variants[:1])[0]
             own = replace(part, passes=part.coarse) if coarse else part
@@ -261,7 +262,6 @@ class Fitting:
             by_shift[k] = (near[0] - near[1]) / (2 * sample)  # a larger shift takes this off the target
             blocks.append(part.measured.coefficients(np.vstack([by_value, by_shift])).T)
             left.append(part.measured.coefficients(target - force))
-        working(1.0)
         return State(state.x, static, state.noise, state.steps), blocks, left
 
     def _step(self, state: State, step: Array) -> tuple[State, list[Array], float]:

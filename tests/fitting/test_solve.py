@@ -34,14 +34,14 @@ def test_droppers_that_are_far_off_jump_back(ready, end, by):
     assert all(ready.stretch[0] < values.all[k].place < ready.stretch[1] for k in off)
     wrong = end.state.x.copy()
     wrong[off] += by
-    jumped = ready.fitting._jumped(replace(end, state=replace(end.state, x=wrong)))
+    jumped = ready.fitting._jumped(replace(end, state=replace(end.state, x=wrong)), lambda doing: None)
     moved = jumped.x - wrong
     np.testing.assert_allclose(moved[off], -np.sign(by) * 0.01)
     assert np.flatnonzero(moved).tolist() == off
 
 
 def test_no_dropper_jumps_where_that_makes_nothing_better(ready, end):
-    assert ready.fitting._jumped(end) is None
+    assert ready.fitting._jumped(end, lambda doing: None) is None
 
 
 def test_derivatives_from_coarse_passes_are_like_those_from_fine_ones(record, design, pantograph):
@@ -50,7 +50,7 @@ def test_derivatives_from_coarse_passes_are_like_those_from_fine_ones(record, de
         fitting = problem([record], design, pantograph, free=("supports",)).fitting
     small = np.diag(0.1 * fitting.values.tolerances)
     (_, (fine,), (left,)), (_, (coarse,), (same,)) = (
-        fitting._derivatives(fitting.start(), small, coarse, lambda share: None) for coarse in (False, True)
+        fitting._derivatives(fitting.start(), small, coarse, lambda doing: None) for coarse in (False, True)
     )
     np.testing.assert_array_equal(left, same)  # of the fine passes
     assert np.linalg.norm(left) > 0
@@ -66,7 +66,7 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, end):
     state = replace(end.state, x=end.state.x + 0.01 * (np.arange(len(end.state.x)) == k))
     for _ in range(3):  # steps of all values but this one
         differences = np.diag(0.1 * fitting.values.tolerances)
-        _, blocks, left = fitting._derivatives(state, differences, False, lambda share: None)
+        _, blocks, left = fitting._derivatives(state, differences, False, lambda doing: None)
         facts = blocks, left, fitting._weights(state.noise), fitting.prior, state.x
         precision, pull = normal(*facts)
         found = Solution(state, np.linalg.inv(precision), tuple(blocks), tuple(left), settled=True)
@@ -75,7 +75,7 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, end):
         x[others] += np.linalg.solve(precision[np.ix_(others, others)], pull[others])
         state = replace(state, x=x)
     wrong = found.state.x
-    jumped = fitting._jumped(found).x - wrong
+    jumped = fitting._jumped(found, lambda doing: None).x - wrong
     assert jumped[k] < -0.004
     alone = np.where(np.arange(len(wrong)) == k, wrong - 0.01, wrong)
     _, (before, after) = fitting._tried(found.state, [wrong, alone])
