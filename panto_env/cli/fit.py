@@ -25,7 +25,7 @@ from .record import Mass, Unit
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
-    from ..fitting.solve import State
+    from ..fitting.misfit import State
 
 
 def fit(

@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.units import from_kmh
+from ..fitting.misfit import Part
 from ..fitting.problem import Problem, problem
-from ..fitting.solve import Part
 from ..fitting.stored import Stored, along
 from ..fitting.values import FREE
 from ..plant.alignment import Alignment

@@ -13,8 +13,9 @@ from ..estimation.innovations import Whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
+from .misfit import Part, State
 from .problem import Problem, problem
-from .solve import Part, Solution, State
+from .solve import Solution
 from .values import USUAL, Value
 
 INTERVAL = 1.96

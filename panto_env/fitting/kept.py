@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.array_file import read_arrays, write_arrays
 from ..records.record import Record
-from .solve import State
+from .misfit import State
 
 ARRAYS = ("x", "static_forces", "noise")
 SUFFIX = ".fit"

@@ -20,8 +20,9 @@ from ..plant.pantograph.schema import PantographData
 from ..records.record import Piece, Record
 from ..records.samples import is_low_passed
 from .measured import Measured, measured
+from .misfit import Part
 from .passes import Passes
-from .solve import Fitting, Part
+from .solve import Fitting
 from .values import AS_BUILT, TOLERANCES, USUAL, Design, Values
 
 END = 20.0

@@ -1,13 +1,8 @@
 """Gauss-Newton with tolerances as priors, and the noise of each band of frequencies found on the way.
 
-The fit minimises, over values x that count from the design,
-
-    sum over records and bands of |c - c(x)|^2 / s_b^2  +  sum of (x / tolerance)^2,
-
-with c the cosine coefficients of a measured force and c(x) those of the simulated one. s_b, the standard
-deviation of what a band has besides, is found with the values: from what is left over, counted with as many
-degrees of freedom as the values leave (MacKay, 1992, "Bayesian interpolation"). At first that is nearly
-everything that a record has, so that first steps are careful; then it falls to what the model cannot explain.
+Noise is found with the values: from what is left over, counted with as many degrees of freedom as the values
+leave (MacKay, 1992, "Bayesian interpolation"). At first that is nearly everything that a record has, so that
+first steps are careful; then it falls to what the model cannot explain.
 """
 
 from __future__ import annotations
@@ -19,14 +14,9 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
-from ..metrics.low_pass import low_pass, zero_phase_low_pass
-from .measured import BANDS, Measured, between
+from .misfit import Misfit, State
 from .normal import CLOSE, noise_of, normal, pull_of
-from .passes import Passes, Variant
-from .values import Values
 
-SHIFT = 0.5
-"""Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
 STEPS, SETS, ROUNDS = 80, 6, 10
 """Most steps, and sets of derivatives once noise is no longer held, until single droppers are looked at; and
 how often they are at most."""
@@ -59,28 +49,6 @@ SHORTER = (1.0, 0.5, 0.2, 0.05)
 
 
 @dataclass(frozen=True)
-class Part:
-    """One piece of a record, and the passes that are held against it."""
-
-    measured: Measured
-    passes: Passes
-    coarse: Passes  # from which derivatives are taken at first
-    name: str
-    low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
-
-
-@dataclass(frozen=True)
-class State:
-    """Where a fit is."""
-
-    # (values + parts,): values as differences from the design, then by how much positions are short (m)
-    x: Array
-    static_forces: Array  # (parts,): N
-    noise: Array  # (parts, bands): standard deviation of coefficients (N)
-    steps: int = 0
-
-
-@dataclass(frozen=True)
 class Solution:
     """The end of a fit."""
 
@@ -105,29 +73,8 @@ class Solution:
         return all(white.probability >= WHITE for white in self.whiteness(bands))
 
 
-class Fitting:
-    """The iteration over some parts of records."""
-
-    def __init__(self, parts: Sequence[Part], values: Values) -> None:
-        self.parts, self.values = parts, values
-        self.prior = np.append(values.tolerances, np.full(len(parts), SHIFT))
-        self._done = DONE * len(self.prior)
-
-    def start(self) -> State:
-        """The line as designed."""
-        count = len(self.parts)
-        static = np.full(count, self.values.design.pantograph.static_force)
-        return State(np.zeros(len(self.prior)), static, np.full((count, BANDS), np.nan))
-
-    def as_designed(self) -> list[Array]:
-        """Force of the line as designed at the places of each part (N)."""
-        state = self.start()
-        count = len(self.values)
-        found = []
-        for k, part in enumerate(self.parts):
-            variant = self.values.variant(state.x[:count], float(state.static_forces[k]))
-            found.append(self.sampled(part, [variant])[0])
-        return found
+class Fitting(Misfit):
+    """The iteration to the least misfit."""
 
     def run(
         self,
@@ -145,7 +92,7 @@ class Fitting:
         """
         best = self._settle(state, None, report, working)
         for _ in range(ROUNDS):
-            jumped = None if best.like_noise(self._bands) else self._jumped(best, working)
+            jumped = None if best.like_noise(self.bands) else self._jumped(best, working)
             if best.settled and jumped is None:
                 break
             found = self._settle(jumped or best.state, best.covariance, report, working)
@@ -165,7 +112,7 @@ class Fitting:
 
         covariance: of the values, where it is known how uncertain they are.
         """
-        begin, sets = state.steps, 0
+        begin, sets, done = state.steps, 0, DONE * len(self.prior)
         known = covariance is not None
         coarse = not known
         differences = (
@@ -173,13 +120,13 @@ class Fitting:
         )
         while True:
             held = COOL * state.noise
-            state, blocks, left = self._derivatives(state, differences, coarse, working)
+            state, blocks, left = self.derivatives(state, differences, coarse, working)
             first = None  # expected decrease by the first step with these derivatives
             while True:
-                found = noise_of(state.noise, blocks, left, self._bands, self.prior, state.x)
+                found = noise_of(state.noise, blocks, left, self.bands, self.prior, state.x)
                 noise = np.fmax(found, held)  # nothing is held at first, where held is nan
                 cooling = bool((noise > (1 + CLOSE) * found).any())
-                precision, pull = normal(blocks, left, self._weights(noise), self.prior, state.x)
+                precision, pull = normal(blocks, left, self.weights(noise), self.prior, state.x)
                 covariance = np.linalg.inv(precision)
                 step = covariance @ pull
                 gain = float(pull @ step)
@@ -187,12 +134,12 @@ class Fitting:
                 report(state, gain)
                 first = gain if first is None else first
                 sure = known and not coarse and not cooling
-                settled = sure and gain < self._done and first < FRESH * self._done
+                settled = sure and gain < done and first < FRESH * done
                 if settled or sets > SETS or state.steps >= begin + STEPS:
                     return Solution(state, covariance, tuple(blocks), tuple(left), settled)
-                before = self._sum(left, noise, state.x)
+                before = self.sum_of(left, noise, state.x)
                 state, left, after = self._step(state, step)
-                if gain < self._done or before - after < KEPT * gain:
+                if gain < done or before - after < KEPT * gain:
                     differences, known = self._uncertain(covariance), True
                     coarse = coarse and (cooling or bool(np.isnan(held).any()))
                     sets += sure
@@ -205,14 +152,14 @@ class Fitting:
         wrong; that they would follow is expected of the last derivatives.
         """
         found, state = None, solution.state
-        weights, covariance = self._weights(state.noise), solution.covariance
+        weights, covariance = self.weights(state.noise), solution.covariance
         jumping = np.repeat(self.values.of_kind("droppers"), len(JUMPS))
         far = self.values.tolerances[jumping] * np.resize(JUMPS, len(jumping))
         while len(jumping):
             working("single droppers")
             tried = np.repeat(state.x[None], 1 + len(jumping), axis=0)
             tried[np.arange(1, len(tried)), jumping] += far
-            left, sums = self._tried(state, tried, np.append(0.0, self.values.begins[jumping]))
+            left, sums = self.tried(state, tried, np.append(0.0, self.values.begins[jumping]))
             facts = solution.blocks, weights, self.prior
             pulls = np.array([pull_of(*facts, own, x) for own, x in zip(left, tried, strict=True)])
             expected = sums - np.sum((pulls @ covariance) * pulls, axis=1)
@@ -239,72 +186,9 @@ class Fitting:
         found[:, order] = WIDE * np.linalg.cholesky(covariance[np.ix_(order, order)]).T
         return found
 
-    def _derivatives(
-        self, state: State, differences: Array, coarse: bool, working: Callable[[str], None]
-    ) -> tuple[State, list[Array], list[Array]]:
-        """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part."""
-        blocks, left = [], []
-        static, count = state.static_forces.copy(), len(self.values)
-        now = state.x[:count]
-        changed = [now, *(now + each for each in differences)]
-        begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences)]
-        for k, part in enumerate(self.parts):
-            working(f"derivatives, {100 * k / len(self.parts):.0f} %")
-            variants = [self.values.variant(each, static[k]) for each in changed]
-            force = self.sampled(part, variants[:1])[0]
-            own = replace(part, passes=part.coarse) if coarse else part
-            near_by, *others = self.sampled(own, variants, np.array(begins))
-            by_value = np.linalg.solve(differences, np.array(others) - near_by)
-            shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
-            target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
-            static[k] += target.mean() - force.mean()
-            by_shift = np.zeros((len(self.parts), len(target)))
-            by_shift[k] = (near[0] - near[1]) / (2 * sample)  # a larger shift takes this off the target
-            blocks.append(part.measured.coefficients(np.vstack([by_value, by_shift])).T)
-            left.append(part.measured.coefficients(target - force))
-        return State(state.x, static, state.noise, state.steps), blocks, left
-
     def _step(self, state: State, step: Array) -> tuple[State, list[Array], float]:
         """The state after the share of a step that gives the least sum, what is left there, and the sum."""
         tried = [state.x + share * step for share in SHORTER]
-        left, sums = self._tried(state, tried)
+        left, sums = self.tried(state, tried)
         best = int(np.argmin(sums))
         return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
-
-    def _tried(
-        self, state: State, tried: Sequence[Array] | Array, begins: Array | None = None
-    ) -> tuple[list[list[Array]], list[float]]:
-        """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
-        count = len(self.values)
-        left: list[list[Array]] = [[] for _ in tried]
-        for k, part in enumerate(self.parts):
-            variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
-            forces = self.sampled(part, variants, begins)
-            for own, x, force in zip(left, tried, forces, strict=True):
-                own.append(part.measured.coefficients(part.measured.force(x[count + k]) - force))
-        return left, [self._sum(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
-
-    def _sum(self, left: Sequence[Array], noise: Array, x: Array) -> float:
-        """What is minimised."""
-        parts = zip(left, noise, self._bands, strict=True)
-        misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
-        return misfit + float(np.sum((x / self.prior) ** 2))
-
-    def sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
-        """Low-passed forces of variants at the places that are compared, (n, places) (N).
-
-        begins: as ``Passes.forces`` takes them.
-        """
-        passes, place = part.passes, part.measured.place
-        forces = passes.forces(variants, begins)
-        if part.low_passed:
-            forces = low_pass(forces, passes.time_step)
-        smooth = zero_phase_low_pass(forces, passes.time_step)
-        return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
-
-    @property
-    def _bands(self) -> list[Index]:
-        return [part.measured.band for part in self.parts]
-
-    def _weights(self, noise: Array) -> list[Array]:
-        return [1 / own[band] ** 2 for own, band in zip(noise, self._bands, strict=True)]

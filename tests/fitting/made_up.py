@@ -3,7 +3,8 @@
 import numpy as np
 
 from panto_env.fitting.fit import Fit
-from panto_env.fitting.solve import Solution, State
+from panto_env.fitting.misfit import State
+from panto_env.fitting.solve import Solution
 
 
 def made_up(ready, differences, shift=0.0, silent=()):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.fitting.kept import identity_of, keep, kept
-from panto_env.fitting.solve import State
+from panto_env.fitting.misfit import State
 from panto_env.records.record import Piece, Record
 
 SETTINGS = {"free": ["droppers"], "tolerances": {"droppers": 0.01}, "line": "{}"}

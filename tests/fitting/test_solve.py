@@ -50,7 +50,7 @@ def test_derivatives_from_coarse_passes_are_like_those_from_fine_ones(record, de
         fitting = problem([record], design, pantograph, free=("supports",)).fitting
     small = np.diag(0.1 * fitting.values.tolerances)
     (_, (fine,), (left,)), (_, (coarse,), (same,)) = (
-        fitting._derivatives(fitting.start(), small, coarse, lambda doing: None) for coarse in (False, True)
+        fitting.derivatives(fitting.start(), small, coarse, lambda doing: None) for coarse in (False, True)
     )
     np.testing.assert_array_equal(left, same)  # of the fine passes
     assert np.linalg.norm(left) > 0
@@ -66,8 +66,8 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, end):
     state = replace(end.state, x=end.state.x + 0.01 * (np.arange(len(end.state.x)) == k))
     for _ in range(3):  # steps of all values but this one
         differences = np.diag(0.1 * fitting.values.tolerances)
-        _, blocks, left = fitting._derivatives(state, differences, False, lambda doing: None)
-        facts = blocks, left, fitting._weights(state.noise), fitting.prior, state.x
+        _, blocks, left = fitting.derivatives(state, differences, False, lambda doing: None)
+        facts = blocks, left, fitting.weights(state.noise), fitting.prior, state.x
         precision, pull = normal(*facts)
         found = Solution(state, np.linalg.inv(precision), tuple(blocks), tuple(left), settled=True)
         others = np.delete(np.arange(len(state.x)), k)
@@ -78,5 +78,5 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, end):
     jumped = fitting._jumped(found, lambda doing: None).x - wrong
     assert jumped[k] < -0.004
     alone = np.where(np.arange(len(wrong)) == k, wrong - 0.01, wrong)
-    _, (before, after) = fitting._tried(found.state, [wrong, alone])
+    _, (before, after) = fitting.tried(found.state, [wrong, alone])
     assert after > before

@@ -1,0 +1,140 @@
+"""How far the forces of a line are from those of records: what a fit minimises, and its derivatives.
+
+It is a sum over values x that count from the design,
+
+    sum over records and bands of |c - c(x)|^2 / s_b^2  +  sum of (x / tolerance)^2,
+
+with c the cosine coefficients of a measured force, c(x) those of the simulated one, and s_b the standard
+deviation of what a band has besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import Array, Index
+from ..metrics.low_pass import low_pass, zero_phase_low_pass
+from .measured import BANDS, Measured, between
+from .passes import Passes, Variant
+from .values import Values
+
+SHIFT = 0.5
+"""Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One piece of a record, and the passes that are held against it."""
+
+    measured: Measured
+    passes: Passes
+    coarse: Passes  # from which derivatives are taken at first
+    name: str
+    low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a fit is."""
+
+    # (values + parts,): values as differences from the design, then by how much positions are short (m)
+    x: Array
+    static_forces: Array  # (parts,): N
+    noise: Array  # (parts, bands): standard deviation of coefficients (N)
+    steps: int = 0
+
+
+class Misfit:
+    """Of some parts of records, over some values of the line."""
+
+    def __init__(self, parts: Sequence[Part], values: Values) -> None:
+        self.parts, self.values = parts, values
+        self.prior = np.append(values.tolerances, np.full(len(parts), SHIFT))
+
+    def start(self) -> State:
+        """The line as designed."""
+        count = len(self.parts)
+        static = np.full(count, self.values.design.pantograph.static_force)
+        return State(np.zeros(len(self.prior)), static, np.full((count, BANDS), np.nan))
+
+    def as_designed(self) -> list[Array]:
+        """Force of the line as designed at the places of each part (N)."""
+        state = self.start()
+        count = len(self.values)
+        found = []
+        for k, part in enumerate(self.parts):
+            variant = self.values.variant(state.x[:count], float(state.static_forces[k]))
+            found.append(self.sampled(part, [variant])[0])
+        return found
+
+    def derivatives(
+        self, state: State, differences: Array, coarse: bool, working: Callable[[str], None]
+    ) -> tuple[State, list[Array], list[Array]]:
+        """Coefficients' derivatives, (coefficients, values + parts), and what is left, of each part.
+
+        differences: from which they are taken, (values, values), a row each. coarse: whether from coarse
+        passes. working: told what is being computed. The state's static forces give the records' means then.
+        """
+        blocks, left = [], []
+        static, count = state.static_forces.copy(), len(self.values)
+        now = state.x[:count]
+        changed = [now, *(now + each for each in differences)]
+        begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences)]
+        for k, part in enumerate(self.parts):
+            working(f"derivatives, {100 * k / len(self.parts):.0f} %")
+            variants = [self.values.variant(each, static[k]) for each in changed]
+            own = replace(part, passes=part.coarse) if coarse else part
+            first, *others = self.sampled(own, variants, np.array(begins))
+            by_value = np.linalg.solve(differences, np.array(others) - first)
+            force = self.sampled(part, variants[:1])[0] if coarse else first
+            shift, sample = state.x[count + k], part.measured.piece.speed * part.measured.piece.time_step
+            target, *near = (part.measured.force(shift + by) for by in (0.0, -sample, sample))
+            static[k] += target.mean() - force.mean()
+            by_shift = np.zeros((len(self.parts), len(target)))
+            by_shift[k] = (near[0] - near[1]) / (2 * sample)  # a larger shift takes this off the target
+            blocks.append(part.measured.coefficients(np.vstack([by_value, by_shift])).T)
+            left.append(part.measured.coefficients(target - force))
+        return State(state.x, static, state.noise, state.steps), blocks, left
+
+    def tried(
+        self, state: State, tried: Sequence[Array] | Array, begins: Array | None = None
+    ) -> tuple[list[list[Array]], list[float]]:
+        """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
+        count = len(self.values)
+        left: list[list[Array]] = [[] for _ in tried]
+        for k, part in enumerate(self.parts):
+            variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
+            forces = self.sampled(part, variants, begins)
+            for own, x, force in zip(left, tried, forces, strict=True):
+                own.append(part.measured.coefficients(part.measured.force(x[count + k]) - force))
+        return left, [self.sum_of(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
+
+    def sum_of(self, left: Sequence[Array], noise: Array, x: Array) -> float:
+        """What is minimised, of what is left of each part, with a noise of (parts, bands) (N)."""
+        parts = zip(left, noise, self.bands, strict=True)
+        misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
+        return misfit + float(np.sum((x / self.prior) ** 2))
+
+    def sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
+        """Low-passed forces of variants at the places that are compared, (n, places) (N).
+
+        begins: as ``Passes.forces`` takes them.
+        """
+        passes, place = part.passes, part.measured.place
+        forces = passes.forces(variants, begins)
+        if part.low_passed:
+            forces = low_pass(forces, passes.time_step)
+        smooth = zero_phase_low_pass(forces, passes.time_step)
+        return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
+
+    @property
+    def bands(self) -> list[Index]:
+        """Band of each coefficient, (coefficients,), of each part."""
+        return [part.measured.band for part in self.parts]
+
+    def weights(self, noise: Array) -> list[Array]:
+        """1 / variance of each coefficient, (coefficients,), of each part; noise: (parts, bands) (N)."""
+        return [1 / own[band] ** 2 for own, band in zip(noise, self.bands, strict=True)]
