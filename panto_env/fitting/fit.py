@@ -101,16 +101,22 @@ class Fit:
     @property
     def shifts(self) -> Array:
         """By how much positions of each part were short, beside its rough shift, (parts,) (m)."""
-        return self.solution.state.x[len(self.problem.fitting.values) :]
+        return self.problem.fitting.shifts(self.solution.state.x)
+
+    @property
+    def gains(self) -> Array:
+        """By how much the gain of each part's sensors differs from 1, (parts,)."""
+        return self.problem.fitting.gains(self.solution.state.x)
+
+    def measured(self, k: int) -> Array:
+        """Coefficients of a part's measured force (N), with its place and gain put right."""
+        return self.parts[k].measured.coefficients(self.problem.fitting.measured(k, self.solution.state.x))
 
     @cached_property
     def left(self) -> list[tuple[float, float]]:
         """Standard deviation (N) of what is compared of each part, and of what is left of it."""
-        found = []
-        for part, shift, left in zip(self.parts, self.shifts, self.solution.left, strict=True):
-            own = part.measured
-            found.append((own.std(own.coefficients(own.force(float(shift)))), own.std(left)))
-        return found
+        std = [part.measured.std for part in self.parts]
+        return [(std[k](self.measured(k)), std[k](left)) for k, left in enumerate(self.solution.left)]
 
     @property
     def before(self) -> float:

@@ -42,7 +42,7 @@ def _draw_force(axes: Axes, fit: Fit) -> None:
     worst = int(np.argmax([after / before for before, after in fit.left]))
     part = fit.parts[worst]
     own = part.measured
-    seen = own.coefficients(own.force(float(fit.shifts[worst])))
+    seen = fit.measured(worst)
     place = own.place + fit.before
     axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
     fitted = own.back(seen - fit.solution.left[worst])

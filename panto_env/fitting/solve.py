@@ -53,8 +53,8 @@ class Solution:
     """The end of a fit."""
 
     state: State
-    covariance: Array  # (values + parts, values + parts)
-    blocks: tuple[Array, ...]  # of each part: derivatives, (coefficients, values + parts)
+    covariance: Array  # (n, n), of the values as in ``State.x``
+    blocks: tuple[Array, ...]  # of each part: derivatives, (coefficients, n)
     left: tuple[Array, ...]  # of each part, (coefficients,): measured less simulated (N)
     settled: bool  # whether a further step would change little
 

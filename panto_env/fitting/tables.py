@@ -67,14 +67,15 @@ def parts_table(fit: Fit) -> Table:
     """A row for each piece of a record: what the fit explains of it, and whether the rest is noise."""
     rows = []
     shifts = fit.shifts + np.array(fit.problem.shifts)
-    triples = zip(fit.parts, fit.left, fit.whiteness, shifts.tolist(), strict=True)
-    for part, (before, after), white, shift in triples:
+    own = zip(fit.parts, fit.left, fit.whiteness, shifts.tolist(), fit.gains.tolist(), strict=True)
+    for part, (before, after), white, shift, gain in own:
         probability = f"{white.probability:.2g}"
         rows.append(
             (
                 part.name,
                 f"{part.measured.piece.speed_kmh:.1f}",
                 f"{shift + 0.0:+.2f}",
+                f"{100 * gain + 0.0:+.2f}",
                 number(before, 2),
                 number(after, 2),
                 f"{100 * (1 - (after / before) ** 2):.1f}",
@@ -85,6 +86,7 @@ def parts_table(fit: Fit) -> Table:
         "record",
         "speed (km/h)",
         "shift (m)",
+        "gain (%)",
         "σ compared (N)",
         "σ left (N)",
         "explained (%)",

@@ -20,7 +20,7 @@ LEFT = 0.7
 def end(ready, truth):
     """A fit that has ended at the truth."""
     fitting = ready.fitting
-    x = np.array([*(truth.of(value) for value in fitting.values.all), 0.0])
+    x = np.array([*(truth.of(value) for value in fitting.values.all), 0.0, 0.0])
     state = replace(fitting.start(), x=x, noise=np.full((1, BANDS), LEFT))
     blocks = np.zeros((len(ready.fitting.parts[0].measured.kept), len(x)))
     return Solution(state, np.diag(fitting.prior**2), (blocks,), (), settled=True)
