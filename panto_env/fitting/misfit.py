@@ -23,9 +23,11 @@ from .values import Values
 
 SHIFT = 0.5
 """Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
-GAIN = 0.03
-"""Standard deviation of the gain of its sensors (own choice). Taken for sure, a gain that is 3 % off moves
-tensions by 0.9 %, and nothing shows it."""
+GAIN, ZERO = 0.03, 5.0
+"""Standard deviations of the gain of its sensors, and of their zero (N); own choice. Taken for sure, a gain
+that is 3 % off and a zero that drifts by 8 N move tensions by 0.9 %, and nothing shows it."""
+FURTHER = 1.0
+"""Difference of the static force (N) by which its derivatives are taken."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,10 @@ class Part:
 class State:
     """Where a fit is."""
 
-    # (n,): values as differences from the design, then by how much positions of each part are short (m), and
-    # by how much its sensors' gain differs from 1
+    # (n,): values as differences from the design, then by how much positions of each part are short (m), its
+    # sensors' gain differs from 1, and their zero from 0 (N)
     x: Array
-    static_forces: Array  # (parts,): N
+    static_forces: Array  # (parts,): with which the mean of each part is the measured one (N)
     noise: Array  # (parts, bands): standard deviation of coefficients (N)
     steps: int = 0
 
@@ -56,7 +58,7 @@ class Misfit:
 
     def __init__(self, parts: Sequence[Part], values: Values) -> None:
         self.parts, self.values = parts, values
-        own = np.repeat([SHIFT, GAIN], len(parts))
+        own = np.repeat([SHIFT, GAIN, ZERO], len(parts))
         self.prior = np.append(values.tolerances, own)
 
     def start(self) -> State:
@@ -87,19 +89,25 @@ class Misfit:
         static, count = state.static_forces.copy(), len(self.values)
         now = state.x[:count]
         changed = [now, *(now + each for each in differences)]
-        begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences)]
+        begins = [0.0, *(self.values.begins[each != 0.0].min() for each in differences), 0.0]
         for k, part in enumerate(self.parts):
             working(f"derivatives, {100 * k / len(self.parts):.0f} %")
             variants = [self.values.variant(each, static[k]) for each in changed]
+            variants.append(self.values.variant(now, static[k] + FURTHER))
             own = replace(part, passes=part.coarse) if coarse else part
-            first, *others = self.sampled(own, variants, np.array(begins))
+            first, *others, heavier = self.sampled(own, variants, np.array(begins))
             by_value = np.linalg.solve(differences, np.array(others) - first)
             force = self.sampled(part, variants[:1])[0] if coarse else first
             sample = part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (self.measured(k, state.x, by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()
-            by_own = np.zeros((2, len(self.parts), len(target)))  # what a larger shift or gain takes off
-            by_own[:, k] = (near[0] - near[1]) / (2 * sample), target / (1 + self.gains(state.x)[k])
+            by_static, gain = (heavier - first) / FURTHER, 1 + self.gains(state.x)[k]
+            # A larger shift, gain or zero takes this off the target, or adds it to the simulated force, whose
+            # mean follows the target's.
+            by_own = np.zeros((3, len(self.parts), len(target)))
+            by_own[0, k] = (near[0] - near[1]) / (2 * sample)
+            by_own[1, k] = (target - target.mean() * by_static) / gain
+            by_own[2, k] = -by_static / gain
             every = np.vstack([by_value, *by_own])
             blocks.append(part.measured.coefficients(every).T)
             left.append(part.measured.coefficients(target - force))
@@ -112,7 +120,7 @@ class Misfit:
         count = len(self.values)
         left: list[list[Array]] = [[] for _ in tried]
         for k, part in enumerate(self.parts):
-            variants = [self.values.variant(x[:count], state.static_forces[k]) for x in tried]
+            variants = [self.values.variant(x[:count], self.static_forces(state, x)[k]) for x in tried]
             forces = self.sampled(part, variants, begins)
             for own, x, force in zip(left, tried, forces, strict=True):
                 own.append(part.measured.coefficients(self.measured(k, x) - force))
@@ -120,16 +128,27 @@ class Misfit:
 
     def shifts(self, x: Array) -> Array:
         """By how much positions of each part are short, (parts,) (m), of all values x."""
-        return x[len(self.values) : -len(self.parts)]
+        return np.asarray(self._own(x)[0])
 
     def gains(self, x: Array) -> Array:
         """By how much the sensors' gain differs from 1, (parts,), of all values x."""
-        return x[-len(self.parts) :]
+        return np.asarray(self._own(x)[1])
+
+    def _own(self, x: Array) -> Array:
+        """Of all values x, those of the parts' own, (3, parts)."""
+        return x[len(self.values) :].reshape(3, len(self.parts))
 
     def measured(self, k: int, x: Array, further: float = 0.0) -> Array:
-        """Force of a part, (places,) (N), with its place and gain put right; further: its shift (m)."""
-        force = self.parts[k].measured.force(float(self.shifts(x)[k]) + further)
-        return np.asarray(force / (1 + self.gains(x)[k]))
+        """Force of a part, (places,) (N), with place, gain and zero put right; further: its shift (m)."""
+        shift, gain, zero = self._own(x)[:, k]
+        force = self.parts[k].measured.force(float(shift) + further)
+        return np.asarray((force - zero) / (1 + gain))
+
+    def static_forces(self, state: State, x: Array) -> Array:
+        """(parts,): static forces (N) for other values x; means of forces follow the measured ones."""
+        parts = range(len(self.parts))
+        more = [self.measured(k, x).mean() - self.measured(k, state.x).mean() for k in parts]
+        return np.asarray(state.static_forces + np.array(more))
 
     def sum_of(self, left: Sequence[Array], noise: Array, x: Array) -> float:
         """What is minimised, of what is left of each part, with a noise of (parts, bands) (N)."""

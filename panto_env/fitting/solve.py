@@ -191,4 +191,5 @@ class Fitting(Misfit):
         tried = [state.x + share * step for share in SHORTER]
         left, sums = self.tried(state, tried)
         best = int(np.argmin(sums))
-        return State(tried[best], state.static_forces, state.noise, state.steps + 1), left[best], sums[best]
+        static = self.static_forces(state, tried[best])
+        return State(tried[best], static, state.noise, state.steps + 1), left[best], sums[best]

@@ -16,7 +16,7 @@ def made_up(ready, differences, shift=0.0, silent=()):
         if value.name in differences:
             x[k] = differences[value.name]
             deviation[k] *= 1.0 if value.name in silent else 0.1
-    x[len(fitting.values) : -len(fitting.parts)] = shift
+    x[len(fitting.values) :][: len(fitting.parts)] = shift
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
     random = np.random.default_rng(0)
     left = tuple(random.standard_normal(len(part.measured.kept)) for part in fitting.parts)

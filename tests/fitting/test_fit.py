@@ -81,7 +81,7 @@ def test_what_is_left_is_the_sensors_noise(fitted):
 
 def test_the_position_error_is_found(fitted):
     shift = fitted.shifts[0] + fitted.problem.shifts[0]
-    deviation = np.sqrt(fitted.solution.covariance[-2, -2])
+    deviation = np.sqrt(fitted.solution.covariance[-3, -3])
     assert shift == pytest.approx(-WRONG, abs=4 * deviation)
     assert deviation < 0.05
 

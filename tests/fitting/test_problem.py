@@ -110,9 +110,22 @@ def test_derivatives_of_a_shift(ready, derivatives):
     (part,) = ready.fitting.parts
     target = part.measured.coefficients(part.measured.force(0.02))
     change = part.measured.coefficients(part.measured.force(-0.02)) - target
-    column = derivatives[0][:, -1]
+    column = derivatives[0][:, -3]
     assert np.linalg.norm(column - change / 0.04) < 0.05 * np.linalg.norm(column)
     assert part.measured.std(column) > 1
+
+
+@pytest.mark.parametrize("which", [-2, -1])
+def test_derivatives_of_gain_and_zero(ready, derivatives, which):
+    """What is left falls by the derivative times either, with the static force that follows the mean."""
+    fitting = ready.fitting
+    x = np.zeros((3, len(fitting.prior)))
+    x[1:, which] = 0.2 * fitting.prior[which] * np.array([-1, 1])
+    _, low, high = (own[0] for own in fitting.tried(fitting.start(), list(x))[0])
+    column = derivatives[0][:, which]
+    change = (low - high) / (x[2] - x[1])[which]
+    assert np.linalg.norm(column - change) < 0.2 * np.linalg.norm(column)  # the force bends
+    assert np.linalg.norm(column) > 5
 
 
 @pytest.mark.parametrize("by", [3.2, -7.5])
