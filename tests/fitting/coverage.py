@@ -34,6 +34,8 @@ SPEEDS = (180.0, 220.0, 250.0, 200.0)
 others as large a share of the wave speed."""
 NOISE, RATE, PLACE = 2.0, 500.0, 0.3
 """Of sensors: rms of a sample (N), samples a second, and standard deviation of the odometer's error (m)."""
+GAIN, ZERO = 0.015, 2.5
+"""Standard deviations of the sensors' gain and zero (N): half of what a fit expects."""
 LINES = ("uniform", "section")
 HEADINGS = (
     "line",
@@ -96,10 +98,11 @@ def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
             seed=1000 * seed + k,
             name=f"{speed:g} km/h",
         )
+        (piece,) = record.pieces
+        gain, zero = (GAIN, ZERO) * random.standard_normal(2)
+        piece.force[:] = (1 + gain) * piece.force + zero
         if wrong == "drift":
-            (piece,) = record.pieces
-            piece.force[:] *= 1.03  # of the sensors' gain
-            piece.force[:] += 8.0 * np.sin(2 * np.pi * piece.time / 30.0)
+            piece.force[:] = 1.03 * piece.force + 8.0 * np.sin(2 * np.pi * piece.time / 30.0)
         found.append(record)
     return found
 
