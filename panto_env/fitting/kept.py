@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.array_file import read_arrays, write_arrays
 from ..records.record import Record
-from .misfit import State
+from .misfit import OWN, State
 
 ARRAYS = ("x", "static_forces", "noise")
 SUFFIX = ".fit"
@@ -25,7 +25,7 @@ def identity_of(records: Sequence[Record], settings: dict[str, Any]) -> dict[str
         for piece in record.pieces:
             for series in (piece.position, piece.force):
                 digest.update(np.ascontiguousarray(series).tobytes())
-    return {"records": digest.hexdigest(), **settings}
+    return {"records": digest.hexdigest(), "own": list(OWN), **settings}
 
 
 def keep(path: Path, state: State, identity: dict[str, Any]) -> None:

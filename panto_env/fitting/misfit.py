@@ -21,11 +21,11 @@ from .measured import BANDS, Measured, between
 from .passes import Passes, Variant
 from .values import Values
 
-SHIFT = 0.5
-"""Standard deviation of a record's positions (m), a value of each record, before its force is looked at."""
-GAIN, ZERO = 0.03, 5.0
-"""Standard deviations of the gain of its sensors, and of their zero (N); own choice. Taken for sure, a gain
-that is 3 % off and a zero that drifts by 8 N move tensions by 0.9 %, and nothing shows it."""
+OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0}
+"""Values of each record's own, and their standard deviations before its force is looked at (own choice): by
+how much positions are short (m), the sensors' gain differs from 1, and their zero from 0 (N). Taken for sure,
+a gain that is 3 % off and a zero that drifts by 8 N move tensions by 0.9 %, and nothing shows it.
+"""
 FURTHER = 1.0
 """Difference of the static force (N) by which its derivatives are taken."""
 
@@ -45,9 +45,7 @@ class Part:
 class State:
     """Where a fit is."""
 
-    # (n,): values as differences from the design, then by how much positions of each part are short (m), its
-    # sensors' gain differs from 1, and their zero from 0 (N)
-    x: Array
+    x: Array  # (n,): values as differences from the design, then each of ``OWN`` for all parts
     static_forces: Array  # (parts,): with which the mean of each part is the measured one (N)
     noise: Array  # (parts, bands): standard deviation of coefficients (N)
     steps: int = 0
@@ -58,8 +56,7 @@ class Misfit:
 
     def __init__(self, parts: Sequence[Part], values: Values) -> None:
         self.parts, self.values = parts, values
-        own = np.repeat([SHIFT, GAIN, ZERO], len(parts))
-        self.prior = np.append(values.tolerances, own)
+        self.prior = np.append(values.tolerances, np.repeat(list(OWN.values()), len(parts)))
 
     def start(self) -> State:
         """The line as designed."""
@@ -104,7 +101,7 @@ class Misfit:
             by_static, gain = (heavier - first) / FURTHER, 1 + self.gains(state.x)[k]
             # A larger shift, gain or zero takes this off the target, or adds it to the simulated force, whose
             # mean follows the target's.
-            by_own = np.zeros((3, len(self.parts), len(target)))
+            by_own = np.zeros((len(OWN), len(self.parts), len(target)))
             by_own[0, k] = (near[0] - near[1]) / (2 * sample)
             by_own[1, k] = (target - target.mean() * by_static) / gain
             by_own[2, k] = -by_static / gain
@@ -135,8 +132,8 @@ class Misfit:
         return np.asarray(self._own(x)[1])
 
     def _own(self, x: Array) -> Array:
-        """Of all values x, those of the parts' own, (3, parts)."""
-        return x[len(self.values) :].reshape(3, len(self.parts))
+        """Of all values x, those of ``OWN``, (3, parts)."""
+        return x[len(self.values) :].reshape(len(OWN), len(self.parts))
 
     def measured(self, k: int, x: Array, further: float = 0.0) -> Array:
         """Force of a part, (places,) (N), with place, gain and zero put right; further: its shift (m)."""
