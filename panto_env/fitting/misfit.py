@@ -108,7 +108,7 @@ class Misfit:
             every = np.vstack([by_value, *by_own])
             blocks.append(part.measured.coefficients(every).T)
             left.append(part.measured.coefficients(target - force))
-        return State(state.x, static, state.noise, state.steps), blocks, left
+        return replace(state, static_forces=static), blocks, left
 
     def tried(
         self, state: State, tried: Sequence[Array] | Array, begins: Array | None = None
@@ -116,8 +116,10 @@ class Misfit:
         """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
         count = len(self.values)
         left: list[list[Array]] = [[] for _ in tried]
+        static = [self.static_forces(state, x) for x in tried]
         for k, part in enumerate(self.parts):
-            variants = [self.values.variant(x[:count], self.static_forces(state, x)[k]) for x in tried]
+            rows = zip(tried, static, strict=True)
+            variants = [self.values.variant(x[:count], float(own[k])) for x, own in rows]
             forces = self.sampled(part, variants, begins)
             for own, x, force in zip(left, tried, forces, strict=True):
                 own.append(part.measured.coefficients(self.measured(k, x) - force))

@@ -130,7 +130,7 @@ class Fitting(Misfit):
                 covariance = np.linalg.inv(precision)
                 step = covariance @ pull
                 gain = float(pull @ step)
-                state = State(state.x, state.static_forces, noise, state.steps)
+                state = replace(state, noise=noise)
                 report(state, gain)
                 first = gain if first is None else first
                 sure = known and not coarse and not cooling
