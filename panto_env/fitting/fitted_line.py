@@ -12,6 +12,7 @@ from ..base.files import check_output, write_whole
 from ..catalog.loader import file_of, parse_catenary, parse_pantograph
 from .fit import INTERVAL, Fit, Found
 from .toml_text import with_table, with_value
+from .values import damping_of
 
 SUFFIXES = (".toml",)
 """Of the files that a line and a pantograph are written to."""
@@ -32,7 +33,7 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     for each in fit.of_kind("damping"):
         if each.told:
             name = each.value.index[0]
-            value = getattr(design.catenary.damping, name) * (1 + each.difference)
+            value = damping_of(design.catenary, name, each.difference)
             text = with_value(text, f"damping.{name}", value, source([each], records), str(base))
     values, sources = as_found(fit, records)
     needed = fit.problem.first_span + design.spans

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +23,7 @@ from ..plant.state import SAMPLE_ROWS, Row, Samples
 from ..plant.train import Train
 
 LANES = 8
-"""Lanes of a plant, of which there is one for each core. They begin together, so fewer lanes compute less."""
+"""Lanes of a plant, of which each core has one. They begin together, so fewer lanes compute less."""
 LARGEST_FORCE = 2e3
 """Contact force (N) beyond which a computation has diverged."""
 
@@ -52,31 +54,36 @@ class Passes:
         """speed: m/s; distance: of a pass (m); spans: of the line."""
         self._runs = Runs(speeds=(speed, speed), conditions=(condition,))
         self._spans, self._numerics, self._pantograph = spans, numerics, pantograph
-        self._plants: dict[FlexibleCatenaryData, list[Plant]] = {}
-        self.speed, first = speed, self._of(catenary)[0]
-        self.time_step = first.time_step
+        self._idle: defaultdict[FlexibleCatenaryData, list[Plant]] = defaultdict(list)
+        with self._lent(catenary) as first:
+            self.speed, self.time_step = speed, first.time_step
+        # Another damping must not have another grid and time step.
+        same = {"time_step": first.time_step, "spacing": first.model.grid["spacing"]}
+        self._numerics = numerics.model_copy(update=same)
         self.steps = int(distance / (speed * self.time_step))
         self.droppers, self.supports = first.model.droppers, first.model.supports
         self.alignment = first.alignment
         self.position = speed * self.time_step * (np.arange(self.steps) + 0.5)
         """Of the samples, (steps,) (m)."""
 
-    def _of(self, catenary: FlexibleCatenaryData) -> list[Plant]:
-        """Plants of a line, one for each core."""
-        if catenary not in self._plants:
-            self._plants[catenary] = [
-                Plant(
-                    catenary,
-                    Train.of(self._pantograph),
-                    spans=self._spans,
-                    lanes=LANES,
-                    numerics=self._numerics,
-                    runs=self._runs,
-                    varied=True,
-                )
-                for _ in range(cores())
-            ]
-        return self._plants[catenary]
+    def _plant(self, catenary: FlexibleCatenaryData) -> Plant:
+        return Plant(
+            catenary,
+            Train.of(self._pantograph),
+            spans=self._spans,
+            lanes=LANES,
+            numerics=self._numerics,
+            runs=self._runs,
+            varied=True,
+        )
+
+    @contextmanager
+    def _lent(self, catenary: FlexibleCatenaryData) -> Iterator[Plant]:
+        """A plant of a line, for one thread at a time; one that was given back where there is one."""
+        idle = self._idle[catenary]
+        plant = idle.pop() if idle else self._plant(catenary)
+        yield plant
+        idle.append(plant)
 
     def forces(self, variants: Sequence[Variant], begins: Array | None = None) -> Array:
         """Contact forces (N), (variants, steps). Raises InputError where a computation diverged.
@@ -87,51 +94,48 @@ class Passes:
         steps = np.zeros(len(variants), dtype=int)
         if begins is not None:
             steps = np.clip((begins / (self.speed * self.time_step)).astype(int), 0, self.steps)
-        found = np.zeros((len(variants), self.steps))
+        found, first = np.zeros((len(variants), self.steps)), variants[0].catenary
+        shares: list[tuple[list[int], Kept | None]] = []
+        late: list[int] = []
         for catenary in dict.fromkeys(each.catenary for each in variants):
             which = [k for k, each in enumerate(variants) if each.catenary == catenary]
-            whole = [k for k in which if steps[k] == 0 or catenary != variants[0].catenary]
-            self._side_by_side(
-                catenary, [(share, None) for share in _shares(whole, cores())], variants, found
-            )
-            late = sorted(set(which) - set(whole), key=lambda k: steps[k])
-            shares = _shares(late)
-            firsts = [int(steps[share[0]]) for share in shares]
-            if shares:
-                kept = self._kept(variants[0], firsts)
-                found[late] = found[0]
-                self._side_by_side(catenary, list(zip(shares, kept, strict=True)), variants, found)
+            late = [k for k in which if steps[k] > 0] if catenary == first else late
+            whole = sorted(set(which) - set(late)) if catenary == first else which
+            shares += [(share, None) for share in _shares(whole, cores() if catenary == first else 1)]
+        self._side_by_side(shares, variants, found)
+        if late:
+            of_late = _shares(sorted(late, key=lambda k: steps[k]))
+            kept = self._kept(variants[0], [int(steps[share[0]]) for share in of_late])
+            found[late] = found[0]
+            self._side_by_side(list(zip(of_late, kept, strict=True)), variants, found)
+        for catenary in set(self._idle) - {first}:
+            del self._idle[catenary]
         return found
 
     def _side_by_side(
-        self,
-        catenary: FlexibleCatenaryData,
-        shares: Sequence[tuple[list[int], Kept | None]],
-        variants: Sequence[Variant],
-        found: Array,
+        self, shares: Sequence[tuple[list[int], Kept | None]], variants: Sequence[Variant], found: Array
     ) -> None:
-        """Compute shares of the variants, from a kept state on or from the line's start, a plant for each."""
-        plants = self._of(catenary)
-        for first in range(0, len(shares), len(plants)):
-            now = shares[first : first + len(plants)]
-            with ThreadPoolExecutor(len(now)) as pool:
-                done = [
-                    pool.submit(self._run, plant, [variants[k] for k in own], kept)
-                    for (own, kept), plant in zip(now, plants, strict=False)
-                ]
-                for (own, _), force in zip(now, done, strict=True):
-                    part = force.result()
-                    found[own, self.steps - part.shape[1] :] = part
+        """Compute shares of the variants, from a kept state on or from the line's start."""
+
+        def run(share: tuple[list[int], Kept | None]) -> Array:
+            (own, kept) = share
+            with self._lent(variants[own[0]].catenary) as plant:
+                return self._run(plant, [variants[k] for k in own], kept)
+
+        with ThreadPoolExecutor(cores()) as pool:
+            for (own, _), force in zip(shares, pool.map(run, shares), strict=True):
+                found[own, self.steps - force.shape[1] :] = force
 
     def _kept(self, variant: Variant, steps: Sequence[int]) -> list[Kept]:
         """States of a variant's pass after numbers of steps, in rising order."""
-        plant = self._of(variant.catenary)[0]
-        self._start(plant, [variant])
-        table, kept, done = self._samples(plant), [], 0
-        for end in steps:
-            plant.advance_passively(end - done, table, 1)
-            kept.append(keep(plant, 0))
-            done = end
+        kept, done = [], 0
+        with self._lent(variant.catenary) as plant:
+            self._start(plant, [variant])
+            table = self._samples(plant)
+            for end in steps:
+                plant.advance_passively(end - done, table, 1)
+                kept.append(keep(plant, 0))
+                done = end
         return kept
 
     def _start(self, plant: Plant, variants: Sequence[Variant]) -> None:

@@ -180,8 +180,7 @@ class Fitting(Misfit):
         They are columns of the covariance's Cholesky factor, in the order in which values come to act: the
         later ones leave the beginning of a pass as it is, which then need not be computed anew.
         """
-        count = len(self.values)
-        order = np.argsort(self.values.begins, kind="stable")
+        count, order = len(self.values), self.values.order
         found = np.zeros((count, count))
         found[:, order] = WIDE * np.linalg.cholesky(covariance[np.ix_(order, order)]).T
         return found

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.names import suggest
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -19,14 +19,14 @@ from .passes import Variant
 
 FREE = ("tensions", "droppers", "supports", "damping", "pantograph", "unevenness")
 """What can be freed."""
-USUAL = ("tensions", "droppers", "supports", "unevenness")
-"""What is freed by default; the last, waves of the running surface, so that droppers don't explain them."""
+USUAL = ("tensions", "droppers", "supports", "damping", "unevenness")
+"""What is freed by default; damping, and waves of the running surface, so that others don't explain them."""
 AS_BUILT = LINE_CONDITIONS["as-built"]
 TOLERANCES = {
     "tensions": AS_BUILT.tension_scatter,  # relative
     "droppers": AS_BUILT.dropper_scatter,  # m
     "supports": AS_BUILT.support_scatter,  # m
-    "damping": 0.3,  # relative
+    "damping": 0.5,  # relative
     "pantograph": 0.05,  # relative
     "unevenness": 1.0,  # as a multiple of a smooth wire's
 }
@@ -105,6 +105,11 @@ class Values:
         found = [0.0 if each.place is None else each.place - LEAD[each.kind] * span for each in self.all]
         return np.maximum(found, 0.0)
 
+    @cached_property
+    def order(self) -> Index:
+        """Numbers of the values in the order in which they act; damping first, as each needs a plant."""
+        return np.lexsort((np.array([value.kind != "damping" for value in self.all]), self.begins))
+
     def of_kind(self, kind: str) -> list[int]:
         """Numbers of the values of a kind."""
         return [k for k, value in enumerate(self.all) if value.kind == kind]
@@ -114,7 +119,7 @@ class Values:
         design = self.design
         scatter, heights = np.zeros(len(design.droppers)), np.zeros(len(design.supports))
         tensions, waves = [1.0, 1.0], np.zeros((len(WAVES), 2))
-        damping = {"alpha": 1.0, "beta": 1.0}
+        damping: dict[str, float] = {}
         chain = {name: list(getattr(design.pantograph, name)) for name in CHAIN}
         for value, difference in zip(self.all, differences.tolist(), strict=True):
             (*which, last) = value.index
@@ -128,14 +133,12 @@ class Values:
                 case "unevenness":
                     waves[which[0], last] = difference
                 case "damping":
-                    damping[last] += difference
+                    damping[last] = damping_of(design.catenary, last, difference)
                 case "pantograph":
                     chain[which[0]][last] *= 1 + difference
         catenary, pantograph = design.catenary, design.pantograph
-        if damping != {"alpha": 1.0, "beta": 1.0}:
-            own = catenary.damping
-            changed = {name: share * getattr(own, name) for name, share in damping.items()}
-            catenary = catenary.model_copy(update={"damping": own.model_copy(update=changed)})
+        if any(value != getattr(catenary.damping, name) for name, value in damping.items()):
+            catenary = catenary.model_copy(update={"damping": catenary.damping.model_copy(update=damping)})
         if self.of_kind("pantograph"):
             pantograph = pantograph.model_copy(update={name: tuple(own) for name, own in chain.items()})
         contact, messenger = tensions
@@ -166,7 +169,9 @@ class Values:
 
     def _damping(self, stretch: tuple[float, float]) -> list[Value]:
         return [
-            self._value("damping", f"damping {name}", "%", 100.0, None, name) for name in ("alpha", "beta")
+            self._value("damping", f"damping {name}", "%", 100.0, None, name)
+            for name, value in self.design.catenary.damping
+            if value > 0
         ]
 
     def _pantograph(self, stretch: tuple[float, float]) -> list[Value]:
@@ -191,6 +196,11 @@ class Values:
         self, kind: str, name: str, unit: str, scale: float, place: float | None, *index: Any
     ) -> Value:
         return Value(kind, name, unit, scale, self._tolerances[kind], place, index)
+
+
+def damping_of(line: FlexibleCatenaryData, name: str, difference: float) -> float:
+    """One of a line's two values of damping that differs by a share from the design's; none drives waves."""
+    return float(getattr(line.damping, name) * max(1 + difference, 0.0))
 
 
 def _rows(waves: Array) -> Array:

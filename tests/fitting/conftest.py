@@ -33,6 +33,8 @@ class Truth:
                 return self.drawn.scatter[last]
             case "supports":
                 return self.drawn.heights[last]
+            case "damping":
+                return 0.0
         amplitude, _, phase = self.drawn.waves[which[0]]
         return amplitude * (np.cos, lambda angle: -np.sin(angle))[last](2 * np.pi * phase)
 

@@ -117,7 +117,7 @@ def test_damping_and_pantograph(record, design, pantograph, tmp_path):
     line = load_catenary(tmp_path / "a.toml")
     assert line.damping.beta == pytest.approx(1.2e-4)
     assert line.damping.alpha == 0.0125
-    assert line.sources["damping.beta"].startswith("fitted to run.csv; 95 % intervals of ±5.9 %")
+    assert line.sources["damping.beta"].startswith("fitted to run.csv; 95 % intervals of ±9.8 %")
     write_pantograph(fit, PANTOGRAPH, tmp_path / "p.toml", "run.csv")
     riding = load_pantograph(tmp_path / "p.toml")
     assert riding.masses == pytest.approx((7.12, 6.3, 5.22))

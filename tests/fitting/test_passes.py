@@ -59,3 +59,21 @@ def test_the_same_line_goes_on_bit_for_bit(passes):
     force = own.forces([same] * 3, np.array([0.0, 200.0, 350.0]))
     np.testing.assert_array_equal(force[1], force[0])
     np.testing.assert_array_equal(force[2], force[0])
+
+
+def test_lines_of_other_damping_have_plants_of_their_own_on_the_same_grid(passes):
+    """Also where one call has several of them."""
+    line, pantograph, own = passes
+    drawn = DrawnLine(ROOM, np.zeros((0, 3)), np.zeros(len(own.droppers)), np.zeros(len(own.supports)))
+
+    def variant(share):
+        damping = line.damping.model_copy(update={"beta": share * line.damping.beta})
+        catenary = line.model_copy(update={"damping": damping})
+        return Variant(catenary, drawn, pantograph, pantograph.static_force)
+
+    mixed = [variant(share) for share in (1.0, 1.2, 1.0, 0.7, 1.2)]
+    together = own.forces(mixed, np.array([0.0, 0.0, 300.0, 300.0, 300.0]))
+    for each, force in zip(mixed, together, strict=True):
+        np.testing.assert_array_equal(force, own.forces([each])[0])
+    assert np.abs(together[1] - together[0]).max() > 0.1
+    assert np.abs(together[3] - together[0]).max() > 0.1

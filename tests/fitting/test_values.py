@@ -130,9 +130,30 @@ def test_waves_are_those_of_a_line_as_built(plan):
     assert everything(plan).variant(np.zeros(len(everything(plan))), 70.0).line.waves.shape == (4, 3)
 
 
-def test_usual_values_leave_line_and_pantograph_as_they_are(plan):
-    """So one plant serves all variants."""
+def test_but_for_damping_usual_values_leave_line_and_pantograph_as_they_are(plan):
+    """So one plant serves all variants that share their damping."""
     values = Values(plan, USUAL, (0.0, 900.0))
-    variant = values.variant(values.tolerances, 70.0)
+    differences = values.tolerances.copy()
+    differences[values.of_kind("damping")] = 0.0
+    variant = values.variant(differences, 70.0)
     assert variant.catenary is plan.catenary
     assert variant.pantograph is plan.pantograph
+
+
+def test_damping_comes_first_of_what_acts_everywhere(plan):
+    """Then few of the differences that are uncertain together change it."""
+    values = Values(plan, USUAL, (0.0, 900.0))
+    order = values.order
+    assert sorted(order) == list(range(len(values)))
+    assert (np.diff(values.begins[order]) >= 0).all()
+    assert sorted(order[:2]) == values.of_kind("damping")
+
+
+def test_damping_never_drives_waves_and_none_stays_none(plan):
+    values = everything(plan)
+    line = values.variant(at(values, "damping beta", -1.5), 70.0).catenary
+    assert (line.damping.alpha, line.damping.beta) == (plan.catenary.damping.alpha, 0.0)
+    bare = plan.catenary.damping.model_copy(update={"alpha": 0.0})
+    undamped = replace(plan, catenary=plan.catenary.model_copy(update={"damping": bare}))
+    names = [value.name for value in everything(undamped).all if value.kind == "damping"]
+    assert names == ["damping beta"]
