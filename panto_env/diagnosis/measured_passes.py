@@ -1,7 +1,8 @@
 """Records of a measuring train side by side with healthy passes, which a fitted line gives.
 
 Healthy passes are simulated on lines that the fit may mean: each with values drawn from what the fit knows,
-and with the noise that its records had. So what the fit does not know is not taken for a defect.
+and with the noise that its records had, seen by sensors with a gain and a zero of their own, as a fit expects
+them. So what the fit does not know, or a sensor shows wrongly, is not taken for a defect.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pydantic import ValidationError
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.units import from_kmh
-from ..fitting.misfit import Part
+from ..fitting.misfit import OWN, Part
 from ..fitting.problem import Problem, problem
 from ..fitting.stored import Stored, along
 from ..fitting.values import FREE
@@ -64,8 +65,9 @@ def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> 
         static, usual = _usual(ready, part, mean)
         seen = _finely(part, usual)
         if number == 0:
-            variants = [ready.fitting.values.variant(x, static) for x in drawn]
-            forces = part.measured.coefficients(ready.fitting.sampled(part, variants))
+            gain, zero = (OWN[name] * random.standard_normal(HEALTHY) for name in ("gain", "zero"))
+            variants = [ready.fitting.values.variant(x, static + z) for x, z in zip(drawn, zero, strict=True)]
+            forces = part.measured.coefficients(ready.fitting.sampled(part, variants)) * (1 + gain[:, None])
             forces += known.noise[part.measured.band] * random.standard_normal(forces.shape)
             for own, force in zip(healthy, forces, strict=True):
                 own[:] = np.interp(position - before, part.measured.place, part.measured.back(force))

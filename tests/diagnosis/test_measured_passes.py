@@ -13,6 +13,7 @@ from panto_env.diagnosis import diagnose_records
 from panto_env.diagnosis.measured_passes import HEALTHY, measured_passes
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.measured import BANDS
+from panto_env.fitting.misfit import OWN
 from panto_env.fitting.stored import Stored, store
 from panto_env.plant.numerics import Numerics
 from panto_env.records.measured import measured
@@ -55,7 +56,10 @@ def known(healthy_record, coarse):
     )  # fmt: skip
 
 
-def test_healthy_passes_surround_a_healthy_record(healthy_record, known):
+def test_healthy_passes_surround_a_healthy_record(healthy_record, known, monkeypatch):
+    """Where sensors have neither gain nor zero, as this record's."""
+    monkeypatch.setitem(OWN, "gain", 0.0)
+    monkeypatch.setitem(OWN, "zero", 0.0)
     own, healthy = measured_passes([healthy_record], known)
     assert healthy.force.shape == (HEALTHY, own.force.shape[1])
     assert own.first == 9
@@ -75,6 +79,13 @@ def test_a_healthy_record_is_healthy_and_a_broken_dropper_is_found(healthy_recor
 
 def test_lost_tension_is_a_changed_line(known):
     assert diagnose_records([record_of({"lost_contact_tension": 0.03}, seed=3)], known).changed
+
+
+@pytest.mark.parametrize(("gain", "zero"), [(1.03, 0.0), (0.97, 0.0), (1.0, 5.0)])
+def test_sensors_with_a_gain_and_a_zero_of_their_own_make_no_line_unhealthy(known, gain, zero):
+    record = record_of({"dropper_scatter": 0.0}, seed=1)
+    record.pieces[0].force[:] = gain * record.pieces[0].force + zero
+    assert diagnose_records([record], known).healthy
 
 
 def test_the_mean_of_records_is_judged(healthy_record, known):
