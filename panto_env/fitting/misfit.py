@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Array, Index
+from ..base.machine import cores
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .measured import BANDS, Measured, between
 from .passes import Passes, Variant
@@ -160,11 +161,14 @@ class Misfit:
 
         begins: as ``Passes.forces`` takes them.
         """
+        from scipy.fft import set_workers  # slow to import
+
         passes, place = part.passes, part.measured.place
         forces = passes.forces(variants, begins)
         if part.low_passed:
             forces = low_pass(forces, passes.time_step)
-        smooth = zero_phase_low_pass(forces, passes.time_step)
+        with set_workers(cores()):
+            smooth = zero_phase_low_pass(forces, passes.time_step)
         return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
 
     @property

@@ -23,9 +23,9 @@ how often they are at most."""
 DONE = 0.05
 """Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
 moves by a fifth of its standard deviation."""
-JUMPS, LESS = (-2.0, -1.0, 1.0, 2.0), 0.95
-"""Tolerances by which single droppers are made longer or shorter where steps lead no further, and what share
-of what is minimised, or left, must remain at most for that to count."""
+JUMPS, BETTER = (-2.0, -1.0, 1.0, 2.0), 30.0
+"""Tolerances by which single droppers are made longer or shorter where steps lead no further, and by how much
+the sum must fall for that to count: far more than by chance, of however many coefficients it is."""
 WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 FRESH = 10.0
@@ -57,11 +57,6 @@ class Solution:
     blocks: tuple[Array, ...]  # of each part: derivatives, (coefficients, n)
     left: tuple[Array, ...]  # of each part, (coefficients,): measured less simulated (N)
     settled: bool  # whether a further step would change little
-
-    @property
-    def size(self) -> float:
-        """Sum of squares of what is left (N^2)."""
-        return float(sum(np.sum(own**2) for own in self.left))
 
     def whiteness(self, bands: Sequence[Index]) -> list[Whiteness]:
         """Of what is left of each part, over its noise: whether it is as random as noise."""
@@ -96,7 +91,7 @@ class Fitting(Misfit):
             if best.settled and jumped is None:
                 break
             found = self._settle(jumped or best.state, best.covariance, report, working)
-            if jumped and not found.size < LESS * best.size:
+            if jumped and not self._sum(found, best) < self._sum(best, best) - BETTER:
                 break
             best = found
         return best
@@ -145,6 +140,10 @@ class Fitting(Misfit):
                     sets += sure
                     break
 
+    def _sum(self, solution: Solution, usual: Solution) -> float:
+        """What is minimised, at a solution, with the noise of another one."""
+        return self.sum_of(solution.left, usual.state.noise, solution.state.x)
+
     def _jumped(self, solution: Solution, working: Callable[[str], None]) -> State | None:
         """The state after single droppers have jumped; None where that makes nothing better.
 
@@ -165,7 +164,7 @@ class Fitting(Misfit):
             expected = sums - np.sum((pulls @ covariance) * pulls, axis=1)
             back = np.sum(covariance[jumping] * pulls[1:], axis=1) ** 2 / np.diag(covariance)[jumping]
             expected[1:] += back  # what a dropper would gain by going back; it stays
-            better = np.flatnonzero(expected[1:] < LESS * expected[0])
+            better = np.flatnonzero(expected[1:] < expected[0] - BETTER)
             if not len(better):
                 break
             best = int(np.argmin(expected[1:]))
