@@ -28,7 +28,7 @@ from panto_env.records.measured import measured
 from panto_env.records.record import Record
 
 LINE, PANTOGRAPH, SPANS, BEYOND = "en50318-2002", "dsa380", 16, 12
-SECTION, SECTION_SPANS = "fast-line", 22
+SECTION, SECTION_SPANS = "fast-line", 18
 SPEEDS = (180.0, 220.0, 250.0, 200.0)
 """Of the passes on that line (km/h), as many as are asked for, from the end of this list on backwards; on
 others as large a share of the wave speed."""
