@@ -1,0 +1,49 @@
+"""Coverage of fits: what its table counts, and that the documents have the table of the stored results."""
+
+import json
+
+import numpy as np
+import pytest
+
+from ..documents import ROOT
+from .coverage import HEADINGS, SPEEDS, design_of, records_of, table
+
+STORED = ROOT / "docs" / "records-coverage"
+
+
+def test_medians_and_shares_inside_are_counted_by_line_model_and_passes(tmp_path):
+    row = {
+        "line": "uniform",
+        "seed": 0,
+        "passes": 3,
+        "wrong": "nothing",
+        "as_noise": [0.5, 0.3],
+        "tensions": [[1e-4, 1e-4], [-3e-4, 1e-4]],
+        "droppers": [[1e-3, 1e-3], [2e-3, 1e-3], [-3e-3, 1e-3], [1e-3, 1e-3]],
+        "supports": [[4e-3, 3e-3]],
+    }
+    other = row | {"seed": 1, "as_noise": [0.5, 0.001], "supports": [[-6.1e-3, 3e-3]]}
+    wrong = row | {"wrong": "drift"}
+    (tmp_path / "uniform-drift-3.json").write_text(json.dumps([wrong]))
+    (tmp_path / "uniform-nothing-3.json").write_text(json.dumps([row, other]))
+    headings, _, right, drift = table(tmp_path)
+    assert [cell.strip() for cell in headings.strip("|").split("|")] == list(HEADINGS)
+    assert right == "| uniform | right | 3 | 2 | 0.02, 50 % | 1.50, 50 % | 5.05, 50 % | 50 % |"
+    assert drift == "| uniform | wrong: drift | 3 | 1 | 0.02, 50 % | 1.50, 50 % | 4.00, 100 % | 0 % |"
+
+
+@pytest.mark.parametrize("line", ["uniform", "section"])
+def test_records_are_those_of_sensors_on_lines_as_built(line):
+    (record,) = records_of(0, 1, "nothing", line)
+    faster = design_of(0, line).contact_wire.wave_speed / design_of(0, "uniform").contact_wire.wave_speed
+    assert record.pieces[0].speed_kmh == pytest.approx(faster * SPEEDS[-1], rel=1e-3)
+    (drifting,) = records_of(0, 1, "drift", line)
+    change = drifting.pieces[0].force - 1.03 * record.pieces[0].force
+    assert np.abs(change).max() == pytest.approx(8.0, rel=1e-3)
+
+
+def test_the_documents_have_the_table_of_the_stored_lines():
+    text = (ROOT / "docs" / "records.md").read_text(encoding="utf-8")
+    rows = list(table(STORED))
+    assert len(rows) > 2
+    assert [row for row in rows if row not in text] == []
