@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -27,6 +28,7 @@ OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0}
 how much positions are short (m), the sensors' gain differs from 1, and their zero from 0 (N). Taken for sure,
 a gain that is 3 % off and a zero that drifts by 8 N move tensions by 0.9 %, and nothing shows it.
 """
+Grid = Literal["coarse", "fair", "fine"]
 FURTHER = 1.0
 """Difference of the static force (N) by which its derivatives are taken."""
 
@@ -37,7 +39,8 @@ class Part:
 
     measured: Measured
     passes: Passes
-    coarse: Passes  # from which derivatives are taken at first
+    fair: Passes  # on a coarser grid, from which derivatives are taken until the end is near
+    coarse: Passes  # at first, with fewer spans about the train
     name: str
     low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
 
@@ -50,6 +53,14 @@ class State:
     static_forces: Array  # (parts,): with which the mean of each part is the measured one (N)
     noise: Array  # (parts, bands): standard deviation of coefficients (N)
     steps: int = 0
+
+
+@dataclass(frozen=True)
+class Near:
+    """What is known of the first of some values x, so that passes on a coarser grid do for the others."""
+
+    left: Sequence[Array]  # of each part
+    begins: Array  # as ``Passes.forces`` takes them
 
 
 class Misfit:
@@ -76,12 +87,12 @@ class Misfit:
         return found
 
     def derivatives(
-        self, state: State, differences: Array, coarse: bool, working: Callable[[str], None]
+        self, state: State, differences: Array, grid: Grid, working: Callable[[str], None]
     ) -> tuple[State, list[Array], list[Array]]:
         """Coefficients' derivatives, (coefficients, n), and what is left, of each part.
 
-        differences: from which they are taken, (values, values), a row each. coarse: whether from coarse
-        passes. working: told what is being computed. The state's static forces give the records' means then.
+        differences: from which they are taken, (values, values), a row each. grid: of the passes from which.
+        working: told what is being computed. The state's static forces give the records' means then.
         """
         blocks, left = [], []
         static, count = state.static_forces.copy(), len(self.values)
@@ -92,10 +103,10 @@ class Misfit:
             working(f"derivatives, {100 * k / len(self.parts):.0f} %")
             variants = [self.values.variant(each, static[k]) for each in changed]
             variants.append(self.values.variant(now, static[k] + FURTHER))
-            own = replace(part, passes=part.coarse) if coarse else part
+            own = replace(part, passes={"coarse": part.coarse, "fair": part.fair, "fine": part.passes}[grid])
             first, *others, heavier = self.sampled(own, variants, np.array(begins))
             by_value = np.linalg.solve(differences, np.array(others) - first)
-            force = self.sampled(part, variants[:1])[0] if coarse else first
+            force = first if grid == "fine" else self.sampled(part, variants[:1])[0]
             sample = part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (self.measured(k, state.x, by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()
@@ -112,18 +123,25 @@ class Misfit:
         return replace(state, static_forces=static), blocks, left
 
     def tried(
-        self, state: State, tried: Sequence[Array] | Array, begins: Array | None = None
+        self, state: State, tried: Sequence[Array] | Array, near: Near | None = None
     ) -> tuple[list[list[Array]], list[float]]:
-        """What is left of each part, and the sum, for some values of x; begins: as ``sampled`` takes them."""
+        """What is left of each part, and the sum, for some values of x; near: what is known of the first."""
         count = len(self.values)
         left: list[list[Array]] = [[] for _ in tried]
         static = [self.static_forces(state, x) for x in tried]
         for k, part in enumerate(self.parts):
             rows = zip(tried, static, strict=True)
             variants = [self.values.variant(x[:count], float(own[k])) for x, own in rows]
-            forces = self.sampled(part, variants, begins)
+            if near is None:
+                forces = self.sampled(part, variants)
+            else:
+                forces = self.sampled(replace(part, passes=part.fair), variants, near.begins)
             for own, x, force in zip(left, tried, forces, strict=True):
                 own.append(part.measured.coefficients(self.measured(k, x) - force))
+            if near is not None:
+                away = near.left[k] - left[0][k]
+                for own in left:
+                    own[k] = own[k] + away
         return left, [self.sum_of(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
 
     def shifts(self, x: Array) -> Array:

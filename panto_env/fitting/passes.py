@@ -59,6 +59,7 @@ class Passes:
             self.speed, self.time_step = speed, first.time_step
         # Another damping must not have another grid and time step.
         same = {"time_step": first.time_step, "spacing": first.model.grid["spacing"]}
+        self.window = int(first.model.grid["window"])  # spans; 0: the whole line
         self._numerics = numerics.model_copy(update=same)
         self.steps = int(distance / (speed * self.time_step))
         self.droppers, self.supports = first.model.droppers, first.model.supports

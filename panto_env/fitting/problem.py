@@ -32,9 +32,6 @@ BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
 NUMERICS = Numerics()
 """Of simulated passes."""
-COARSE = Numerics(accuracy="fast")
-"""Of those from which derivatives are taken at first, in half the time: their window of 8 spans leaves out
-some waves that come back, so that derivatives by droppers differ by a quarter, and by tensions by more."""
 MOST_LOOSE = 0.1
 """Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
@@ -97,7 +94,9 @@ def problem(
             facts = line, pantograph, condition, piece.speed, min(end + END, distance), spans
             passes = Passes(*facts, NUMERICS)
             droppers, supports = passes.droppers, passes.supports
-            parts.append(Part(own, passes, Passes(*facts, COARSE), name, is_low_passed(piece)))
+            fair = Passes(*facts, Numerics(accuracy="fast", window=passes.window))
+            coarse = Passes(*facts, Numerics(accuracy="fast"))
+            parts.append(Part(own, passes, fair, coarse, name, is_low_passed(piece)))
     if not parts:
         raise InputError(f"No record can be compared. {' '.join(notes)}")
     begin = min(float(part.measured.place[0]) for part in parts)

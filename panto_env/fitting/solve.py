@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
-from .misfit import Misfit, State
+from .misfit import Grid, Misfit, Near, State
 from .normal import CLOSE, noise_of, normal, pull_of
 
 STEPS, SETS, ROUNDS = 80, 6, 10
@@ -23,9 +23,9 @@ how often they are at most."""
 DONE = 0.05
 """Expected decrease of the sum by a further step, for each value, below which the iteration ends: each then
 moves by a fifth of its standard deviation."""
-JUMPS, BETTER = (-2.0, -1.0, 1.0, 2.0), 30.0
+JUMPS, BETTER = (-2.0, -1.0, 1.0, 2.0), 15.0
 """Tolerances by which single droppers are made longer or shorter where steps lead no further, and by how much
-the sum must fall for that to count: far more than by chance, of however many coefficients it is."""
+the sum must fall for that to count: more than by chance, of however many coefficients it is."""
 WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 FRESH = 10.0
@@ -45,7 +45,7 @@ values are. Droppers that go slack bend the course of the force; small differenc
 KEPT = 0.5
 """Share of the expected decrease that a step must bring for the derivatives to be kept for the next one."""
 SHORTER = (1.0, 0.5, 0.2, 0.05)
-"""Shares of a step that are tried."""
+"""Shares of a step that are tried, the last two where less is better."""
 
 
 @dataclass(frozen=True)
@@ -82,30 +82,36 @@ class Fitting(Misfit):
         report: called after each step with the state and the expected decrease of a further one. working:
         called now and then with what is being computed.
 
-        As long as noise is held above what is left, derivatives come from coarse passes. Where what is left
-        at the end is not like noise, single droppers jump, for one may be on the wrong side of going slack.
+        As long as noise is held above what is left, derivatives come from coarse passes, then from fair ones.
+        Where what is left is not like noise, single droppers jump, for one may be on the wrong side of going
+        slack. The last derivatives are fine.
         """
-        best = self._settle(state, None, report, working)
+
+        def settle(state: State, covariance: Array | None = None, fine: bool = False) -> Solution:
+            return self._settle(state, covariance, fine, report, working)
+
+        best = settle(state)
         for _ in range(ROUNDS):
             jumped = None if best.like_noise(self.bands) else self._jumped(best, working)
             if best.settled and jumped is None:
                 break
-            found = self._settle(jumped or best.state, best.covariance, report, working)
+            found = settle(jumped or best.state, best.covariance)
             if jumped and not self._sum(found, best) < self._sum(best, best) - BETTER:
                 break
             best = found
-        return best
+        return settle(best.state, best.covariance, fine=True)
 
     def _settle(
         self,
         state: State,
         covariance: Array | None,
+        fine: bool,
         report: Callable[[State, float], None],
         working: Callable[[str], None],
     ) -> Solution:
         """Iterate until a further step would change little, or steps lead nowhere.
 
-        covariance: of the values, where it is known how uncertain they are.
+        covariance: of the values, where it is known how uncertain they are. fine: whether derivatives are.
         """
         begin, sets, done = state.steps, 0, DONE * len(self.prior)
         known = covariance is not None
@@ -115,7 +121,8 @@ class Fitting(Misfit):
         )
         while True:
             held = COOL * state.noise
-            state, blocks, left = self.derivatives(state, differences, coarse, working)
+            grid: Grid = "coarse" if coarse else "fine" if fine else "fair"
+            state, blocks, left = self.derivatives(state, differences, grid, working)
             first = None  # expected decrease by the first step with these derivatives
             while True:
                 found = noise_of(state.noise, blocks, left, self.bands, self.prior, state.x)
@@ -150,7 +157,7 @@ class Fitting(Misfit):
         What a jump makes better shows when all other values have followed, for they have made up for what was
         wrong; that they would follow is expected of the last derivatives.
         """
-        found, state = None, solution.state
+        found, state, now = None, solution.state, solution.left
         weights, covariance = self.weights(state.noise), solution.covariance
         jumping = np.repeat(self.values.of_kind("droppers"), len(JUMPS))
         far = self.values.tolerances[jumping] * np.resize(JUMPS, len(jumping))
@@ -158,7 +165,7 @@ class Fitting(Misfit):
             working("single droppers")
             tried = np.repeat(state.x[None], 1 + len(jumping), axis=0)
             tried[np.arange(1, len(tried)), jumping] += far
-            left, sums = self.tried(state, tried, np.append(0.0, self.values.begins[jumping]))
+            left, sums = self.tried(state, tried, Near(now, np.append(0.0, self.values.begins[jumping])))
             facts = solution.blocks, weights, self.prior
             pulls = np.array([pull_of(*facts, own, x) for own, x in zip(left, tried, strict=True)])
             expected = sums - np.sum((pulls @ covariance) * pulls, axis=1)
@@ -169,6 +176,7 @@ class Fitting(Misfit):
                 break
             best = int(np.argmin(expected[1:]))
             found = state = replace(state, x=tried[1 + best])
+            now = tuple(left[1 + best])
             others = better[jumping[better] != jumping[best]]
             jumping, far = jumping[others], far[others]
         return found
@@ -187,7 +195,10 @@ class Fitting(Misfit):
     def _step(self, state: State, step: Array) -> tuple[State, list[Array], float]:
         """The state after the share of a step that gives the least sum, what is left there, and the sum."""
         tried = [state.x + share * step for share in SHORTER]
-        left, sums = self.tried(state, tried)
+        left, sums = self.tried(state, tried[:2])
+        if sums[0] > sums[1]:
+            shorter = self.tried(state, tried[2:])
+            left, sums = left + shorter[0], sums + shorter[1]
         best = int(np.argmin(sums))
         static = self.static_forces(state, tried[best])
         return State(tried[best], static, state.noise, state.steps + 1), left[best], sums[best]
