@@ -36,7 +36,7 @@ WAVES = (*IRREGULARITY, (AS_BUILT.wear_wavelength, AS_BUILT.wear_depth / 2))
 """Wavelengths and amplitudes (m) of the running surface of a line as built. Droppers send waves of wear back
 with other frequencies, so that they are in the low-passed force, too: 0.2 to 0.3 N of it.
 """
-LEAD = {"droppers": 2, "supports": 6}
+LEAD = {"droppers": 3, "supports": 6}
 """Spans ahead of the train from which on a value acts on the force: before, by less than a millionth."""
 CHAIN = ("masses", "stiffnesses", "dampings")
 

@@ -43,7 +43,7 @@ def derivatives(exact):
     """Derivatives of coefficients at the design, and what is left there."""
     fitting = exact.fitting
     small = np.diag([1e-5 if value.kind == "tensions" else 1e-6 for value in fitting.values.all])
-    _, (block,), (left,) = fitting.derivatives(fitting.start(), small, False, lambda doing: None)
+    _, (block,), (left,) = fitting.derivatives(fitting.start(), small, "fine", lambda doing: None)
     return block, left
 
 
