@@ -39,7 +39,7 @@ def fit(
         typer.Option(
             help="What may differ from the design, of tensions, droppers, supports, damping, pantograph and "
             "unevenness.",
-            show_default="tensions,droppers,supports,unevenness",
+            show_default="tensions,droppers,supports,damping,unevenness",
         ),
     ] = None,
     tolerance: Annotated[

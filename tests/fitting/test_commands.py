@@ -3,15 +3,18 @@
 import csv
 import json
 from dataclasses import replace
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import text_of
+from panto_env.cli.fit import fit as command
 from panto_env.fitting.kept import identity_of, keep, kept
 from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import Fitting
+from panto_env.fitting.values import USUAL
 from panto_env.records.record_file import read_record, write_record
 
 from ..command import panto
@@ -20,6 +23,11 @@ from .conftest import LINE, PANTOGRAPH, record_of
 ON = ("--line", LINE, "--pantograph", PANTOGRAPH)
 TENSIONS = (*ON, "--free", "tensions")
 LOST = {"lost_contact_tension": 0.02, "lost_messenger_tension": -0.015}
+
+
+def test_its_help_says_what_is_freed_by_default():
+    (option,) = (each for each in get_type_hints(command, include_extras=True)["free"].__metadata__)
+    assert option.show_default == ",".join(USUAL)
 
 
 @pytest.fixture(scope="module")
