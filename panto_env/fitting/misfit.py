@@ -38,9 +38,9 @@ class Part:
     """One piece of a record, and the passes that are held against it."""
 
     measured: Measured
-    passes: Passes
-    fair: Passes  # on a coarser grid, from which derivatives are taken until the end is near
-    coarse: Passes  # at first, with fewer spans about the train
+    fine: Passes
+    fair: Passes  # on a coarser grid, where derivatives by droppers are 5 % off: until the end is near
+    coarse: Passes  # with 8 spans about the train, too, where they are a quarter off: at first
     name: str
     low_passed: bool = False  # whether EN 50317's filter was applied before the force was recorded
 
@@ -103,8 +103,7 @@ class Misfit:
             working(f"derivatives, {100 * k / len(self.parts):.0f} %")
             variants = [self.values.variant(each, static[k]) for each in changed]
             variants.append(self.values.variant(now, static[k] + FURTHER))
-            own = replace(part, passes={"coarse": part.coarse, "fair": part.fair, "fine": part.passes}[grid])
-            first, *others, heavier = self.sampled(own, variants, np.array(begins))
+            first, *others, heavier = self.sampled(part, variants, np.array(begins), grid)
             by_value = np.linalg.solve(differences, np.array(others) - first)
             force = first if grid == "fine" else self.sampled(part, variants[:1])[0]
             sample = part.measured.piece.speed * part.measured.piece.time_step
@@ -132,16 +131,14 @@ class Misfit:
         for k, part in enumerate(self.parts):
             rows = zip(tried, static, strict=True)
             variants = [self.values.variant(x[:count], float(own[k])) for x, own in rows]
-            if near is None:
-                forces = self.sampled(part, variants)
-            else:
-                forces = self.sampled(replace(part, passes=part.fair), variants, near.begins)
-            for own, x, force in zip(left, tried, forces, strict=True):
-                own.append(part.measured.coefficients(self.measured(k, x) - force))
-            if near is not None:
-                away = near.left[k] - left[0][k]
-                for own in left:
-                    own[k] = own[k] + away
+            forces = (
+                self.sampled(part, variants, near.begins, "fair") if near else self.sampled(part, variants)
+            )
+            pairs = zip(tried, forces, strict=True)
+            found = [part.measured.coefficients(self.measured(k, x) - force) for x, force in pairs]
+            away = near.left[k] - found[0] if near else 0.0
+            for own, coefficients in zip(left, found, strict=True):
+                own.append(coefficients + away)
         return left, [self.sum_of(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
 
     def shifts(self, x: Array) -> Array:
@@ -174,14 +171,17 @@ class Misfit:
         misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
         return misfit + float(np.sum((x / self.prior) ** 2))
 
-    def sampled(self, part: Part, variants: Sequence[Variant], begins: Array | None = None) -> Array:
+    def sampled(
+        self, part: Part, variants: Sequence[Variant], begins: Array | None = None, grid: Grid = "fine"
+    ) -> Array:
         """Low-passed forces of variants at the places that are compared, (n, places) (N).
 
-        begins: as ``Passes.forces`` takes them.
+        begins: as ``Passes.forces`` takes them. grid: of the passes.
         """
         from scipy.fft import set_workers  # slow to import
 
-        passes, place = part.passes, part.measured.place
+        passes: Passes = getattr(part, grid)
+        place = part.measured.place
         forces = passes.forces(variants, begins)
         if part.low_passed:
             forces = low_pass(forces, passes.time_step)

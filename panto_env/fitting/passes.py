@@ -97,12 +97,11 @@ class Passes:
             steps = np.clip((begins / (self.speed * self.time_step)).astype(int), 0, self.steps)
         found, first = np.zeros((len(variants), self.steps)), variants[0].catenary
         shares: list[tuple[list[int], Kept | None]] = []
-        late: list[int] = []
-        for catenary in dict.fromkeys(each.catenary for each in variants):
-            which = [k for k, each in enumerate(variants) if each.catenary == catenary]
-            late = [k for k in which if steps[k] > 0] if catenary == first else late
-            whole = sorted(set(which) - set(late)) if catenary == first else which
-            shares += [(share, None) for share in _shares(whole, cores() if catenary == first else 1)]
+        late = [k for k in np.flatnonzero(steps).tolist() if variants[k].catenary == first]
+        whole = sorted(set(range(len(variants))) - set(late))
+        for catenary in dict.fromkeys(variants[k].catenary for k in whole):
+            own = [k for k in whole if variants[k].catenary == catenary]
+            shares += [(share, None) for share in _shares(own, cores() if catenary == first else 1)]
         self._side_by_side(shares, variants, found)
         if late:
             of_late = _shares(sorted(late, key=lambda k: steps[k]))

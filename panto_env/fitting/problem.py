@@ -92,11 +92,11 @@ def problem(
                 notes.append(f"{name} is left out: {error}")
                 continue
             facts = line, pantograph, condition, piece.speed, min(end + END, distance), spans
-            passes = Passes(*facts, NUMERICS)
-            droppers, supports = passes.droppers, passes.supports
-            fair = Passes(*facts, Numerics(accuracy="fast", window=passes.window))
+            fine = Passes(*facts, NUMERICS)
+            droppers, supports = fine.droppers, fine.supports
+            fair = Passes(*facts, Numerics(accuracy="fast", window=fine.window))
             coarse = Passes(*facts, Numerics(accuracy="fast"))
-            parts.append(Part(own, passes, fair, coarse, name, is_low_passed(piece)))
+            parts.append(Part(own, fine, fair, coarse, name, is_low_passed(piece)))
     if not parts:
         raise InputError(f"No record can be compared. {' '.join(notes)}")
     begin = min(float(part.measured.place[0]) for part in parts)

@@ -26,7 +26,7 @@ LOST = {"lost_contact_tension": 0.02, "lost_messenger_tension": -0.015}
 
 
 def test_its_help_says_what_is_freed_by_default():
-    (option,) = (each for each in get_type_hints(command, include_extras=True)["free"].__metadata__)
+    (option,) = get_type_hints(command, include_extras=True)["free"].__metadata__
     assert option.show_default == ",".join(USUAL)
 
 
