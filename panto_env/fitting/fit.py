@@ -26,6 +26,9 @@ tell it."""
 CORRELATED = 0.9
 """Correlation from which on two values are named: the records know their sum or difference better."""
 
+WHITE = 0.01
+"""Probability below which what is left is called unlike noise."""
+
 
 @dataclass(frozen=True)
 class Found:

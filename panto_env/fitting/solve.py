@@ -26,8 +26,6 @@ moves by a fifth of its standard deviation."""
 JUMPS, BETTER = (-2.0, -1.0, 1.0, 2.0), 15.0
 """Tolerances by which single droppers are made longer or shorter where steps lead no further, and by how much
 the sum must fall for that to count: more than by chance, of however many coefficients it is."""
-WHITE = 0.01
-"""Probability below which what is left is called unlike noise."""
 FRESH = 10.0
 """How many times that much a first step with new derivatives may bring for them to be good to the end."""
 FIRST = 0.1
@@ -63,10 +61,6 @@ class Solution:
         rows = zip(self.left, self.state.noise, bands, strict=True)
         return [whiteness((left / own[band])[:, None]) for left, own, band in rows]
 
-    def like_noise(self, bands: Sequence[Index]) -> bool:
-        """Whether what is left of each part is as random as noise."""
-        return all(white.probability >= WHITE for white in self.whiteness(bands))
-
 
 class Fitting(Misfit):
     """The iteration to the least misfit."""
@@ -83,8 +77,9 @@ class Fitting(Misfit):
         called now and then with what is being computed.
 
         As long as noise is held above what is left, derivatives come from coarse passes, then from fair ones.
-        Where what is left is not like noise, single droppers jump, for one may be on the wrong side of going
-        slack. The last derivatives are fine.
+        Where steps lead no further, single droppers jump, for one may be on the wrong side of going slack:
+        even where what is left is like noise, for some of that goes into the noise that is found. The last
+        derivatives are fine.
         """
 
         def settle(state: State, covariance: Array | None = None, fine: bool = False) -> Solution:
@@ -92,7 +87,7 @@ class Fitting(Misfit):
 
         best = settle(state)
         for _ in range(ROUNDS):
-            jumped = None if best.like_noise(self.bands) else self._jumped(best, working)
+            jumped = self._jumped(best, working)
             if best.settled and jumped is None:
                 break
             found = settle(jumped or best.state, best.covariance)

@@ -11,9 +11,8 @@ import numpy as np
 from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .fit import Fit
+from .fit import WHITE, Fit
 from .measured import BANDS
-from .solve import WHITE
 from .values import Value
 
 ARRAYS = ("difference", "covariance", "noise")

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..base.table import Alarm, Table
 from ..terminal import number
-from .fit import INTERVAL, Fit, Found
-from .solve import WHITE
+from .fit import INTERVAL, WHITE, Fit, Found
 from .values import FREE
 
 STRANGE = 0.3
