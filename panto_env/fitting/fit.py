@@ -25,7 +25,6 @@ TELLS = 0.6
 tell it."""
 CORRELATED = 0.9
 """Correlation from which on two values are named: the records know their sum or difference better."""
-
 WHITE = 0.01
 """Probability below which what is left is called unlike noise."""
 

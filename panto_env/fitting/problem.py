@@ -12,6 +12,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.spans import FIRST_SETTLED
+from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
 from ..plant.line_condition import LineCondition, together
@@ -108,6 +109,14 @@ def problem(
         notes.append(
             f"The records have {told} coefficients for {len(values)} values, so noise is hardly known, and "
             f"intervals may be too narrow; give more passes, or free less, for {ENOUGH:g} times as many."
+        )
+    crossed = sum(
+        begin < length.in_use[1] and length.in_use[0] < end for length in tension_lengths(line, spans)
+    )
+    if crossed > 1 and "tensions" in free:
+        notes.append(
+            f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; where "
+            "theirs differ, cut the records at the overlaps and fit each part."
         )
     fitting = Fitting(parts, values)
     shifted = []

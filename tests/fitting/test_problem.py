@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from panto_env import simulate
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
 from panto_env.fitting import problem as preparing
@@ -14,6 +15,8 @@ from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.line_condition import LineCondition
+from panto_env.records.measured import measured
+from panto_env.records.record import Record
 
 from .conftest import BUILT, SEED, SPANS, record_of
 
@@ -74,6 +77,19 @@ def test_too_few_coefficients_for_so_many_values_are_noted(ready, record, design
     assert told < 2 * len(ready.fitting.values)
     assert f"{told} coefficients for {len(ready.fitting.values)} values" in ready.notes[-1]
     assert problem([record], design, pantograph, free=("tensions",)).notes == ()
+
+
+def test_records_of_several_tension_lengths_are_noted(pantograph):
+    """On this line trains pass to other wires at 1070 m."""
+    line = load_catenary("sweden-st15-bridge")
+    run = simulate(line, pantograph, 180.0, accuracy="fast", distance=1200.0, record_droppers=False)
+    (piece,) = measured(run).pieces
+    for last, found in ((1200.0, True), (1080.0, False)):
+        count = int(np.sum(piece.position < last))
+        own = {"position": piece.position[:count], "force": piece.force[:count]}
+        cut = replace(piece, height=None, uplift=None, **own)
+        notes = problem([Record("run", (cut,))], line, pantograph).notes
+        assert any("2 tension lengths" in note for note in notes) is found
 
 
 def test_derivatives_of_all_droppers_add_up(exact, derivatives):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.fitting import problem as preparing
+from panto_env.fitting.fit import WHITE
 from panto_env.fitting.measured import BANDS
 from panto_env.fitting.normal import normal
 from panto_env.fitting.problem import problem
@@ -89,3 +90,16 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     alone = np.where(np.arange(len(wrong)) == k, wrong - 0.01, wrong)
     _, (before, after) = fitting.tried(found.state, [wrong, alone])
     assert after > before
+
+
+def test_droppers_are_looked_at_where_what_is_left_is_like_noise(ready, true, monkeypatch):
+    """Part of what a dropper leaves that is off goes into the noise, and looks like it."""
+    fitting, looked = ready.fitting, []
+    end = ended(fitting, true)
+    noise = tuple(np.random.default_rng(0).normal(0.0, LEFT, len(left)) for left in end.left)
+    end = replace(end, left=noise)
+    assert min(white.probability for white in end.whiteness(fitting.bands)) > WHITE
+    monkeypatch.setattr(fitting, "_settle", lambda *arguments: end)
+    monkeypatch.setattr(fitting, "_jumped", lambda solution, working: looked.append(solution))
+    assert fitting.run(fitting.start()) is end
+    assert looked == [end]
