@@ -4,6 +4,7 @@ python -m tests.fitting.coverage FOLDER --lines 100           # goes on where it
 python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong, in one of several ways
 python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
 python -m tests.fitting.coverage FOLDER --line section        # lines whose spans differ, each drawn
+python -m tests.fitting.coverage FOLDER --diagnose            # and what later passes over these lines show
 python -m tests.fitting.coverage FOLDER --table
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +25,11 @@ from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.fitting.fit import fit
 from panto_env.plant.catenary.flexible.attached import dropper_positions
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.line_condition import LINE_CONDITIONS, draw
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
+
+from .later import LATER, later
 
 LINE, PANTOGRAPH, SPANS, BEYOND = "en50318-2002", "dsa380", 16, 12
 SECTION, SECTION_SPANS = "fast-line", 18
@@ -45,8 +49,11 @@ HEADINGS = (
     "tension (%), inside",
     "dropper (mm)",
     "support (mm)",
+    "damping (%)",
+    "waves (mm)",
     "unlike noise",
 )
+SCALES = {"tensions": 100.0, "droppers": 1e3, "supports": 1e3, "damping": 100.0, "unevenness": 1e3}
 WRONG = ("nothing", "grid", "damping", "pantograph", "drift")
 
 
@@ -60,9 +67,22 @@ def design_of(seed: int, line: str) -> FlexibleCatenaryData:
     return section.draw(np.random.default_rng(seed))[0]
 
 
-def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
-    """Records of passes over one line; wrong: what the fit will not know."""
-    random = np.random.default_rng([seed, passes])
+def records_of(
+    seed: int,
+    passes: int,
+    wrong: str,
+    kind: str,
+    *,
+    condition: LineCondition | str = "as-built",
+    speeds: tuple[float, ...] = (),
+    visit: int = 0,
+) -> list[Record]:
+    """Records of passes over one line.
+
+    wrong: what the fit will not know. condition: of the line as built, and with what is defect. speeds:
+    instead of the usual ones (km/h). visit: with other noise, gain, zero and place of the sensors.
+    """
+    random = np.random.default_rng([seed, passes, visit])
     line, pantograph = design_of(seed, kind), load_pantograph(PANTOGRAPH)
     faster = line.contact_wire.wave_speed / design_of(0, "uniform").contact_wire.wave_speed
     settings: dict[str, Any] = {}
@@ -73,19 +93,19 @@ def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
         other = damping.model_copy(update={"alpha": 2 * damping.alpha, "beta": 2 * damping.beta})
         line = line.model_copy(update={"damping": other})
     if wrong == "pantograph":
-        signs = random.choice([-1, 1], 3)
+        signs = np.random.default_rng(seed).choice([-1, 1], 3)
         masses = tuple(float(m * (1 + 0.05 * s)) for m, s in zip(pantograph.masses, signs, strict=True))
         springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
         pantograph = pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
     if wrong == "grid":
         settings |= {"window": 0, "spacing": 0.25, "time_step": 5e-4, "precision": "double"}
     found = []
-    for k, speed in enumerate(faster * np.array(SPEEDS[-passes:])):
+    for k, speed in enumerate(faster * np.array(speeds or SPEEDS[-passes:])):
         run = simulate(
             line,
             pantograph,
             float(speed),
-            line_condition="as-built",
+            line_condition=condition,
             seed=seed,
             record_droppers=False,
             **settings,
@@ -95,7 +115,7 @@ def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
             rate=RATE,
             force_noise=NOISE,
             position_error=float(PLACE * random.standard_normal()),
-            seed=1000 * seed + k,
+            seed=1000 * seed + 10 * visit + k,
             name=f"{speed:g} km/h",
         )
         (piece,) = record.pieces
@@ -107,8 +127,11 @@ def records_of(seed: int, passes: int, wrong: str, kind: str) -> list[Record]:
     return found
 
 
-def judge(seed: int, passes: int, wrong: str, kind: str) -> dict[str, Any]:
-    """Errors and standard deviations of one fit by kind, in the values' own units."""
+def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False) -> dict[str, Any]:
+    """Errors and standard deviations of one fit by kind, in the values' own units.
+
+    diagnose: and what later passes show that are held against it.
+    """
     records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
     spans = line.spans if line.ends else SPANS + BEYOND
@@ -116,15 +139,26 @@ def judge(seed: int, passes: int, wrong: str, kind: str) -> dict[str, Any]:
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
     assert true.heights is not None
-    truths = {"tensions": np.array(true.tensions) - 1, "droppers": true.scatter, "supports": true.heights}
+    phases = 2 * np.pi * true.waves[:, 2]
+    truths = {
+        "tensions": np.array(true.tensions) - 1,
+        "droppers": true.scatter,
+        "supports": true.heights,
+        "damping": np.full(2, 1.0 if wrong == "damping" else 0.0),
+        "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
+    }
     rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
     rows["settled"] = found.solution.settled
     rows["left"] = [_short(left) for _, left in found.left]
     rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
     for name, truth in truths.items():
-        own = found.of_kind(name)
-        pairs = [(each.difference - float(truth[each.value.index[0]]), each.deviation) for each in own]
+        pairs = []
+        for number, each in enumerate(found.of_kind(name)):
+            index = (number,) if name == "damping" else each.value.index
+            pairs.append((each.difference - float(truth[index]), each.deviation))
         rows[name] = [[_short(number) for number in pair] for pair in pairs]
+    if diagnose:
+        rows["later"] = later(found, partial(records_of, seed, passes, wrong, kind), seed)
     return rows
 
 
@@ -144,25 +178,45 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
         temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
 
 
+def groups(folder: Path) -> Iterator[tuple[tuple[int, int, int], list[Any]]]:
+    """What was found, by number of the line's kind, number of what is wrong, and number of passes."""
+    found: dict[tuple[int, int, int], list[Any]] = {}
+    for path in sorted(folder.glob("*-*-*.json")):
+        for each in known(path):
+            order = LINES.index(each["line"]), WRONG.index(each["wrong"]), each["passes"]
+            found.setdefault(order, []).append(each)
+    yield from sorted(found.items())
+
+
+def model_of(number: int) -> str:
+    """What is wrong with the model, in a table's words."""
+    return f"wrong: {WRONG[number]}" if number else "right"
+
+
 def table(folder: Path) -> Iterator[str]:
     """Rows of a table in Markdown: coverage and errors by line, what is wrong, and the number of passes."""
-    results = [row for path in sorted(folder.glob("*-*-*.json")) for row in known(path)]
     yield f"| {' | '.join(HEADINGS)} |"
     yield f"| --- | --- |{' ---: |' * (len(HEADINGS) - 2)}"
-    groups: dict[Any, list[Any]] = {}
-    for each in results:
-        order = LINES.index(each["line"]), WRONG.index(each["wrong"]), each["passes"]
-        groups.setdefault(order, []).append(each)
-    for (line, number, passes), own in sorted(groups.items()):
+    for (line, number, passes), own in groups(folder):
         cells = []
-        for kind, scale in (("tensions", 100.0), ("droppers", 1e3), ("supports", 1e3)):
+        for kind, scale in SCALES.items():
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < 1.96 * deviations)
-            cells.append(f"{scale * np.median(np.abs(errors)):.2f}, {inside:.0f} %")
+            cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
         unlike = np.mean([min(each["as_noise"]) < 0.01 for each in own])
-        what = f"wrong: {WRONG[number]}" if number else "right"
-        cells = [LINES[line], what, f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
+        cells = [LINES[line], model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
+
+
+def diagnosed(folder: Path) -> Iterator[str]:
+    """Rows of a table in Markdown: what ``panto diagnose`` said of later passes over the fitted lines."""
+    yield f"| {' | '.join(('line', 'model', 'lines', *LATER))} |"
+    yield f"| --- | --- |{' ---: |' * (1 + len(LATER))}"
+    for (line, number, _), rows in groups(folder):
+        own = [row["later"] for row in rows if "later" in row]
+        if own:
+            cells = [f"{sum(each[name] for each in own)}" for name in LATER]
+            yield f"| {' | '.join([LINES[line], model_of(number), f'{len(own)}', *cells])} |"
 
 
 def main() -> None:
@@ -175,17 +229,18 @@ def main() -> None:
     parser.add_argument("--passes", type=int, default=4, choices=range(1, len(SPEEDS) + 1))
     parser.add_argument("--line", choices=LINES, default=LINES[0])
     parser.add_argument("--wrong", choices=WRONG, default=WRONG[0])
+    parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     if not given.table:
         path = given.folder / f"{given.line}-{given.wrong}-{given.passes}.json"
-        done = {row["seed"] for row in known(path)}
+        done = {row["seed"] for row in known(path) if "later" in row or not given.diagnose}
         for seed in sorted(set(range(given.lines)) - done):
-            row = judge(seed, given.passes, given.wrong, given.line)
-            write(path, [*known(path), row])
+            row = judge(seed, given.passes, given.wrong, given.line, given.diagnose)
+            write(path, [*(other for other in known(path) if other["seed"] != seed), row])
             print(f"line {seed + 1} of {given.lines}", flush=True)
-    for row in table(given.folder):
+    for row in (*table(given.folder), "", *diagnosed(given.folder)):
         print(row)
 
 

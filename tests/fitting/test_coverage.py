@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ..documents import ROOT
-from .coverage import HEADINGS, SPEEDS, design_of, records_of, table
+from .coverage import HEADINGS, SPEEDS, design_of, diagnosed, records_of, table
+from .later import LATER
 
 STORED = ROOT / "docs" / "records-coverage"
 
@@ -21,6 +22,8 @@ def test_medians_and_shares_inside_are_counted_by_line_model_and_passes(tmp_path
         "tensions": [[1e-4, 1e-4], [-3e-4, 1e-4]],
         "droppers": [[1e-3, 1e-3], [2e-3, 1e-3], [-3e-3, 1e-3], [1e-3, 1e-3]],
         "supports": [[4e-3, 3e-3]],
+        "damping": [[0.1, 0.2], [-0.3, 0.2]],
+        "unevenness": [[1e-5, 1e-5]],
     }
     other = row | {"seed": 1, "as_noise": [0.5, 0.001], "supports": [[-6.1e-3, 3e-3]]}
     wrong = row | {"wrong": "drift"}
@@ -28,8 +31,18 @@ def test_medians_and_shares_inside_are_counted_by_line_model_and_passes(tmp_path
     (tmp_path / "uniform-nothing-3.json").write_text(json.dumps([row, other]))
     headings, _, right, drift = table(tmp_path)
     assert [cell.strip() for cell in headings.strip("|").split("|")] == list(HEADINGS)
-    assert right == "| uniform | right | 3 | 2 | 0.02, 50 % | 1.50, 50 % | 5.05, 50 % | 50 % |"
-    assert drift == "| uniform | wrong: drift | 3 | 1 | 0.02, 50 % | 1.50, 50 % | 4.00, 100 % | 0 % |"
+    cells = "0.02, 50 % | 1.5, 50 % | 5.1, 50 % | 20, 100 % | 0.01, 100 % | 50 % |"
+    assert right == f"| uniform | right | 3 | 2 | {cells}"
+    cells = "0.02, 50 % | 1.5, 50 % | 4, 100 % | 20, 100 % | 0.01, 100 % | 0 % |"
+    assert drift == f"| uniform | wrong: drift | 3 | 1 | {cells}"
+
+
+def test_what_later_passes_show_is_counted(tmp_path):
+    row = {"line": "section", "seed": 0, "passes": 3, "wrong": "grid"}
+    seen = dict(zip(LATER, (True, False, True), strict=True))
+    rows = [row | {"later": seen}, row | {"seed": 1, "later": seen}, row | {"seed": 2}]
+    (tmp_path / "section-grid-3.json").write_text(json.dumps(rows))
+    assert list(diagnosed(tmp_path))[2:] == ["| section | wrong: grid | 2 | 2 | 0 | 2 |"]
 
 
 @pytest.mark.parametrize("line", ["uniform", "section"])
@@ -42,8 +55,20 @@ def test_records_are_those_of_sensors_on_lines_as_built(line):
     assert np.abs(change).max() == pytest.approx(8.0, rel=1e-3)
 
 
+def test_later_passes_have_other_sensors_and_defects():
+    healthy = {"speeds": (235.0,), "visit": 1}
+    passes = [
+        records_of(0, 3, "nothing", "uniform", **others)[0]
+        for others in (healthy, healthy, healthy | {"visit": 2}, healthy | {"condition": {}})
+    ]
+    forces = [record.pieces[0].force for record in passes]
+    assert [round(record.pieces[0].speed_kmh, 3) for record in passes] == 4 * [235.0]
+    np.testing.assert_array_equal(forces[0], forces[1])
+    assert all(np.abs(forces[0][:1000] - other[:1000]).max() > 1.0 for other in forces[2:])
+
+
 def test_the_documents_have_the_table_of_the_stored_lines():
     text = (ROOT / "docs" / "records.md").read_text(encoding="utf-8")
-    rows = list(table(STORED))
-    assert len(rows) > 2
-    assert [row for row in rows if row not in text] == []
+    for rows in (list(table(STORED)), list(diagnosed(STORED))):
+        assert len(rows) > 2
+        assert [row for row in rows if row not in text] == []
