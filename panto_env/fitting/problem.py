@@ -115,8 +115,8 @@ def problem(
     )
     if crossed > 1 and "tensions" in free:
         notes.append(
-            f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; where "
-            "theirs differ, cut the records at the overlaps and fit each part."
+            f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; "
+            "where theirs differ, cut the records at the overlaps and fit each part."
         )
     fitting = Fitting(parts, values)
     shifted = []

@@ -40,6 +40,10 @@ WIDE = 1.0
 """Standard deviations of the differences from which derivatives are taken, once it is known how uncertain
 values are. Droppers that go slack bend the course of the force; small differences only see the nearest bend.
 """
+SURE = 1e-3
+"""Least standard deviation, as a share of tolerances, of what values say together. Smaller differences end in
+rounding, whose derivatives make a fit surer and surer, and its differences smaller and smaller.
+"""
 KEPT = 0.5
 """Share of the expected decrease that a step must bring for the derivatives to be kept for the next one."""
 SHORTER = (1.0, 0.5, 0.2, 0.05)
@@ -183,6 +187,11 @@ class Fitting(Misfit):
         later ones leave the beginning of a pass as it is, which then need not be computed anew.
         """
         count, order = len(self.values), self.values.order
+        covariance = covariance[:count, :count]
+        scale = np.outer(self.values.tolerances, self.values.tolerances)
+        sizes, axes = np.linalg.eigh(covariance / scale)
+        if sizes[0] < SURE**2:
+            covariance = (axes * np.maximum(sizes, SURE**2)) @ axes.T * scale
         found = np.zeros((count, count))
         found[:, order] = WIDE * np.linalg.cholesky(covariance[np.ix_(order, order)]).T
         return found

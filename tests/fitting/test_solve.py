@@ -10,7 +10,7 @@ from panto_env.fitting.fit import WHITE
 from panto_env.fitting.measured import BANDS
 from panto_env.fitting.normal import normal
 from panto_env.fitting.problem import problem
-from panto_env.fitting.solve import Solution
+from panto_env.fitting.solve import SURE, Solution
 from panto_env.plant.numerics import Numerics
 
 LEFT = 0.7
@@ -103,3 +103,19 @@ def test_droppers_are_looked_at_where_what_is_left_is_like_noise(ready, true, mo
     monkeypatch.setattr(fitting, "_jumped", lambda solution, working: looked.append(solution))
     assert fitting.run(fitting.start()) is end
     assert looked == [end]
+
+
+def test_differences_never_become_so_small_that_rounding_is_all_that_is_left(ready):
+    """Where two values together are known far too well, which rounding may make a negative variance, too."""
+    fitting = ready.fitting
+    count, scale = len(fitting.values), fitting.values.tolerances
+    usual = np.diag(np.append(0.01 * scale**2, fitting.prior[count:] ** 2))
+    found = fitting._uncertain(usual) / scale
+    np.testing.assert_allclose(found.T @ found, 0.01 * np.eye(count), atol=1e-15)
+    for together in (1.0 - 1e-9, 1.0 + 1e-9):
+        sure = usual.copy()
+        sure[0, 1] = sure[1, 0] = 0.01 * together * scale[0] * scale[1]
+        found = fitting._uncertain(sure) / scale
+        gram = found.T @ found
+        np.testing.assert_allclose(gram[2:], 0.01 * np.eye(count)[2:], atol=1e-12)
+        assert np.linalg.eigvalsh(gram).min() == pytest.approx(SURE**2, rel=1e-3)
