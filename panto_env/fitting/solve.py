@@ -158,7 +158,7 @@ class Fitting(Misfit):
         """
         found, state, now = None, solution.state, solution.left
         weights, covariance = self.weights(state.noise), solution.covariance
-        jumping = np.repeat(self.values.of_kind("droppers"), len(JUMPS))
+        jumping = np.repeat(np.array(self.values.of_kind("droppers"), dtype=int), len(JUMPS))
         far = self.values.tolerances[jumping] * np.resize(JUMPS, len(jumping))
         while len(jumping):
             working("single droppers")

@@ -119,3 +119,8 @@ def test_differences_never_become_so_small_that_rounding_is_all_that_is_left(rea
         gram = found.T @ found
         np.testing.assert_allclose(gram[2:], 0.01 * np.eye(count)[2:], atol=1e-12)
         assert np.linalg.eigvalsh(gram).min() == pytest.approx(SURE**2, rel=1e-3)
+
+
+def test_no_dropper_jumps_where_none_is_free(record, design, pantograph):
+    fitting = problem([record], design, pantograph, free=("tensions",)).fitting
+    assert fitting._jumped(ended(fitting, np.zeros(5)), lambda doing: None) is None
