@@ -22,7 +22,7 @@ import numpy as np
 from panto_env import simulate
 from panto_env.base.files import write_whole
 from panto_env.catalog import load_catenary, load_pantograph, load_section
-from panto_env.fitting.fit import fit
+from panto_env.fitting.fit import INTERVAL, WHITE, fit
 from panto_env.plant.catenary.flexible.attached import dropper_positions
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
@@ -140,11 +140,11 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     assert true.scatter is not None
     assert true.heights is not None
     phases = 2 * np.pi * true.waves[:, 2]
-    truths = {
+    truths: dict[str, Any] = {
         "tensions": np.array(true.tensions) - 1,
         "droppers": true.scatter,
         "supports": true.heights,
-        "damping": np.full(2, 1.0 if wrong == "damping" else 0.0),
+        "damping": dict.fromkeys([("alpha",), ("beta",)], 1.0 if wrong == "damping" else 0.0),
         "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
     }
     rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
@@ -152,10 +152,8 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     rows["left"] = [_short(left) for _, left in found.left]
     rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
     for name, truth in truths.items():
-        pairs = []
-        for number, each in enumerate(found.of_kind(name)):
-            index = (number,) if name == "damping" else each.value.index
-            pairs.append((each.difference - float(truth[index]), each.deviation))
+        own = found.of_kind(name)
+        pairs = [(each.difference - float(truth[each.value.index]), each.deviation) for each in own]
         rows[name] = [[_short(number) for number in pair] for pair in pairs]
     if diagnose:
         rows["later"] = later(found, partial(records_of, seed, passes, wrong, kind), seed)
@@ -201,9 +199,9 @@ def table(folder: Path) -> Iterator[str]:
         cells = []
         for kind, scale in SCALES.items():
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
-            inside = 100 * np.mean(np.abs(errors) < 1.96 * deviations)
+            inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
-        unlike = np.mean([min(each["as_noise"]) < 0.01 for each in own])
+        unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
         cells = [LINES[line], model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
 

@@ -28,7 +28,7 @@ def later(fit: Fit, passes: Callable[..., list[Record]], seed: int) -> dict[str,
     dropper, and with less tension.
 
     passes: records over the line of the fit, as ``coverage.records_of`` takes its last arguments. seed: of
-    which dropper is broken, in one of the spans in the middle half of those compared.
+    which dropper is broken, of the middle half of those compared.
     """
     known, built = knowledge(fit, "earlier"), LINE_CONDITIONS["as-built"]
     droppers = fit.of_kind("droppers")
