@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.linear_algebra import one_thread
 from ..estimation.innovations import Whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
@@ -145,8 +146,10 @@ def fit(
 
     line, pantograph: as designed. tolerances: standard deviations of values before any record is seen, by
     kind. begin: where to go on, by default with the design. report, working: as ``Fitting.run`` takes them.
+    What is found does not depend on the number of cores: steps magnify what is rounded in another order.
     Raises InputError as ``problem`` does, and where a simulated pass diverges.
     """
-    ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
-    fitting = ready.fitting
-    return Fit(ready, fitting.run(fitting.start() if begin is None else begin, report, working))
+    with one_thread():
+        ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
+        fitting = ready.fitting
+        return Fit(ready, fitting.run(fitting.start() if begin is None else begin, report, working))

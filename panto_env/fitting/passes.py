@@ -101,7 +101,7 @@ class Passes:
         whole = sorted(set(range(len(variants))) - set(late))
         for catenary in dict.fromkeys(variants[k].catenary for k in whole):
             own = [k for k in whole if variants[k].catenary == catenary]
-            shares += [(share, None) for share in _shares(own, cores() if catenary == first else 1)]
+            shares += [(share, None) for share in _shares(own)]
         self._side_by_side(shares, variants, found)
         if late:
             of_late = _shares(sorted(late, key=lambda k: steps[k]))
@@ -173,7 +173,10 @@ class Passes:
         )
 
 
-def _shares(which: Sequence[int], least: int = 1) -> list[list[int]]:
-    """Numbers of variants in shares of even size, at most as many as a plant has lanes; ``least`` shares."""
-    count = min(len(which), max(least, -(-len(which) // LANES)))
+def _shares(which: Sequence[int]) -> list[list[int]]:
+    """Numbers of variants in shares of even size, at most as many as a plant has lanes.
+
+    Whatever the number of cores: lanes that are computed together round together.
+    """
+    count = -(-len(which) // LANES)
     return [share.tolist() for share in np.array_split(which, count)] if count else []

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
+from panto_env.base.machine import on_cores
 from panto_env.fitting.fit import fit
 from panto_env.fitting.plots import plot_fit
 from panto_env.fitting.problem import problem
@@ -12,6 +14,8 @@ from panto_env.fitting.values import TOLERANCES
 
 from .test_problem import moved
 
+FEW = ("tensions", "droppers")
+"""Values whose fit is quick, and differs by rounding."""
 WRONG = 0.15
 """Position error (m): less than the search's grid."""
 
@@ -135,3 +139,13 @@ def test_a_search_of_half_a_span_is_far_enough(record, design, pantograph):
     assert problem([moved(record, 12.3)], design, pantograph, free=("tensions",)).shifts[0] == pytest.approx(
         -12.3, abs=0.3
     )
+
+
+def test_a_fit_does_not_depend_on_the_number_of_cores(record, design, pantograph, coarse):
+    """Neither shares of the passes nor sums of the linear algebra do: steps would magnify their rounding."""
+    with on_cores(1), threadpool_limits(1, "blas"):
+        one = fit([record], design, pantograph, free=FEW)
+    with threadpool_limits(2, "blas"):
+        two = fit([record], design, pantograph, free=FEW)
+    np.testing.assert_array_equal(two.solution.state.x, one.solution.state.x)
+    np.testing.assert_array_equal(two.solution.covariance, one.solution.covariance)
