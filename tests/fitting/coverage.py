@@ -195,15 +195,33 @@ def table(folder: Path) -> Iterator[str]:
     """Rows of a table in Markdown: coverage and errors by line, what is wrong, and the number of passes."""
     yield f"| {' | '.join(HEADINGS)} |"
     yield f"| --- | --- |{' ---: |' * (len(HEADINGS) - 2)}"
-    for (line, number, passes), own in groups(folder):
+    for line, number, passes, own in _rows(folder):
         cells = []
         for kind, scale in SCALES.items():
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
         unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
-        cells = [LINES[line], model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
+        cells = [line, model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
+
+
+def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
+    """Lines, number of what is wrong, number of passes, and what was found of these.
+
+    Where lines of all kinds were tried: also of them together, and of the fits that call themselves good.
+    """
+    together: dict[tuple[int, int], list[list[Any]]] = {}
+    for (line, number, passes), own in groups(folder):
+        yield LINES[line], number, passes, own
+        together.setdefault((number, passes), []).append(own)
+    for (number, passes), kinds in together.items():
+        if len(kinds) == len(LINES):
+            own = [each for kind in kinds for each in kind]
+            yield "both", number, passes, own
+            good = [each for each in own if each["settled"] and min(each["as_noise"]) >= WHITE]
+            if good:
+                yield "both, settled and like noise", number, passes, good
 
 
 def diagnosed(folder: Path) -> Iterator[str]:

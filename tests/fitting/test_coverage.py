@@ -18,6 +18,7 @@ def test_medians_and_shares_inside_are_counted_by_line_model_and_passes(tmp_path
         "seed": 0,
         "passes": 3,
         "wrong": "nothing",
+        "settled": True,
         "as_noise": [0.5, 0.3],
         "tensions": [[1e-4, 1e-4], [-3e-4, 1e-4]],
         "droppers": [[1e-3, 1e-3], [2e-3, 1e-3], [-3e-3, 1e-3], [1e-3, 1e-3]],
@@ -35,6 +36,20 @@ def test_medians_and_shares_inside_are_counted_by_line_model_and_passes(tmp_path
     assert right == f"| uniform | right | 3 | 2 | {cells}"
     cells = "0.02, 50 % | 1.5, 50 % | 4, 100 % | 20, 100 % | 0.01, 100 % | 0 % |"
     assert drift == f"| uniform | wrong: drift | 3 | 1 | {cells}"
+
+
+def test_lines_of_all_kinds_are_counted_together_and_fits_that_call_themselves_good(tmp_path):
+    names = ("tensions", "droppers", "supports", "damping", "unevenness")
+    row = {"seed": 0, "passes": 3, "wrong": "nothing", "settled": True, "as_noise": [0.5]}
+    good = row | {"line": "uniform"} | {name: [[1e-3, 1e-3]] for name in names}
+    bad = row | {"line": "section"} | {name: [[3e-3, 1e-3]] for name in names}
+    (tmp_path / "uniform-nothing-3.json").write_text(json.dumps([good]))
+    (tmp_path / "section-nothing-3.json").write_text(json.dumps([bad | {"settled": False}]))
+    cells = [[cell.strip() for cell in each.strip("|").split("|")] for each in list(table(tmp_path))[4:]]
+    assert [each[:5] for each in cells] == [
+        ["both", "right", "3", "2", "0.2, 50 %"],
+        ["both, settled and like noise", "right", "3", "1", "0.1, 100 %"],
+    ]
 
 
 def test_what_later_passes_show_is_counted(tmp_path):
