@@ -11,7 +11,8 @@ import numpy as np
 from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .fit import WHITE, Fit
+from .doubts import doubts
+from .fit import Fit
 from .measured import BANDS
 from .values import Value
 
@@ -38,11 +39,6 @@ def knowledge(fit: Fit, records: str) -> Stored:
     fitting, before = fit.problem.fitting, fit.before
     design, count = fitting.values.design, len(fitting.values)
     values = tuple(along(each, before) for each in fitting.values.all)
-    notes = []
-    if not fit.solution.settled:
-        notes.append(f"The fit to {records} has not settled.")
-    if min(white.probability for white in fit.whiteness) < WHITE:
-        notes.append(f"What the fit to {records} left is not like noise.")
     begin, end = fit.problem.stretch
     return Stored(
         name=records,
@@ -53,7 +49,7 @@ def knowledge(fit: Fit, records: str) -> Stored:
         covariance=fit.solution.covariance[:count, :count],
         compared=(begin + before, end + before),
         noise=np.median(fit.solution.state.noise, axis=0),
-        notes=tuple(notes),
+        notes=tuple(f"Fit to {records}: {doubt}" for doubt in doubts(fit)),
     )
 
 

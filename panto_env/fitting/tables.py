@@ -9,11 +9,10 @@ import numpy as np
 
 from ..base.table import Alarm, Table
 from ..terminal import number
+from .doubts import doubts
 from .fit import INTERVAL, WHITE, Fit, Found
 from .values import FREE
 
-STRANGE = 0.3
-"""Share of a force that is left, by standard deviation, from which on the fit is called wrong. Own choice."""
 NAMES = {
     "tensions": "tensions",
     "droppers": "lengths of droppers",
@@ -113,7 +112,7 @@ def rows_of(found: Sequence[Found], before: float = 0.0) -> list[dict[str, Any]]
 
 
 def remarks(fit: Fit) -> list[str]:
-    """Sentences on what the records cannot tell, or tell only together."""
+    """Sentences on what the records cannot tell, or tell only together, and why the fit is less sure."""
     found = []
     for kind in FREE:
         own = fit.of_kind(kind)
@@ -123,27 +122,7 @@ def remarks(fit: Fit) -> list[str]:
             found.append(f"{what}: the records tell {told or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
-    strange = [
-        part.name
-        for part, (before, after) in zip(fit.parts, fit.left, strict=True)
-        if after > STRANGE * before
-    ]
-    if strange:
-        found.append(
-            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or "
-            "its positions may be wrong by half a span or more; the values mean nothing then."
-        )
-    unlike = [
-        part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
-    ]
-    if unlike:
-        found.append(
-            f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
-            "intervals are too narrow."
-        )
-    if not fit.solution.settled:
-        found.append("The fit has not settled; intervals are not to be relied on.")
-    return [*fit.problem.notes, *found]
+    return [*found, *doubts(fit)]
 
 
 def _signed(each: Found, *values: float) -> list[str]:

@@ -11,6 +11,7 @@ from panto_env.catalog import load_catenary
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.fit import fit
 from panto_env.fitting.problem import problem
+from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
 from panto_env.metrics.spans import FIRST_SETTLED
@@ -211,6 +212,9 @@ def test_a_tolerance_of_tensions_beyond_what_one_grid_bears_is_refused(record, d
         problem([record], design, pantograph, tolerances={"tensions": 0.3})
 
 
-def test_a_record_of_another_line_is_called_strange(record, pantograph):
+def test_a_record_of_another_line_is_called_strange_in_the_file_of_the_fit_too(record, pantograph):
     found = fit([record], load_catenary("re250"), pantograph, free=("tensions",))
     assert any(note.startswith("The fit explains little of") for note in remarks(found))
+    assert any(
+        note.startswith("Fit to May: The fit explains little of") for note in knowledge(found, "May").notes
+    )
