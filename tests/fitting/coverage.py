@@ -211,17 +211,18 @@ def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
 
     Where lines of all kinds were tried: also of them together, and of the fits that call themselves good.
     """
-    together: dict[tuple[int, int], list[list[Any]]] = {}
+    together: dict[tuple[int, int], dict[str, list[Any]]] = {}
     for (line, number, passes), own in groups(folder):
         yield LINES[line], number, passes, own
-        together.setdefault((number, passes), []).append(own)
+        together.setdefault((number, passes), {})[LINES[line]] = own
     for (number, passes), kinds in together.items():
         if len(kinds) == len(LINES):
-            own = [each for kind in kinds for each in kind]
-            yield "both", number, passes, own
-            good = [each for each in own if each["settled"] and min(each["as_noise"]) >= WHITE]
-            if good:
-                yield "both, settled and like noise", number, passes, good
+            kinds["both"] = [each for own in kinds.values() for each in own]
+            yield "both", number, passes, kinds["both"]
+            for name, own in kinds.items():
+                good = [each for each in own if each["settled"] and min(each["as_noise"]) >= WHITE]
+                if good:
+                    yield f"{name}, settled and like noise", number, passes, good
 
 
 def diagnosed(folder: Path) -> Iterator[str]:
@@ -256,8 +257,8 @@ def main() -> None:
             row = judge(seed, given.passes, given.wrong, given.line, given.diagnose)
             write(path, [*(other for other in known(path) if other["seed"] != seed), row])
             print(f"line {seed + 1} of {given.lines}", flush=True)
-    for row in (*table(given.folder), "", *diagnosed(given.folder)):
-        print(row)
+    for text in (*table(given.folder), "", *diagnosed(given.folder)):
+        print(text)
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ def test_lines_of_all_kinds_are_counted_together_and_fits_that_call_themselves_g
     cells = [[cell.strip() for cell in each.strip("|").split("|")] for each in list(table(tmp_path))[4:]]
     assert [each[:5] for each in cells] == [
         ["both", "right", "3", "2", "0.2, 50 %"],
+        ["uniform, settled and like noise", "right", "3", "1", "0.1, 100 %"],
         ["both, settled and like noise", "right", "3", "1", "0.1, 100 %"],
     ]
 
