@@ -94,7 +94,7 @@ def measured(piece: Piece, offset: float, stretch: tuple[float, float], span: fl
     begin, end = max(stretch[0], float(position[0])), min(stretch[1], float(position[-1]))
     if end - begin < 3 * span:
         raise InputError(
-            f"Run '{piece.run}' has only {max(end - begin, 0.0):.0f} m behind the spans in which a pass "
+            f"It has only {max(end - begin, 0.0):.0f} m behind the spans in which a pass "
             f"settles; a fit takes at least three spans ({3 * span:.0f} m) there: give a longer record."
         )
     inside = (position >= begin) & (position <= end)
@@ -102,8 +102,8 @@ def measured(piece: Piece, offset: float, stretch: tuple[float, float], span: fl
     away = float(np.abs(speed / piece.speed - 1).max())
     if away > CHANGES:
         raise InputError(
-            f"In run '{piece.run}' the speed differs by up to {100 * away:.1f} % from its mean, and a fit "
-            f"takes at most {100 * CHANGES:g} %; give a part of it at one speed."
+            f"Its speed differs by up to {100 * away:.1f} % from the mean, and a fit takes at most "
+            f"{100 * CHANGES:g} %; give a part of it at one speed."
         )
     place = np.arange(begin, end, piece.speed / PER_SECOND)
     return Measured(piece, place, offset, max(piece.speed / (LONGEST * span), 0.2))

@@ -93,7 +93,7 @@ def test_force_is_read_at_the_place_with_offset_and_shift():
 
 
 def test_a_stretch_that_is_too_short_is_refused():
-    with pytest.raises(InputError, match=r"Run 'a' has only 179 m .* at least three spans \(180 m\)"):
+    with pytest.raises(InputError, match=r"It has only 179 m .* at least three spans \(180 m\)"):
         taken(piece(), (160.0, 339.0))
     assert isinstance(taken(piece(), (160.0, 341.0)), Measured)
     with pytest.raises(InputError, match="has only 0 m"):

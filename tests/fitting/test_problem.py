@@ -198,12 +198,12 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     (piece,) = record.pieces
     half = len(piece.force) // 2
     short = replace(piece, position=piece.position[:half], force=piece.force[:half])
-    with pytest.raises(InputError, match=r"No record can be compared\. run is left out: Run '' has only 0 m"):
+    with pytest.raises(InputError, match=r"No record can be compared\. run is left out: It has only 0 m"):
         problem([replace(record, pieces=(short,))], design, pantograph)
     both = problem(
         [record, replace(record, name="b", pieces=(short,))], design, pantograph, free=("tensions",)
     )
-    assert both.notes[0].startswith("b is left out: Run '' has only")
+    assert both.notes[0].startswith("b is left out: It has only")
     assert len(both.fitting.parts) == 1
 
 
