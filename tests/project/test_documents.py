@@ -48,6 +48,8 @@ RULES = (
     Rule("panto drift", "of two fits, which take minutes; tests/fitting/test_drift.py has made-up ones"),
     Rule("panto diagnose month3-220.csv", "of a fit; tests/diagnosis/test_measured_passes.py has one"),
     Rule("panto fit", f"{MINUTES}; tests/fitting/test_commands.py has short ones"),
+    Rule("panto simulate --catenary found.toml", "of a fit; tests/fitting/test_fitted_line.py has one"),
+    Rule("panto compare month1-220.csv", "of a fitted line's run; tests/records/test_compare.py has others"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
     Rule("panto oracle --stored", "as it stands", ""),
     Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
