@@ -90,7 +90,8 @@ def problem(
             try:
                 own = measured(piece, offset, (stretch[0], end), alignment.mean_length)
             except InputError as error:
-                notes.append(f"{name} is left out: {error}")
+                of_run = f" (run '{piece.run}')" if piece.run else ""
+                notes.append(f"{name}{of_run} is left out: {error}")
                 continue
             facts = line, pantograph, condition, piece.speed, min(end + END, distance), spans
             fine = Passes(*facts, NUMERICS)

@@ -201,9 +201,13 @@ def table(folder: Path) -> Iterator[str]:
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
-        unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
+        unlike = np.mean([_unlike_noise(each) for each in own])
         cells = [line, model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
+
+
+def _unlike_noise(row: dict[str, Any]) -> bool:
+    return bool(min(row["as_noise"]) < WHITE)
 
 
 def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
@@ -220,7 +224,7 @@ def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
             kinds["both"] = [each for own in kinds.values() for each in own]
             yield "both", number, passes, kinds["both"]
             for name, own in kinds.items():
-                good = [each for each in own if each["settled"] and min(each["as_noise"]) >= WHITE]
+                good = [each for each in own if each["settled"] and not _unlike_noise(each)]
                 if good:
                     yield f"{name}, settled and like noise", number, passes, good
 

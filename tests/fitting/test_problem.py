@@ -204,6 +204,9 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
         [record, replace(record, name="b", pieces=(short,))], design, pantograph, free=("tensions",)
     )
     assert both.notes[0].startswith("b is left out: It has only")
+    named = replace(record, name="b", pieces=(replace(short, run="May"),))
+    notes = problem([record, named], design, pantograph, free=("tensions",)).notes
+    assert notes[0].startswith("b (run 'May') is left out: It has only")
     assert len(both.fitting.parts) == 1
 
 
