@@ -24,6 +24,7 @@ from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
 from .cache import cache_folder, kernel_hash
 from .columns import Columns
+from .compile import inlined
 from .packed import ADDRESS, PackedType, array_form, open_packed, words_of
 
 TILE = 32
@@ -93,6 +94,22 @@ def _packed_at(form: PackedType) -> Any:
     return packed_at
 
 
+def in_tile(part: Callable[..., Any], form: PackedType, results: PackedType) -> Any:
+    """A function of kernels that calls ``part(packed, results, lane)`` in a lane of a tile.
+
+    It takes the address of packed arguments and that of packed results, each with how far apart tiles are
+    there (bytes), then the tile and the lane in it.
+    """
+    packed_at, results_at = _packed_at(form), _packed_at(results)
+
+    @inlined
+    def call(arguments: int, apart: int, answers: int, answers_apart: int, tile: int, lane: int) -> None:
+        (result,) = open_packed(results_at(answers + tile * answers_apart))
+        part(packed_at(arguments + tile * apart), result, lane)
+
+    return call
+
+
 def compiled(
     part: Callable[..., Any], form: PackedType, results: PackedType, capability: tuple[int, int]
 ) -> str:
@@ -102,13 +119,12 @@ def compiled(
     """
     from numba import cuda
 
-    packed_at, results_at = _packed_at(form), _packed_at(results)
+    call = in_tile(part, form, results)
 
     def each_lane(arguments: int, apart: int, answers: int, answers_apart: int, lanes: int) -> None:
         tile, lane = cuda.blockIdx.x, cuda.threadIdx.x
         if tile * cuda.blockDim.x + lane < lanes:
-            (result,) = open_packed(results_at(answers + tile * answers_apart))
-            part(packed_at(arguments + tile * apart), result, lane)
+            call(arguments, apart, answers, answers_apart, tile, lane)
 
     signature = types.void(*[types.int64] * 5)
     bounds = TILE, BLOCKS
