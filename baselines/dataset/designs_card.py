@@ -84,10 +84,10 @@ def card(settings: DesignsSettings, shown: Sequence[Column], table: Any, made_of
         *_endings("ending", "ended early", kinds["ending"], table.num_rows),
         *_endings("accuracy_warning", "with a warning", kinds["accuracy_warning"], table.num_rows),
         "",
-        "Caveats: simulated, not measured; grid and time step are chosen so that figures are within 1 % of "
-        "converged ones up to 70 % of the wave speed, where no warning says more; a model that is fitted to "
-        "it knows nothing beyond the ranges, nor of other kinds of line (stitched, with pre-sag), several "
-        "pantographs, wind, or irregularity.",
+        "Caveats: simulated, not measured; grid and time step are chosen so that the standard deviation is "
+        "within 1 % of its converged value up to 95 % of the wave speed, where no warning says more; a model "
+        "that is fitted to it knows nothing beyond the ranges, nor of other kinds of line (stitched, with "
+        "pre-sag), several pantographs, wind, or irregularity.",
         "",
     ]
     return "\n".join(lines)

@@ -24,8 +24,9 @@ class Numerics(Settings):
 
     accuracy: Literal["full", "fast"] = Field(
         "full",
-        description='"full": grid and time step for which figures of a flexible line are within 1 % of '
-        'converged ones up to 95 % of the wave speed; "fast": coarser ones, two to four times as fast',
+        description='"full": grid and time step for which the standard deviation of the force on a flexible '
+        'line is within 1 % of its converged value up to 95 % of the wave speed; "fast": coarser ones, '
+        'which are faster (docs/validation.md has all bounds)',
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one for the accuracy"
