@@ -17,6 +17,7 @@ from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..metrics.low_pass import zero_phase_low_pass
 from ..records.record import Piece
+from ..records.samples import local_speed
 
 PER_SECOND = 50.0
 """Places at which forces are compared, per second of travel."""
@@ -98,7 +99,7 @@ def measured(piece: Piece, offset: float, stretch: tuple[float, float], span: fl
             f"settles; a fit takes at least three spans ({3 * span:.0f} m) there: give a longer record."
         )
     inside = (position >= begin) & (position <= end)
-    speed = np.gradient(position[inside], piece.time_step)
+    speed = local_speed(piece)[inside]  # of samples one by one it would be that of the odometer's steps
     away = float(np.abs(speed / piece.speed - 1).max())
     if away > CHANGES:
         raise InputError(

@@ -178,16 +178,8 @@ class Misfit:
 
         begins: as ``Passes.forces`` takes them. grid: of the passes.
         """
-        from scipy.fft import set_workers  # slow to import
-
         passes: Passes = getattr(part, grid)
-        place = part.measured.place
-        forces = passes.forces(variants, begins)
-        if part.low_passed:
-            forces = low_pass(forces, passes.time_step)
-        with set_workers(cores()):
-            smooth = zero_phase_low_pass(forces, passes.time_step)
-        return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))
+        return forces_at(passes, variants, part.measured.place, part.low_passed, begins)
 
     @property
     def bands(self) -> list[Index]:
@@ -197,3 +189,20 @@ class Misfit:
     def weights(self, noise: Array) -> list[Array]:
         """1 / variance of each coefficient, (coefficients,), of each part; noise: (parts, bands) (N)."""
         return [1 / own[band] ** 2 for own, band in zip(noise, self.bands, strict=True)]
+
+
+def forces_at(
+    passes: Passes, variants: Sequence[Variant], place: Array, low_passed: bool, begins: Array | None = None
+) -> Array:
+    """Forces of variants, low-passed at 20 Hz without delay, at places (m), (n, places) (N).
+
+    low_passed: whether they go through EN 50317's filter before. begins: as ``Passes.forces`` takes them.
+    """
+    from scipy.fft import set_workers  # slow to import
+
+    forces = passes.forces(variants, begins)
+    if low_passed:
+        forces = low_pass(forces, passes.time_step)
+    with set_workers(cores()):
+        smooth = zero_phase_low_pass(forces, passes.time_step)
+    return between(smooth, (place - passes.position[0]) / (passes.speed * passes.time_step))

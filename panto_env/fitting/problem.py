@@ -15,20 +15,21 @@ from ..metrics.spans import FIRST_SETTLED
 from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
-from ..plant.line_condition import LineCondition, together
+from ..plant.line_condition import DrawnLine, LineCondition, together
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Piece, Record
 from ..records.samples import is_low_passed
 from .measured import Measured, measured
-from .misfit import Part
-from .passes import Passes
+from .misfit import Part, forces_at
+from .passes import Passes, Variant
 from .solve import Fitting
+from .start import rough_shift, spans_before
 from .values import AS_BUILT, TOLERANCES, USUAL, Design, Values
 
 END = 20.0
-"""Way (m) before the end of a record that is not compared: a low-pass without delay does not know how it goes
-on."""
+"""Way (m) at both ends of a record that is not compared: a low-pass without delay does not know how it goes
+on, and the record's place is not known yet."""
 BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
 NUMERICS = Numerics()
@@ -37,8 +38,12 @@ MOST_LOOSE = 0.1
 """Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
 """Coefficients of forces for each value from which on noise is known well enough. Own choice."""
-SEARCH, GRID = 0.5, 0.25
-"""Spans on each side within which a record's place is searched, and the distance of the trials (m)."""
+LEFT_OUT = "is left out"
+"""What a note says of a piece that is not compared."""
+DESIGNED = LineCondition()
+"""Of passes that only tell where others begin."""
+SEARCH = 0.5
+"""Spans on each side within which a record's place is searched."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Problem:
     """What a fit begins with."""
 
     fitting: Fitting
-    first_span: int  # spans of the line before the simulated ones
+    first_span: int  # spans of the line before the simulated ones; below 0: these begin before it
     stretch: tuple[float, float]  # of the simulated line that is compared (m)
     shifts: tuple[float, ...]  # by how much positions of each record were short, roughly (m)
     notes: tuple[str, ...]
@@ -74,26 +79,28 @@ def problem(
     """
     if not isinstance(line, FlexibleCatenaryData):
         raise InputError(f"Only flexible lines can be fitted, and '{line.name}' is none; name another line.")
+    _refuse_twice(records)
     pieces = [piece for record in records for piece in record.pieces]
-    first_span, spans, distance = _spans(pieces, line)
+    first_span, spans, distance = _spans(pieces, line, pantograph)
     alignment = line.alignment(spans)
-    offset = float(line.alignment(first_span + 1).support(first_span)) if first_span else 0.0
+    offset = first_span * line.span_length if first_span else 0.0
     stretch = (float(alignment.support(FIRST_SETTLED - 1)), distance)
     condition = _condition(line, free, tolerances, first_span, spans)
-    parts, notes, shifts = [], [], []
+    parts, shifts = [], []
+    notes = [f"{record.name}: {note}" for record in records for note in record.notes]
     droppers: Array = np.zeros(0)
     supports: Array = np.zeros(0)
     for record in records:
         for k, piece in enumerate(record.pieces):
             name = f"{record.name}, piece {k + 1}" if len(record.pieces) > 1 else record.name
-            end = min(float(piece.position[-1]) - offset - END, distance)
+            own_stretch = _inner(piece, offset, stretch)
             try:
-                own = measured(piece, offset, (stretch[0], end), alignment.mean_length)
+                own = measured(piece, offset, own_stretch, alignment.mean_length)
             except InputError as error:
                 of_run = f" (run '{piece.run}')" if piece.run else ""
-                notes.append(f"{name}{of_run} is left out: {error}")
+                notes.append(f"{name}{of_run} {LEFT_OUT}: {error}")
                 continue
-            facts = line, pantograph, condition, piece.speed, min(end + END, distance), spans
+            facts = line, pantograph, condition, piece.speed, min(own_stretch[1] + END, distance), spans
             fine = Passes(*facts, NUMERICS)
             droppers, supports = fine.droppers, fine.supports
             fair = Passes(*facts, Numerics(accuracy="fast", window=fine.window))
@@ -104,7 +111,9 @@ def problem(
     begin = min(float(part.measured.place[0]) for part in parts)
     end = max(float(part.measured.place[-1]) for part in parts)
     design = Design(line, pantograph, condition, spans, droppers, supports, first_span)
-    values = Values(design, free, (-1.0, end + BEYOND * alignment.mean_length), dict(tolerances or {}))
+    span = alignment.mean_length
+    freed = begin - (FIRST_SETTLED - 1) * span - 1.0, end + BEYOND * span
+    values = Values(design, free, freed, dict(tolerances or {}))
     told = sum(len(part.measured.kept) for part in parts)
     if told < ENOUGH * len(values):
         notes.append(
@@ -122,13 +131,45 @@ def problem(
     fitting = Fitting(parts, values)
     shifted = []
     for part, force in zip(parts, fitting.as_designed(), strict=True):
-        shift = _shift(part.measured, force, SEARCH * alignment.mean_length)
+        shift, _ = rough_shift(part.measured, force, SEARCH * span)
         shifts.append(shift)
-        shifted.append(replace(part, measured=replace(part.measured, offset=part.measured.offset - shift)))
+        shifted.append(replace(part, measured=_moved(part.measured, shift, stretch, span)))
     return Problem(Fitting(shifted, values), first_span, (begin, end), tuple(shifts), tuple(notes))
 
 
-def _spans(pieces: Sequence[Piece], line: FlexibleCatenaryData) -> tuple[int, int, float]:
+def _refuse_twice(records: Sequence[Record]) -> None:
+    """Refuse a pass that is there twice: it would count as two, and intervals would be too narrow."""
+    known: dict[bytes, str] = {}
+    for record in records:
+        for piece in record.pieces:
+            force = piece.force.tobytes()
+            if force in known:
+                raise InputError(
+                    f"{known[force]} and {record.name} hold the same forces; give each pass once, or "
+                    "intervals would be too narrow."
+                )
+            known[force] = record.name
+
+
+def _inner(piece: Piece, offset: float, stretch: tuple[float, float]) -> tuple[float, float]:
+    """Of a stretch of the simulated line (m), what a piece tells of, without its ends."""
+    position = piece.position - offset
+    return max(stretch[0], float(position[0]) + END), min(float(position[-1]) - END, stretch[1])
+
+
+def _moved(own: Measured, shift: float, stretch: tuple[float, float], span: float) -> Measured:
+    """A piece moved along the line (m); so far that an end of it would be compared, less of it is."""
+    offset = own.offset - shift
+    if abs(shift) <= 0.5 * END:
+        return replace(own, offset=offset)
+    begin, end = _inner(own.piece, offset, stretch)
+    within = max(begin, float(own.place[0])), min(end, float(own.place[-1]))
+    return measured(own.piece, offset, within, span)
+
+
+def _spans(
+    pieces: Sequence[Piece], line: FlexibleCatenaryData, pantograph: PantographData
+) -> tuple[int, int, float]:
     """Spans before the simulated ones, their number, and the way along them (m)."""
     low = min(float(piece.position[0]) for piece in pieces)
     high = max(float(piece.position[-1]) for piece in pieces)
@@ -140,15 +181,29 @@ def _spans(pieces: Sequence[Piece], line: FlexibleCatenaryData) -> tuple[int, in
         )
     if line.ends:
         return 0, line.spans, min(high, whole.length)
-    before = max(0, math.floor(whole.in_spans(low)) - (FIRST_SETTLED - 1))
+
+    def as_designed(piece: Piece, own: Measured) -> Array:
+        distance = float(own.place[-1]) + END
+        spans = _spans_of(line, distance)
+        passes = Passes(line, pantograph, DESIGNED, piece.speed, distance, spans, Numerics(accuracy="fast"))
+        variant = Variant(line, DrawnLine(DESIGNED), pantograph, pantograph.static_force)
+        force: Array = forces_at(passes, [variant], own.place, is_low_passed(piece))[0]
+        return force
+
+    before = spans_before(pieces, line, as_designed)
     distance = high - before * line.span_length
-    spans = math.ceil(whole.in_spans(distance)) + CLEAR + 4
+    spans = _spans_of(line, distance)
     if spans > MOST_SPANS:
         raise InputError(
             f"The records cover {spans - CLEAR:,} spans, and a fit takes up to {MOST_SPANS - CLEAR:,}; give "
             "parts of them."
         )
     return before, max(spans, 3), distance
+
+
+def _spans_of(line: FlexibleCatenaryData, distance: float) -> int:
+    """Spans of a line on which a train runs so far (m) without feeling its end."""
+    return math.ceil(float(line.alignment().in_spans(distance))) + CLEAR + 4
 
 
 def _condition(
@@ -186,14 +241,3 @@ def _within(condition: LineCondition, first_span: int, spans: int) -> LineCondit
             numbers = [(row[0] - first_span, *row[1:]) for row in rows]
             moved[name] = tuple(row for row in numbers if 1 <= row[0] <= most)
     return condition.model_copy(update=moved)
-
-
-def _shift(own: Measured, force: Array, reach: float) -> float:
-    """By how much positions (m) are short, roughly: where measured and simulated force are most alike."""
-    trials = GRID * np.arange(-math.floor(reach / GRID), math.floor(reach / GRID) + 1)
-    expected = own.coefficients(force)
-    scores = []
-    for trial in trials:
-        seen = own.coefficients(own.force(float(trial)))
-        scores.append(float(seen @ expected / np.linalg.norm(seen)))
-    return float(trials[int(np.argmax(scores))])

@@ -10,7 +10,8 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.fit import fit
-from panto_env.fitting.problem import problem
+from panto_env.fitting.problem import END, problem
+from panto_env.fitting.start import LEAD
 from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
@@ -159,28 +160,80 @@ def test_a_position_error_is_found(record, ready, design, pantograph, by):
 
 
 def test_a_record_from_far_along_the_line(record, ready, design, pantograph):
-    """40 spans on, a record is held against as many spans of a line, which are named by their place on it."""
-    far = problem([moved(record, 40 * 60.0)], design, pantograph, free=("droppers",))
-    assert far.first_span == 40 - (FIRST_SETTLED - 1)
+    """60 spans on, a record is held against a pass that begins before it, of spans named by their place."""
+    far = problem([moved(record, 60 * 60.0)], design, pantograph, free=("droppers",))
+    assert far.first_span == 60 - LEAD
     assert far.shifts == (0.0,)
     own, same = far.fitting.parts[0].measured, ready.fitting.parts[0].measured
-    skipped = 60.0 * (FIRST_SETTLED - 1)
-    assert own.place[0] == pytest.approx(skipped, abs=0.5)
+    skipped = 60.0 * LEAD
+    assert own.place[0] == pytest.approx(skipped + END, abs=0.5)
     np.testing.assert_allclose(own.piece.position - own.offset - skipped, same.piece.position)
     names = [value.name for value in far.fitting.values.all]
-    assert names[0] == f"dropper 1 of span {far.first_span + 1}"
+    # Nine spans before what is compared, which begins 20 m behind the first support.
+    assert names[0] == f"dropper 4 of span {60 - FIRST_SETTLED + 2}"
+
+
+def test_a_measured_pass_has_settled_at_the_line_s_first_support(pantograph, design):
+    """A record that begins there is held against whichever it is like: a start at rest, or a settled pass."""
+    whole = record_of(line_condition=BUILT, seed=SEED, spans=90, distance=64 * 60.0)
+    (piece,) = whole.pieces
+    for spans, first_span in ((0, 0), (50, -LEAD)):
+        begin = 60.0 * spans
+        inside = (piece.position >= begin) & (piece.position < begin + 60 * SPANS)
+        cut = replace(piece, position=piece.position[inside] - begin, force=piece.force[inside])
+        found = problem([replace(whole, pieces=(cut,))], design, pantograph, free=("droppers",))
+        assert found.first_span == first_span
+        assert found.before == 60.0 * first_span
+        # What is compared has its places on the line.
+        begins = 60.0 * (FIRST_SETTLED - 1) if spans == 0 else END
+        assert found.before + found.stretch[0] == pytest.approx(begins, abs=1.0)
+
+
+def test_a_pass_that_is_given_twice_is_refused(record, design, pantograph):
+    with pytest.raises(InputError, match="run and copy hold the same forces; give each pass once"):
+        problem([record, replace(record, name="copy")], design, pantograph)
+
+
+def test_positions_in_whole_decimetres_are_no_changes_of_speed(record, design, pantograph):
+    (piece,) = record.pieces
+    coarse = replace(piece, position=np.round(piece.position, 1))
+    (part,) = problem(
+        [replace(record, pieces=(coarse,))], design, pantograph, free=("tensions",)
+    ).fitting.parts
+    assert part.measured.piece is coarse
+
+
+def test_what_a_record_says_of_itself_is_among_the_notes(record, design, pantograph):
+    said = replace(record, name="May", notes=("Positions are the integral of the speed.",))
+    found = problem([said], design, pantograph, free=("tensions",))
+    assert found.notes == ("May: Positions are the integral of the speed.",)
+
+
+@pytest.mark.parametrize("short_of", [25.0, -25.0])
+def test_an_end_of_a_record_is_not_compared_though_it_is_moved(pantograph, design, short_of):
+    """A record from the midst of a line, whose odometer is 25 m off."""
+    whole = record_of(line_condition=BUILT, seed=SEED, spans=90, distance=74 * 60.0)
+    (piece,) = whole.pieces
+    inside = piece.position >= 60.0 * 60
+    cut = replace(piece, position=piece.position[inside] - short_of, force=piece.force[inside])
+    found = problem([replace(whole, pieces=(cut,))], design, pantograph, free=("tensions",))
+    assert found.shifts[0] == pytest.approx(short_of, abs=0.5)
+    own = found.fitting.parts[0].measured
+    position = own.piece.position - own.offset
+    assert position[0] + END - 1e-6 <= own.place[0]
+    assert own.place[-1] <= position[-1] - END + 1e-6
 
 
 def test_what_was_found_before_is_moved_with_the_spans(record, design, pantograph):
-    """A line of which dropper 3 of span 50 is known to be broken, and others outside what is simulated."""
+    """A line of which dropper 3 of span 70 is known to be broken, and others outside what is simulated."""
     known = LineCondition(
-        broken_droppers=((50, 3), (5, 1)), raised_supports=((45, 0.004), (2, 0.01), (400, 0.01)), ice=0.1
+        broken_droppers=((70, 3), (5, 1)), raised_supports=((65, 0.004), (2, 0.01), (400, 0.01)), ice=0.1
     )
     line = design.model_copy(update={"as_found": known})
-    far = problem([moved(record, 40 * 60.0)], line, pantograph, free=("tensions",))
+    far = problem([moved(record, 60 * 60.0)], line, pantograph, free=("tensions",))
     condition = far.fitting.values.design.condition
-    assert condition.broken_droppers == ((50 - far.first_span, 3),)
-    assert condition.raised_supports == ((45 - far.first_span, 0.004),)
+    assert condition.broken_droppers == ((70 - far.first_span, 3),)
+    assert condition.raised_supports == ((65 - far.first_span, 0.004),)
     assert condition.ice == 0.1
     assert condition.tension_scatter == TOLERANCES["tensions"]
 
