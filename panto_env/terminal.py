@@ -30,23 +30,38 @@ from .base.shown import harmless
 from .base.standard_streams import say
 from .base.table import Alarm, Table
 
+OUTPUTS = "panto_env.outputs"
+"""Where a command keeps the output files that it was given."""
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
 
 
-def writable(suffixes: Sequence[str], *, announced: bool = True) -> Callable[[str | None], str | None]:
+def writable(
+    suffixes: Sequence[str], *, announced: bool = True
+) -> Callable[[typer.Context, str | None], str | None]:
     """Callback that checks an option for an output file before the command begins its work.
 
     announced: whether it also announces that an existing file will be overwritten.
     """
 
-    def check(path: str | None) -> str | None:
+    def check(context: typer.Context, path: str | None) -> str | None:
         if path is not None:
             check_output(path, suffixes)
+            _refuse_twice(context, path)
             if announced:
                 announce_overwriting(path)
         return path
 
     return check
+
+
+def _refuse_twice(context: typer.Context, path: str) -> None:
+    """Raise InputError where another output of the same command has this file."""
+    known = context.meta.setdefault(OUTPUTS, set())
+    if Path(path).resolve() in known:
+        raise InputError(
+            f"{path} is named for two outputs, of which only one would be left; name two files."
+        )
+    known.add(Path(path).resolve())
 
 
 def announce_overwriting(path: str | Path) -> None:

@@ -84,6 +84,7 @@ def fit(
     """
     from ..catalog import load_catenary, load_pantograph
     from ..fitting import fit as fits
+    from ..fitting.fitted_line import check_design
     from ..fitting.kept import SUFFIX, identity_of, kept
     from ..fitting.kept import keep as keep_state
     from ..fitting.values import USUAL
@@ -93,6 +94,8 @@ def fit(
     tolerances = by_kind(tolerance or [])
     records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
+    if output is not None:
+        check_design(line, names)
     target = output or values or keep
     place = None if target is None else Path(f"{target}{SUFFIX}")
     settings = {"free": list(names), "tolerances": tolerances}
@@ -122,8 +125,6 @@ def fit(
             report=report,
             working=working,
         )
-    if place is not None:
-        place.unlink(missing_ok=True)
     every = ", ".join(file.name for file in files)
     with written_last() as later:
         if output is not None:
@@ -148,6 +149,8 @@ def fit(
 
             later(save, plot_fit(found, f"{every}: {riding.name} on {design.name}"), plot)
         _print(found, json)
+    if place is not None:  # only now: where a file could not be written, the steps are not lost
+        place.unlink(missing_ok=True)
 
 
 def by_kind(given: list[str]) -> dict[str, float]:

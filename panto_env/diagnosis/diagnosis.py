@@ -104,9 +104,9 @@ def diagnose_records(
     known: what the fit knows. false_alarms, classifier: as of ``diagnose``. seed: of the healthy passes,
     which are simulated. Raises InputError as ``measured_passes`` does.
     """
-    passes, reference = measured_passes(records, known, seed)
+    passes, reference, notes = measured_passes(records, known, seed)
     found = judge(passes, Healthy.of(reference), false_alarms, classifier)
-    return replace(found, notes=(*known.notes, *found.notes))
+    return replace(found, notes=(*notes, *known.notes, *found.notes))
 
 
 def judge(

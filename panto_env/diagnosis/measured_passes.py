@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import ValidationError
@@ -18,12 +19,12 @@ from ..base.errors import InputError
 from ..base.units import from_kmh
 from ..fitting.misfit import OWN, Part
 from ..fitting.problem import Problem, problem
-from ..fitting.stored import Stored, along
+from ..fitting.stored import Stored, turned
 from ..fitting.values import FREE
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
-from ..records.record import Record
+from ..records.record import Piece, Record
 from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
 
 HEALTHY = 24
@@ -32,8 +33,10 @@ AWAY = 0.5
 """Way (m) on each side of a record's rough place within which it is placed finely."""
 
 
-def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> tuple[Passes, Passes]:
-    """Records to be judged, and healthy passes over the line of a fit, as ``Passes`` hold them.
+def measured_passes(
+    records: Sequence[Record], known: Stored, seed: int = 0
+) -> tuple[Passes, Passes, tuple[str, ...]]:
+    """Records to be judged, and healthy passes over the line of a fit, as ``Passes`` hold them; and notes.
 
     seed: of the healthy passes' lines and noise. Raises InputError for records of different speeds, for those
     that cover no two spans of the fit's stretch together, and as ``fitting.problem.problem`` does.
@@ -47,7 +50,8 @@ def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> 
         ) from error
     kinds = [kind for kind in FREE if any(value.kind == kind for value in known.values)]
     tolerances = {value.kind: value.tolerance for value in known.values if value.kind != "unevenness"}
-    ready = problem(records, line, pantograph, free=kinds, tolerances=tolerances)
+    single, notes = _one_piece_each(records, known.compared)
+    ready = problem(single, line, pantograph, free=kinds, tolerances=tolerances)
     parts, plan = ready.fitting.parts, ready.fitting.values.design
     speeds = np.array([part.measured.piece.speed_kmh for part in parts])
     if np.ptp(speeds) > SPEEDS * speeds.min():
@@ -76,7 +80,31 @@ def measured_passes(records: Sequence[Record], known: Stored, seed: int = 0) -> 
         measured.append(healthy.mean(axis=0) + away)
     facts = (alignment, first, per_span, plan.droppers + before, line.name, from_kmh(float(speeds.mean())))
     wave_speed = line.contact_wire.wave_speed
-    return Passes(np.array(measured), *facts, wave_speed), Passes(healthy, *facts, wave_speed)
+    both = Passes(np.array(measured), *facts, wave_speed), Passes(healthy, *facts, wave_speed)
+    return *both, (*notes, *ready.of_records)
+
+
+def _one_piece_each(
+    records: Sequence[Record], stretch: tuple[float, float]
+) -> tuple[list[Record], list[str]]:
+    """Records of one piece each, that which covers most of a stretch (m), and what is left out so."""
+    found, notes = [], []
+    for record in records:
+        if len(record.pieces) > 1:
+            ways = [_within(piece, stretch) for piece in record.pieces]
+            longest = record.pieces[int(np.argmax(ways))]
+            notes.append(
+                f"{record.name} has {len(ways)} pieces, and a diagnosis takes one of each record: that from "
+                f"{longest.position[0]:,.0f} to {longest.position[-1]:,.0f} m."
+            )
+            record = replace(record, pieces=(longest,))
+        found.append(record)
+    return found, notes
+
+
+def _within(piece: Piece, stretch: tuple[float, float]) -> float:
+    """How much of a stretch a piece covers (m)."""
+    return float(min(piece.position[-1], stretch[1]) - max(piece.position[0], stretch[0]))
 
 
 def _places(
@@ -96,14 +124,20 @@ def _places(
 
 
 def _values(ready: Problem, known: Stored) -> tuple[Array, Array]:
-    """What a fit knows of the values of another one: means, (values,), and covariance."""
+    """What a fit knows of the values of another one: means, (values,), and covariance.
+
+    Of values that are not in it only the tolerance is known.
+    """
     numbers = {value.name: number for number, value in enumerate(known.values)}
-    own = [numbers.get(along(value, ready.before).name, -1) for value in ready.fitting.values.all]
-    there = np.flatnonzero(np.array(own) >= 0)
-    which = np.array(own)[there]
-    mean, covariance = np.zeros(len(own)), np.zeros((len(own), len(own)))
-    mean[there] = known.difference[which]
-    covariance[np.ix_(there, there)] = known.covariance[np.ix_(which, which)]
+    values = ready.fitting.values.all
+    own = np.array([numbers.get(value.name, -1) for value in values])
+    there = np.flatnonzero(own >= 0)
+    mean, covariance = np.zeros(len(own)), np.diag(ready.fitting.values.tolerances**2)
+    mean[there] = known.difference[own[there]]
+    covariance[np.ix_(there, there)] = known.covariance[np.ix_(own[there], own[there])]
+    if ready.before:
+        turn = turned(values, ready.before)
+        mean, covariance = turn @ mean, turn @ covariance @ turn.T
     return mean, covariance
 
 

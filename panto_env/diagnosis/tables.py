@@ -53,7 +53,8 @@ def verdict(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.changed:
         sentences.append(
             f"The whole line differs from its healthy state, {diagnosis.level:.1f} times as much as healthy "
-            "passes do from one another: lost tension, or a pantograph unlike theirs."
+            "passes do from one another: lost tension, a pantograph unlike theirs, or, of a measured record, "
+            "noisier sensors or an odometer that is off."
         )
     if diagnosis.findings:
         count = len(diagnosis.findings)

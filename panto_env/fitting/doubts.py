@@ -10,7 +10,7 @@ STRANGE = 0.3
 
 def doubts(fit: Fit) -> list[str]:
     """Sentences on what makes the values of a fit, or their intervals, wrong or less reliable."""
-    found = list(fit.problem.notes)
+    found = [*fit.problem.of_records, *fit.problem.notes]
     strange = [
         part.name
         for part, (before, after) in zip(fit.parts, fit.left, strict=True)

@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..catalog.loader import file_of, parse_catenary, parse_pantograph
+from ..catalog.loader import file_of, load_catenary, parse_catenary, parse_pantograph
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from .fit import INTERVAL, Fit, Found
 from .toml_text import with_table, with_value
 from .values import damping_of
 
 SUFFIXES = (".toml",)
 """Of the files that a line and a pantograph are written to."""
+
+
+def check_design(base: str | Path, free: Sequence[str]) -> None:
+    """Refuse a design in whose text fitted values could not be written, before hours are spent on them.
+
+    base: as of ``write_line``; free: kinds of values. Raises InputError with what to change.
+    """
+    text = file_of(base).read_text(encoding="utf-8-sig")
+    line = load_catenary(base)
+    if isinstance(line, FlexibleCatenaryData) and "damping" in free:
+        for name, value in line.damping:
+            if value > 0:
+                text = with_value(text, f"damping.{name}", value, "", str(base))
+    with_table(text, "as_found", {}, {}, str(base))
 
 
 def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> None:
@@ -79,6 +94,9 @@ def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     for each in found["supports"]:
         number = each.value.index[0] + 1 + before
         raised[number] = raised.get(number, 0.0) + each.difference
+    # What stands before the line's first support has no place in its file.
+    cut = {place: wrong for place, wrong in cut.items() if place[0] >= 1}
+    raised = {number: wrong for number, wrong in raised.items() if number >= 1}
     values: dict[str, Any] = dict(known)
     if found["droppers"]:
         values["miscut_droppers"] = [[*place, wrong] for place, wrong in _rounded(cut)]

@@ -38,8 +38,6 @@ MOST_LOOSE = 0.1
 """Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
 """Coefficients of forces for each value from which on noise is known well enough. Own choice."""
-LEFT_OUT = "is left out"
-"""What a note says of a piece that is not compared."""
 DESIGNED = LineCondition()
 """Of passes that only tell where others begin."""
 SEARCH = 0.5
@@ -54,7 +52,8 @@ class Problem:
     first_span: int  # spans of the line before the simulated ones; below 0: these begin before it
     stretch: tuple[float, float]  # of the simulated line that is compared (m)
     shifts: tuple[float, ...]  # by how much positions of each record were short, roughly (m)
-    notes: tuple[str, ...]
+    of_records: tuple[str, ...]  # notes on the records: what was left out, corrected or assumed
+    notes: tuple[str, ...]  # on what is fitted to them
 
     @property
     def before(self) -> float:
@@ -86,8 +85,8 @@ def problem(
     offset = first_span * line.span_length if first_span else 0.0
     stretch = (float(alignment.support(FIRST_SETTLED - 1)), distance)
     condition = _condition(line, free, tolerances, first_span, spans)
-    parts, shifts = [], []
-    notes = [f"{record.name}: {note}" for record in records for note in record.notes]
+    parts, notes, shifts = [], [], []
+    of_records = [f"{record.name}: {note}" for record in records for note in record.notes]
     droppers: Array = np.zeros(0)
     supports: Array = np.zeros(0)
     for record in records:
@@ -98,7 +97,7 @@ def problem(
                 own = measured(piece, offset, own_stretch, alignment.mean_length)
             except InputError as error:
                 of_run = f" (run '{piece.run}')" if piece.run else ""
-                notes.append(f"{name}{of_run} {LEFT_OUT}: {error}")
+                of_records.append(f"{name}{of_run} is left out: {error}")
                 continue
             facts = line, pantograph, condition, piece.speed, min(own_stretch[1] + END, distance), spans
             fine = Passes(*facts, NUMERICS)
@@ -107,7 +106,7 @@ def problem(
             coarse = Passes(*facts, Numerics(accuracy="fast"))
             parts.append(Part(own, fine, fair, coarse, name, is_low_passed(piece)))
     if not parts:
-        raise InputError(f"No record can be compared. {' '.join(notes)}")
+        raise InputError(f"No record can be compared. {' '.join(of_records)}")
     begin = min(float(part.measured.place[0]) for part in parts)
     end = max(float(part.measured.place[-1]) for part in parts)
     design = Design(line, pantograph, condition, spans, droppers, supports, first_span)
@@ -134,7 +133,8 @@ def problem(
         shift, _ = rough_shift(part.measured, force, SEARCH * span)
         shifts.append(shift)
         shifted.append(replace(part, measured=_moved(part.measured, shift, stretch, span)))
-    return Problem(Fitting(shifted, values), first_span, (begin, end), tuple(shifts), tuple(notes))
+    said = tuple(of_records), tuple(notes)
+    return Problem(Fitting(shifted, values), first_span, (begin, end), tuple(shifts), *said)
 
 
 def _refuse_twice(records: Sequence[Record]) -> None:

@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from .doubts import doubts
 from .fit import Fit
 from .measured import BANDS
-from .values import Value
+from .values import WAVES, Value
 
 ARRAYS = ("difference", "covariance", "noise")
 
@@ -39,14 +39,18 @@ def knowledge(fit: Fit, records: str) -> Stored:
     fitting, before = fit.problem.fitting, fit.before
     design, count = fitting.values.design, len(fitting.values)
     values = tuple(along(each, before) for each in fitting.values.all)
+    difference, covariance = fit.solution.state.x[:count], fit.solution.covariance[:count, :count]
+    if before:
+        turn = turned(values, -before)
+        difference, covariance = turn @ difference, turn @ covariance @ turn.T
     begin, end = fit.problem.stretch
     return Stored(
         name=records,
         line=design.catenary.model_dump_json(),
         pantograph=design.pantograph.model_dump_json(),
         values=values,
-        difference=fit.solution.state.x[:count],
-        covariance=fit.solution.covariance[:count, :count],
+        difference=difference,
+        covariance=covariance,
         compared=(begin + before, end + before),
         noise=np.median(fit.solution.state.noise, axis=0),
         notes=tuple(f"Fit to {records}: {doubt}" for doubt in doubts(fit)),
@@ -93,11 +97,21 @@ def stored(path: str | Path) -> Stored:
 
 def along(value: Value, before: float) -> Value:
     """A value with its place on the line, of which some way lies before what was simulated (m)."""
-    if value.place is not None:
-        return replace(value, place=value.place + before)
-    # Waves have their phase where the simulated spans begin.
-    apart = value.kind == "unevenness" and before
-    return replace(value, name=f"{value.name} from {before:g} m on") if apart else value
+    return value if value.place is None else replace(value, place=value.place + before)
+
+
+def turned(values: Sequence[Value], further: float) -> Array:
+    """Matrix, (values, values), that gives waves the phase of a place that lies further along (m).
+
+    Waves have their phase where the simulated spans begin, in a file where the line does.
+    """
+    turn = np.eye(len(values))
+    for k, value in enumerate(values):
+        if value.kind == "unevenness" and value.index[1] == 0:  # the cosine, which its sine follows
+            angle = 2 * np.pi * further / WAVES[value.index[0]][0]
+            cosine, sine = np.cos(angle), np.sin(angle)
+            turn[k : k + 2, k : k + 2] = [[cosine, sine], [-sine, cosine]]
+    return turn
 
 
 def _pair(numbers: Sequence[float]) -> tuple[float, float]:

@@ -23,7 +23,8 @@ def with_value(text: str, key: str, value: Any, source: str, name: str) -> str:
     changed, count = line.subn(lambda _: entry, text[begin:end])
     made = text[:begin] + changed + text[end:]
     if count != 1 or _read(made).get(key) != value:
-        raise InputError(f"{key} of {name} cannot be replaced: write it in a line of its own.")
+        where = f", in a table [{section}]" if section else ""
+        raise InputError(f"{key} of {name} cannot be replaced: write {last} in a line of its own{where}.")
     return made
 
 

@@ -79,7 +79,8 @@ class Values:
     ) -> None:
         """stretch: of the simulated line in which droppers and supports are freed (m).
 
-        tolerances: instead of those of ``TOLERANCES``. Raises InputError for a name that cannot be freed.
+        tolerances: instead of those of ``TOLERANCES``. Raises InputError for a name that cannot be freed, and
+        where the line has nothing of what is freed.
         """
         unknown = [name for name in free if name not in FREE]
         if unknown or not free:
@@ -89,6 +90,10 @@ class Values:
         self.all: tuple[Value, ...] = tuple(
             value for name in FREE if name in free for value in getattr(self, f"_{name}")(stretch)
         )
+        if not self.all:
+            raise InputError(
+                f"Line '{design.catenary.name}' has nothing to free of {', '.join(free)}; free other values."
+            )
 
     def __len__(self) -> int:
         return len(self.all)

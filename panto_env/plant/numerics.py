@@ -26,7 +26,7 @@ class Numerics(Settings):
         "full",
         description='"full": grid and time step for which the standard deviation of the force on a flexible '
         'line is within 1 % of its converged value up to 95 % of the wave speed; "fast": coarser ones, '
-        'which are faster (docs/validation.md has all bounds)',
+        "which are faster (docs/validation.md has all bounds)",
     )
     time_step: Annotated[float, Between(1e-6, 10, "s")] | None = Field(
         None, description="time step (s), instead of the one for the accuracy"

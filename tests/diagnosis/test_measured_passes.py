@@ -60,7 +60,7 @@ def test_healthy_passes_surround_a_healthy_record(healthy_record, known, monkeyp
     """Where sensors have neither gain nor zero, as this record's."""
     monkeypatch.setitem(OWN, "gain", 0.0)
     monkeypatch.setitem(OWN, "zero", 0.0)
-    own, healthy = measured_passes([healthy_record], known)
+    own, healthy, _ = measured_passes([healthy_record], known)
     assert healthy.force.shape == (HEALTHY, own.force.shape[1])
     assert own.first == 9
     assert own.position[0] == pytest.approx(540.0)
@@ -89,10 +89,28 @@ def test_sensors_with_a_gain_and_a_zero_of_their_own_make_no_line_unhealthy(know
 
 
 def test_the_mean_of_records_is_judged(healthy_record, known):
-    own, healthy = measured_passes([healthy_record, record_of({}, seed=4, position_error=0.0)], known)
+    own, healthy, _ = measured_passes([healthy_record, record_of({}, seed=4, position_error=0.0)], known)
     assert own.force.shape[0] == 2
     both, one = (np.std(force - healthy.force.mean(axis=0)) for force in (own.force.mean(axis=0), own.force))
     assert both < 0.9 * one
+
+
+def test_a_record_with_a_gap_is_judged_by_its_longest_piece_and_says_so(healthy_record, known):
+    (piece,) = healthy_record.pieces
+    ends = piece.position < 610.0, piece.position > 630.0
+    pieces = tuple(replace(piece, position=piece.position[at], force=piece.force[at]) for at in ends)
+    own, _, notes = measured_passes([replace(healthy_record, pieces=pieces)], known)
+    assert own.position[0] == pytest.approx(660.0)
+    assert "250 km/h has 2 pieces, and a diagnosis takes one of each record: that from 630 to 900 m." in notes
+
+
+def test_what_is_left_out_and_what_a_record_says_is_among_the_notes(healthy_record, known):
+    (piece,) = healthy_record.pieces
+    short = replace(piece, position=piece.position[:3000], force=piece.force[:3000], run="May")
+    given = [replace(healthy_record, notes=("Said.",)), replace(healthy_record, name="b", pieces=(short,))]
+    found = diagnose_records(given, known)
+    assert found.notes[0] == "250 km/h: Said."
+    assert found.notes[1].startswith("b (run 'May') is left out: It has only")
 
 
 def test_what_cannot_be_judged_is_refused(healthy_record, known):

@@ -173,3 +173,36 @@ def test_bad_input_is_one_line_and_status_2(others, arguments, words):
     assert words in " ".join(done.stderr.split())
     assert done.stderr.strip().count("\n") == 0
     assert names(others) == before
+
+
+def undamped(text):
+    """A line's text without its damping, which stands at its end."""
+    return text[: text.index("[damping]")]
+
+
+def test_a_line_that_could_not_be_written_is_refused_before_the_fit(folder):
+    inline = "damping.alpha = 0.05\ndamping.beta = 1e-4\n" + undamped(text_of(LINE))
+    (folder / "mine.toml").write_text(inline, encoding="utf-8")
+    asked = ("--line", "mine.toml", "--pantograph", PANTOGRAPH, "--free", "damping", "--output", "found.toml")
+    done = panto("fit", "run.csv", *asked, cwd=folder)
+    assert done.returncode == 2
+    assert "write alpha in a line of its own, in a table [damping]" in done.stderr
+    assert names(folder) == ["mine.toml", "run.csv"]
+
+
+def test_one_file_for_two_outputs_is_refused(folder):
+    done = panto(
+        "fit", "run.csv", *TENSIONS, "--output", "a.toml", "--pantograph-output", "./a.toml", cwd=folder
+    )
+    assert done.returncode == 2
+    assert "a.toml is named for two outputs, of which only one would be left" in done.stderr
+    assert names(folder) == ["run.csv"]
+
+
+def test_a_line_without_what_is_freed_is_refused(folder):
+    none = undamped(text_of(LINE)) + "[damping]\nalpha = 0.0\nbeta = 0.0\n"
+    (folder / "mine.toml").write_text(none, encoding="utf-8")
+    asked = ("--line", "mine.toml", "--pantograph", PANTOGRAPH, "--free", "damping")
+    done = panto("fit", "run.csv", *asked, cwd=folder)
+    assert done.returncode == 2
+    assert "has nothing to free of damping; free other values" in done.stderr

@@ -8,8 +8,8 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.fitting.drift import SMALLER, drift
-from panto_env.fitting.stored import Stored, store, stored
-from panto_env.fitting.values import Value
+from panto_env.fitting.stored import Stored, store, stored, turned
+from panto_env.fitting.values import WAVES, Value
 
 from ..command import panto
 
@@ -169,3 +169,24 @@ def test_the_command_as_json_and_without_changes(folder):
     )
     assert loose.returncode == 2
     assert "--tolerance of unknown 'dropper'" in loose.stderr
+
+
+def test_waves_of_spans_that_begin_elsewhere_are_the_same_waves():
+    """As cosine and sine from the line's start on, and from 137 m on."""
+    values = [
+        Value("unevenness", f"{part} {k}", "mm", 1e3, 1e-3, None, (k, part))
+        for k in range(len(WAVES))
+        for part in (0, 1)
+    ]
+    values.insert(0, dropper(3))
+    parts = np.random.default_rng(0).standard_normal(len(values))
+    seen = turned(values, 137.0) @ parts
+    assert seen[0] == parts[0]
+    x = np.linspace(0.0, 50.0, 7)
+    for k, (length, _) in enumerate(WAVES):
+
+        def height(of, at, k=k, length=length):
+            angle = 2 * np.pi * at / length
+            return of[2 * k + 1] * np.cos(angle) + of[2 * k + 2] * np.sin(angle)
+
+        np.testing.assert_allclose(height(seen, x), height(parts, x + 137.0), atol=1e-12)

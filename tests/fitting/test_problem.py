@@ -206,7 +206,7 @@ def test_positions_in_whole_decimetres_are_no_changes_of_speed(record, design, p
 def test_what_a_record_says_of_itself_is_among_the_notes(record, design, pantograph):
     said = replace(record, name="May", notes=("Positions are the integral of the speed.",))
     found = problem([said], design, pantograph, free=("tensions",))
-    assert found.notes == ("May: Positions are the integral of the speed.",)
+    assert found.of_records == ("May: Positions are the integral of the speed.",)
 
 
 @pytest.mark.parametrize("short_of", [25.0, -25.0])
@@ -256,9 +256,9 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     both = problem(
         [record, replace(record, name="b", pieces=(short,))], design, pantograph, free=("tensions",)
     )
-    assert both.notes[0].startswith("b is left out: It has only")
+    assert both.of_records[0].startswith("b is left out: It has only")
     named = replace(record, name="b", pieces=(replace(short, run="May"),))
-    notes = problem([record, named], design, pantograph, free=("tensions",)).notes
+    notes = problem([record, named], design, pantograph, free=("tensions",)).of_records
     assert notes[0].startswith("b (run 'May') is left out: It has only")
     assert len(both.fitting.parts) == 1
 
