@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -15,17 +14,18 @@ from ..metrics.spans import FIRST_SETTLED
 from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
-from ..plant.line_condition import DrawnLine, LineCondition, together
+from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Piece, Record
 from ..records.samples import is_low_passed
+from .condition import condition_of
 from .measured import Measured, measured
 from .misfit import Part, forces_at
 from .passes import Passes, Variant
 from .solve import Fitting
 from .start import rough_shift, spans_before
-from .values import AS_BUILT, TOLERANCES, USUAL, Design, Values
+from .values import USUAL, Design, Values
 
 END = 20.0
 """Way (m) at both ends of a record that is not compared: a low-pass without delay does not know how it goes
@@ -34,10 +34,15 @@ BEYOND = 1.5
 """Spans beyond what is compared in which droppers and supports are freed, too: their waves meet the train."""
 NUMERICS = Numerics()
 """Of simulated passes."""
-MOST_LOOSE = 0.1
-"""Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
 ENOUGH = 2.0
 """Coefficients of forces for each value from which on noise is known well enough. Own choice."""
+FILTERED = (
+    "was low-passed before it was recorded, and is taken as behind EN 50317's filter, which delays a force: "
+    "behind another one tensions are off by 0.2 % and more, and a healthy line may be called changed; give "
+    "unfiltered forces where there are any."
+)
+"""What is said of a force whose filter is not known: two filters' forces, moved along the line, are too much
+alike to tell them apart by."""
 DESIGNED = LineCondition()
 """Of passes that only tell where others begin."""
 SEARCH = 0.5
@@ -84,7 +89,7 @@ def problem(
     alignment = line.alignment(spans)
     offset = first_span * line.span_length if first_span else 0.0
     stretch = (float(alignment.support(FIRST_SETTLED - 1)), distance)
-    condition = _condition(line, free, tolerances, first_span, spans)
+    condition = condition_of(line, free, tolerances, first_span, spans)
     parts, notes, shifts = [], [], []
     of_records = [f"{record.name}: {note}" for record in records for note in record.notes]
     droppers: Array = np.zeros(0)
@@ -105,6 +110,8 @@ def problem(
             fair = Passes(*facts, Numerics(accuracy="fast", window=fine.window))
             coarse = Passes(*facts, Numerics(accuracy="fast"))
             parts.append(Part(own, fine, fair, coarse, name, is_low_passed(piece)))
+            if parts[-1].low_passed:
+                of_records.append(f"{name} {FILTERED}")
     if not parts:
         raise InputError(f"No record can be compared. {' '.join(of_records)}")
     begin = min(float(part.measured.place[0]) for part in parts)
@@ -204,40 +211,3 @@ def _spans(
 def _spans_of(line: FlexibleCatenaryData, distance: float) -> int:
     """Spans of a line on which a train runs so far (m) without feeling its end."""
     return math.ceil(float(line.alignment().in_spans(distance))) + CLEAR + 4
-
-
-def _condition(
-    line: FlexibleCatenaryData,
-    free: Sequence[str],
-    tolerances: Mapping[str, float] | None,
-    first_span: int,
-    spans: int,
-) -> LineCondition:
-    """The condition in which each lane draws a line of its own: the plant makes room for what is freed."""
-    known = TOLERANCES | dict(tolerances or {})
-    if known["tensions"] > MOST_LOOSE:
-        raise InputError(
-            f"The tolerance of tensions must be at most {MOST_LOOSE:g} of the design's, not "
-            f"{known['tensions']:g}; name a line whose design is nearer."
-        )
-    room = LineCondition(
-        irregularity=1.0 if "unevenness" in free else 0.0,
-        wear_depth=AS_BUILT.wear_depth if "unevenness" in free else 0.0,
-        wear_wavelength=AS_BUILT.wear_wavelength,
-        dropper_scatter=TOLERANCES["droppers"],
-        support_scatter=TOLERANCES["supports"],
-        tension_scatter=known["tensions"] if "tensions" in free else 0.0,
-    )
-    return room if line.as_found is None else together(_within(line.as_found, first_span, spans), room)
-
-
-def _within(condition: LineCondition, first_span: int, spans: int) -> LineCondition:
-    """A condition of a line, of which so many spans behind some first ones are simulated."""
-    moved: dict[str, Any] = {}
-    for name in LineCondition.model_fields:
-        rows = getattr(condition, name)
-        if isinstance(rows, tuple):  # all begin with the number of a span, or of the support at its end
-            most = spans - 1 if name == "raised_supports" else spans
-            numbers = [(row[0] - first_span, *row[1:]) for row in rows]
-            moved[name] = tuple(row for row in numbers if 1 <= row[0] <= most)
-    return condition.model_copy(update=moved)

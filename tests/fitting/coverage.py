@@ -4,6 +4,7 @@ python -m tests.fitting.coverage FOLDER --lines 100           # goes on where it
 python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong, in one of several ways
 python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
 python -m tests.fitting.coverage FOLDER --line section        # lines whose spans differ, each drawn
+python -m tests.fitting.coverage FOLDER --line midst          # records from the midst of a line
 python -m tests.fitting.coverage FOLDER --diagnose            # and what later passes over these lines show
 python -m tests.fitting.coverage FOLDER --table
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,7 +42,11 @@ NOISE, RATE, PLACE = 2.0, 500.0, 0.3
 """Of sensors: rms of a sample (N), samples a second, and standard deviation of the odometer's error (m)."""
 GAIN, ZERO = 0.015, 2.5
 """Standard deviations of the sensors' gain and zero (N): half of what a fit expects."""
-LINES = ("uniform", "section")
+LINES = ("uniform", "section", "midst")
+"""Kinds of lines: all spans alike, spans that differ, and records from the midst of the first kind."""
+BOTH = LINES[:2]
+MIDST = 64
+"""Spans that trains have run before records from the midst of a line."""
 HEADINGS = (
     "line",
     "model",
@@ -59,7 +65,7 @@ WRONG = ("nothing", "grid", "damping", "pantograph", "drift")
 
 def design_of(seed: int, line: str) -> FlexibleCatenaryData:
     """A line as designed: the uniform one, or a section drawn by seed."""
-    if line == "uniform":
+    if line in ("uniform", "midst"):
         found = load_catenary(LINE)
         assert isinstance(found, FlexibleCatenaryData)
         return found
@@ -86,8 +92,9 @@ def records_of(
     line, pantograph = design_of(seed, kind), load_pantograph(PANTOGRAPH)
     faster = line.contact_wire.wave_speed / design_of(0, "uniform").contact_wire.wave_speed
     settings: dict[str, Any] = {}
+    before = MIDST if kind == "midst" else 0
     if not line.ends:
-        settings = {"spans": SPANS + BEYOND, "distance": SPANS * line.span_length}
+        settings = {"spans": before + SPANS + BEYOND, "distance": (before + SPANS) * line.span_length}
     if wrong == "damping":
         damping = line.damping
         other = damping.model_copy(update={"alpha": 2 * damping.alpha, "beta": 2 * damping.beta})
@@ -119,6 +126,10 @@ def records_of(
             name=f"{speed:g} km/h",
         )
         (piece,) = record.pieces
+        if before:
+            inside = piece.position > before * line.span_length
+            piece = replace(piece, position=piece.position[inside], force=piece.force[inside], height=None)
+            record = replace(record, pieces=(piece,))
         gain, zero = (GAIN, ZERO) * random.standard_normal(2)
         piece.force[:] = (1 + gain) * piece.force + zero
         if wrong == "drift":
@@ -134,16 +145,17 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     """
     records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
-    spans = line.spans if line.ends else SPANS + BEYOND
+    first = found.problem.first_span
+    spans = line.spans if line.ends else (MIDST if kind == "midst" else 0) + SPANS + BEYOND
     droppers = len(dropper_positions(line, spans))
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
     assert true.heights is not None
-    phases = 2 * np.pi * true.waves[:, 2]
+    phases = 2 * np.pi * (true.waves[:, 2] + found.before * true.waves[:, 1])
     truths: dict[str, Any] = {
         "tensions": np.array(true.tensions) - 1,
-        "droppers": true.scatter,
-        "supports": true.heights,
+        "droppers": true.scatter[first * droppers // spans :],
+        "supports": true.heights[first:],
         "damping": dict.fromkeys([("alpha",), ("beta",)], 1.0 if wrong == "damping" else 0.0),
         "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
     }
@@ -220,7 +232,8 @@ def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
         yield LINES[line], number, passes, own
         together.setdefault((number, passes), {})[LINES[line]] = own
     for (number, passes), kinds in together.items():
-        if len(kinds) == len(LINES):
+        if set(BOTH) <= set(kinds):
+            kinds = {name: kinds[name] for name in BOTH}
             kinds["both"] = [each for own in kinds.values() for each in own]
             yield "both", number, passes, kinds["both"]
             for name, own in kinds.items():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ..documents import ROOT
-from .coverage import HEADINGS, SPEEDS, design_of, diagnosed, records_of, table
+from .coverage import HEADINGS, SPANS, SPEEDS, design_of, diagnosed, records_of, table
 from .later import LATER
 
 STORED = ROOT / "docs" / "records-coverage"
@@ -69,6 +69,13 @@ def test_records_are_those_of_sensors_on_lines_as_built(line):
     (drifting,) = records_of(0, 1, "drift", line)
     change = drifting.pieces[0].force - 1.03 * record.pieces[0].force
     assert np.abs(change).max() == pytest.approx(8.0, rel=1e-3)
+
+
+def test_records_from_the_midst_of_a_line_have_no_start_in_them():
+    (record,) = records_of(0, 1, "nothing", "midst")
+    (piece,) = record.pieces
+    assert piece.position[0] == pytest.approx(64 * 60.0, abs=1.0)
+    assert piece.length == pytest.approx(SPANS * 60.0, abs=2.0)
 
 
 def test_later_passes_have_other_sensors_and_defects():

@@ -15,6 +15,7 @@ from panto_env.fitting.start import LEAD
 from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
+from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.line_condition import LineCondition
 from panto_env.records.measured import measured
@@ -207,6 +208,15 @@ def test_what_a_record_says_of_itself_is_among_the_notes(record, design, pantogr
     said = replace(record, name="May", notes=("Positions are the integral of the speed.",))
     found = problem([said], design, pantograph, free=("tensions",))
     assert found.of_records == ("May: Positions are the integral of the speed.",)
+
+
+def test_a_filter_that_is_taken_for_granted_is_named(record, design, pantograph):
+    (piece,) = record.pieces
+    behind = replace(piece, force=low_pass(piece.force, piece.time_step))
+    found = problem([replace(record, pieces=(behind,))], design, pantograph, free=("tensions",))
+    (note,) = found.of_records
+    assert note.startswith("run was low-passed before it was recorded, and is taken as behind EN 50317's")
+    assert problem([record], design, pantograph, free=("tensions",)).of_records == ()
 
 
 @pytest.mark.parametrize("short_of", [25.0, -25.0])
