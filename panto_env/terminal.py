@@ -58,9 +58,7 @@ def _refuse_twice(context: typer.Context, path: str) -> None:
     """Raise InputError where another output of the same command has this file."""
     known = context.meta.setdefault(OUTPUTS, set())
     if Path(path).resolve() in known:
-        raise InputError(
-            f"{path} is named for two outputs, of which only one would be left; name two files."
-        )
+        raise InputError(f"{path} is named for two outputs, of which only one would be left; name two files.")
     known.add(Path(path).resolve())
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,25 +39,38 @@ TIME = Column(("time", "t"), {"s": 1.0, "ms": 1e-3}, "s")
 
 
 def read_columns(
-    path: str | Path, columns: Mapping[str, Column], units: Mapping[str, str] | None = None
+    path: str | Path,
+    columns: Mapping[str, Column],
+    units: Mapping[str, str] | None = None,
+    *,
+    other: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Columns by name, (n,) each, in SI units; lists of texts.
 
     Units are given in the header, as in ``y_p1 (mm)`` or ``force [N]``, or in ``units`` by column, which has
     priority. Other columns are ignored, and so are lines that are empty or begin with #. The separator is a
     comma, semicolon or tab. Where it is no comma, and no number has a decimal point, commas are decimal.
-    Raises InputError, naming line and column, for anything missing or not a number.
+    other: as in ``places_of``. Raises InputError, naming line and column, for anything missing or not a
+    number, and for more cells than headings, as where decimal commas stand between commas.
     """
     lines, separator = _lines(path)
     header, body = lines[0][1], lines[1:]
-    places = places_of(path, header, columns, units)
+    places = places_of(path, header, columns, units, other)
     used = {place for name, (place, _) in places.items() if not columns[name].text}
     points = any("." in cells[place] for _, cells in body for place in used if place < len(cells))
     decimal = "." if separator == "," or points else ","
+    # An empty cell may come from a separator at the line's end, but not where a comma may be decimal.
+    empty_ends = separator != "," or points
     values: dict[str, Any] = {
         name: [""] * len(body) if columns[name].text else np.empty(len(body)) for name in places
     }
     for row, (number, cells) in enumerate(body):
+        more = cells[len(header) :]
+        if any(map(str.strip, more)) or (more and not empty_ends):
+            raise InputError(
+                f"Line {number} of {path} has {len(cells)} cells under {len(header)} headings; where commas "
+                "are decimal marks, put semicolons between cells, and otherwise correct such lines."
+            )
         for name, (place, scale) in places.items():
             text = cells[place].strip() if place < len(cells) else ""
             if columns[name].text:
@@ -128,11 +141,17 @@ def _lines(path: str | Path) -> tuple[list[tuple[int, list[str]]], str]:
 
 
 def places_of(
-    path: str | Path, header: list[str], columns: Mapping[str, Column], units: Mapping[str, str] | None
+    path: str | Path,
+    header: list[str],
+    columns: Mapping[str, Column],
+    units: Mapping[str, str] | None,
+    other: Callable[[str], None] | None = None,
 ) -> dict[str, tuple[int, float]]:
     """Place of each column among the headings of a file, and scale of its unit to SI.
 
-    Raises InputError for a missing column, one that is there twice, and an unknown or missing unit.
+    other: is called with each heading that is no column's, in lower case and without unit, spaces, '_' and
+    '-', to refuse what must not be ignored. Raises InputError for a missing column, one that is there twice,
+    and an unknown or missing unit.
     """
     units = dict(units or {})
     unknown = [name for name in units if name not in columns]
@@ -144,6 +163,8 @@ def places_of(
         plain = re.sub(r"[\s_-]", "", match[1]).lower() if match else ""
         name = next((name for name, column in columns.items() if plain in column.spellings), None)
         if name is None or match is None:
+            if other is not None:
+                other(plain)
             continue
         if name in places:
             raise InputError(f"{path} has column {name} twice; keep one.")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ WAYS = {"m": 1.0, "km": 1e3}
 SPEEDS = {"km/h": 1 / METRES_PER_SECOND, "m/s": 1.0}
 ACCELERATIONS = {"m/s2": 1.0, "m/s²": 1.0, "m/s^2": 1.0, "g": 9.80665}
 NUMBERS = range(1, STRIPS + 1)
+_SENSOR = re.compile(r"(?:force|f|acceleration|a)(\d+)")
 
 
 def _optional(
@@ -49,12 +52,13 @@ def read(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
     """Columns of a record by name, (n,) each, in SI units; ``run`` a list of texts. Empty cells are nan.
 
     units: of columns whose heading has none. Raises InputError for a file that cannot be read, for a saved
-    run of `panto simulate`, for a cell that is not a number, and for units as ``read_columns`` does.
+    run of `panto simulate`, for a sensor whose number is not 1 to ``STRIPS``, for a cell that is not a
+    number, and for units and rows as ``read_columns`` does.
     """
     found = (
         _parquet(path, units)
         if Path(path).suffix.lower() == ".parquet"
-        else read_columns(path, COLUMNS, units)
+        else read_columns(path, COLUMNS, units, other=partial(_refuse_sensor, path))
     )
     if not found:
         raise InputError(
@@ -63,6 +67,22 @@ def read(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
     if len(next(iter(found.values()))) == 0:
         raise InputError(f"{path} has no samples; give a record with a row for each sample.")
     return found
+
+
+def _refuse_sensor(path: str | Path, heading: str) -> None:
+    """Raise InputError for a heading, as ``places_of`` gives it, of a sensor that would be left out."""
+    match = _SENSOR.fullmatch(heading)
+    if match is None:
+        return
+    what, whole = (
+        ("force", "their sum as one column force (N)")
+        if heading.startswith("f")
+        else ("acceleration", "their mean as one column acceleration_1 (m/s2)")
+    )
+    raise InputError(
+        f"Column {what}_{match[1]} of {path} is of no sensor that is read; number sensors from 1 to "
+        f"{STRIPS}, give more than {STRIPS} as {whole}, or rename the column if it is something else."
+    )
 
 
 def _parquet(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
@@ -82,7 +102,8 @@ def _parquet(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any
             "run, or write the run as .csv to judge it like a record."
         )
     values: dict[str, Any] = {}
-    for name, (place, scale) in places_of(path, table.column_names, COLUMNS, units).items():
+    places = places_of(path, table.column_names, COLUMNS, units, partial(_refuse_sensor, path))
+    for name, (place, scale) in places.items():
         values[name] = _cells(path, name, table.column(place), scale)
     return values
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.units import to_kmh
 from ..metrics.criterion import Criterion
 from ..metrics.labels import LABELS
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
@@ -23,7 +24,7 @@ from .samples import Samples
 from .shift import Shift, find_shift
 
 SAME_SPEED = 0.03
-"""Relative difference of speeds up to which a record is compared with a run. Own choice."""
+"""Relative difference of speeds, mean and local, up to which a record is compared with a run. Own choice."""
 STD, UPLIFT, HEIGHT = 20.0, 20.0, 20.0
 """Accepted deviations of σ (%), of the maximum uplift (mm) and of the contact point's range (mm)."""
 SOURCE = "EN 50318, recalled"
@@ -78,8 +79,8 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     """Hold a record against the evaluated spans of a run's first pantograph.
 
     shift: about what is to be added to the record's positions (m), if known; else it is searched within 1.5
-    spans. Raises InputError where the run ended early or is too short, the speeds differ by more than 3 %, or
-    the two have less than a span in common.
+    spans. Raises InputError where the run ended early or is too short, the two have less than a span in
+    common, or the speeds differ by more than 3 %, of the whole or of a second in the spans that both cover.
     """
     covered = run.spans()
     assert covered is not None  # it is for a choice of "all" only
@@ -163,15 +164,16 @@ def _spans(
     settled, position = samples.settled, samples.position
     numbers = run.alignment.span_of(np.array([begin + 1e-6, end - 1e-6]))
     found, own, other = [], [], []
-    ways = samples.speed * samples.step
+    compared = np.zeros(len(position), dtype=bool)
     for span in range(int(numbers[0]), int(numbers[1]) + 1):
         first, last = run.alignment.limits((span, span))
         here, there = (
             (position >= first) & (position < last) & settled,
             run.alignment.within(run.position, (span, span)),
         )
-        if ways[here].sum() < COVERED * (last - first):
+        if samples.way(here) < COVERED * (last - first):
             continue
+        compared |= here
         a, b = samples.filtered[here], filtered[there]
         own.append(a)
         other.append(b)
@@ -183,7 +185,20 @@ def _spans(
             "The record covers none of the run's evaluated spans without a gap; simulate a run along all "
             "that was recorded, or give a record without so many gaps."
         )
+    _check_speed(samples.speed[compared], run, found[0].begin, found[-1].end)
     return found, np.concatenate(own), np.concatenate(other)
+
+
+def _check_speed(speed: Array, run: Trajectory, begin: float, end: float) -> None:
+    """Raise InputError unless local speeds (m/s), (m,), from begin to end (m), are about the run's."""
+    away = float(np.abs(speed / run.speed - 1).max())
+    if away > SAME_SPEED:
+        low, high = to_kmh(float(speed.min())), to_kmh(float(speed.max()))
+        raise InputError(
+            f"The record's speed lies between {low:.1f} and {high:.1f} km/h from {begin:,.0f} to {end:,.0f} "
+            f"m, up to {100 * away:.1f} % from the run's {run.speed_kmh:.1f} km/h, where {100 * SAME_SPEED:g} "
+            "% are allowed; give a part of the record at one speed, and a run at that."
+        )
 
 
 def _heights(samples: Samples) -> Array:

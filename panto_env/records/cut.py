@@ -12,16 +12,13 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.record_columns import equal_step
 from .axes import Axes
+from .odometer import resets, rising, runs_back, standing
 from .record import Piece
 
 SHORTEST = 1.0
 """Pieces below this duration (s) are left out: EN 50317's low-pass settles within a fifth of it."""
-BACK = 1.0
-"""Way (m) up to which a position that falls is noise of the odometer; beyond, it was reset."""
-AHEAD = 3.0
-"""How many times as far as the speed explains a position may step forward, beside ``BACK``."""
-STANDING = 1.0
-"""Time (s) from which on a position that does not change means that the train stands."""
+RUNS_BACK = "the train runs back"
+"""Reason of the break at which a train turns back: positions are counted in one direction only."""
 
 
 @dataclass(frozen=True)
@@ -42,18 +39,20 @@ def cut(
     force: N, (n,), nan where missing; series: ``height`` and ``uplift`` (m), (n,), where recorded; raised: 1
     where the pantograph is up, (n,). Raises InputError where steps of time within a piece are not equal.
     """
-    standing = _standing(axes)
+    still = standing(axes.time, axes.position, axes.gap)
     down = np.zeros(len(force), dtype=bool) if raised is None else ~(raised > 0.5)
     empty = np.isnan(force) & ~down
-    reset = _resets(axes)
+    reset = resets(axes.time, axes.position, axes.step, axes.gap)
+    back = runs_back(axes.position, axes.gap | reset)
     breaks = [
         _between("samples are missing", axes, axes.gap),
         _between("the position jumps, as an odometer that is reset", axes, reset & ~axes.gap),
         _stretches("the force is missing", axes, empty),
         _stretches("the pantograph is down", axes, down),
-        _stretches("the train stands", axes, standing),
+        _stretches("the train stands", axes, still),
+        _stretches(RUNS_BACK, axes, back),
     ]
-    good = ~(standing | down | empty)
+    good = ~(still | back | down | empty)
     apart = axes.gap | reset | (good[1:] != good[:-1])
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(force)]
     parts = [slice(begin, end) for begin, end in pairwise(edges) if good[begin]]
@@ -72,7 +71,7 @@ def cut(
 def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part: slice) -> Piece:
     time, own = axes.time[part], {name: values[part] for name, values in series.items()}
     own = {name: values for name, values in own.items() if not np.isnan(values).all()}
-    position, forces = _rising(axes.position[part]), force[part]
+    position, forces = rising(axes.position[part]), force[part]
     step = axes.step if axes.over_place else equal_step(time, 2, "to be judged")
     if axes.over_place:
         from scipy.interpolate import PchipInterpolator  # slow to import; it keeps 0 N at 0 N
@@ -84,42 +83,6 @@ def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part
             {k: np.interp(equal, time, v) for k, v in own.items()},
         )
     return Piece(run, step, float(time[0]), position, forces, own.get("height"), own.get("uplift"))
-
-
-def _standing(axes: Axes) -> NDArray[np.bool_]:
-    """Samples at which the train stands, (n,)."""
-    still = np.concatenate([[False], (np.diff(axes.position) == 0) & ~axes.gap, [False]])
-    begins, ends = np.flatnonzero(still[1:] & ~still[:-1]), np.flatnonzero(~still[1:] & still[:-1])
-    found = np.zeros(len(axes.time), dtype=bool)
-    for begin, end in zip(begins, ends, strict=True):
-        if axes.time[end] - axes.time[begin] > STANDING:
-            found[begin : end + 1] = True
-    return found
-
-
-def _resets(axes: Axes) -> NDArray[np.bool_]:
-    """Whether the position jumps between a sample and the next, (n - 1,)."""
-    ways, steps = np.diff(axes.position), np.diff(axes.time)
-    usual = float(np.median(ways[ways > 0] / steps[ways > 0])) if (ways > 0).any() else 0.0
-    coarse = float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0  # steps of the odometer itself
-    return np.asarray((ways < -BACK) | (ways > AHEAD * max(usual * axes.step, coarse) + BACK) & ~axes.gap)
-
-
-def _rising(position: Array) -> Array:
-    """Positions (m), (n,), without the noise and the steps of an odometer: they rise from each sample on.
-
-    Between samples at which the position has grown it grows evenly; behind the last of them, as before it.
-    """
-    highest = np.maximum.accumulate(position)
-    new = np.flatnonzero(np.diff(highest, prepend=-np.inf) > 0)
-    if len(new) == len(position) or len(new) < 2:
-        return position
-    number = np.arange(len(position))
-    even = np.interp(number, new, highest[new])
-    first, last = new[0], new[-1]
-    rate = (highest[last] - highest[first]) / (last - first)
-    even[last:] = highest[last] + rate * (number[last:] - last)
-    return np.asarray(even)
 
 
 def _between(reason: str, axes: Axes, where: NDArray[np.bool_]) -> Break:

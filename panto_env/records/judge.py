@@ -34,6 +34,8 @@ SECTION = 1000.0
 """Length of a section (m) where no other is known. Own choice."""
 COVERED = 0.9
 """Share of a span that must be recorded for its figures to be shown."""
+SLACK = 1.0
+"""Way (m) that a record may lie beyond the line without a word: odometers are not better. Own choice."""
 WINDOW = 8.0
 """Duration of the windows (s) whose spectra are averaged."""
 
@@ -58,6 +60,7 @@ class Judgement:
     parts: tuple[Part, ...]  # the whole first, then by run, speed, section and span
     requirements: tuple[tuple[Part, list[Criterion]], ...]  # of each class of speeds
     alignment: Alignment | None  # supports, where they are known
+    reach: tuple[float, float]  # m, from the first support to the last one; inf where the line goes on
     notes: tuple[str, ...]
 
     @property
@@ -85,6 +88,7 @@ def judge(
     """
     samples = Samples(record)
     alignment = _alignment(samples, line, span)
+    reach = (0.0, alignment.length if alignment is not None and line is not None and line.ends else math.inf)
     parts = [_part(samples, "whole", "whole record", np.ones(len(samples.raw), dtype=bool))]
     runs = list(dict.fromkeys(piece.run for piece in record.pieces))
     if len(runs) > 1:
@@ -97,14 +101,15 @@ def judge(
     parts += [
         _part(samples, "section", f"{edges[k]:,.0f} to {edges[k + 1]:,.0f} m", at == k) for k in np.unique(at)
     ]
-    parts += _spans(samples, alignment) if alignment is not None else []
+    parts += _spans(samples, alignment, reach) if alignment is not None else []
     uplift = max(
         (float(np.nanmax(p.uplift)) for p in record.pieces if p.uplift is not None), default=math.nan
     )
     judged = [part for part in classes if part.samples * samples.step >= LONG_ENOUGH] or parts[:1]
     alone = len(judged) == 1
     requirements = tuple((part, _criteria(part, line, uplift if alone else math.nan)) for part in judged)
-    return Judgement(samples, tuple(parts), requirements, alignment, tuple(_notes(samples, line, span)))
+    notes = _notes(samples, line, span) + (_beyond(samples, reach) if alignment is not None else [])
+    return Judgement(samples, tuple(parts), requirements, alignment, reach, tuple(notes))
 
 
 def force_spectrum(record: Record) -> tuple[Array, Array]:
@@ -148,15 +153,16 @@ def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) ->
     return Part(kind, where, figures, arcing(raw, samples.step) if resolved else math.nan, speed, len(raw))
 
 
-def _spans(samples: Samples, alignment: Alignment) -> list[Part]:
-    """Parts of the spans that at least one run covers."""
+def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -> list[Part]:
+    """Parts of the spans within reach (m), that runs cover together."""
     numbers, found = alignment.span_of(samples.position), []
     for number in np.unique(numbers):
         begin, end = alignment.limits((int(number), int(number)))
+        if begin < reach[0] - 1e-6 or end > reach[1] + 1e-6:
+            continue
         words = f"{number}: {begin:,.6g} to {end:,.6g} m"
-        part = _part(samples, "span", words, numbers == number)
-        if part.figures.distance >= COVERED * (end - begin):
-            found.append(part)
+        if samples.way(numbers == number) >= COVERED * (end - begin):
+            found.append(_part(samples, "span", words, numbers == number))
     return found
 
 
@@ -169,7 +175,7 @@ def _alignment(samples: Samples, line: CatenaryData | None, span: float | None) 
     if line is None:
         return None
     own = line.alignment()
-    if line.ends and (end < 0 or begin > own.length):
+    if end < 0 or (line.ends and begin > own.length):
         raise InputError(
             f"The record runs from {begin:,.0f} to {end:,.0f} m, and line '{line.name}' from 0 to "
             f"{own.length:,.0f} m; write positions from the line's first support."
@@ -221,3 +227,15 @@ def _notes(samples: Samples, line: CatenaryData | None, span: float | None) -> l
     if line is None and span is not None:
         notes.append(f"Supports are taken to stand every {span:g} m from 0 m on.")
     return notes
+
+
+def _beyond(samples: Samples, reach: tuple[float, float]) -> list[str]:
+    """A note where samples lie before the first support, or behind the last one, of ``reach`` (m)."""
+    begin, end = samples.position.min(), samples.position.max()
+    if begin >= reach[0] - SLACK and end <= reach[1] + SLACK:
+        return []
+    known = "0 m on" if math.isinf(reach[1]) else f"0 to {reach[1]:,.0f} m"
+    return [
+        f"The record runs from {begin:,.0f} to {end:,.0f} m, and spans are known from {known}: what lies "
+        "beyond counts in all figures but those by span."
+    ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import overload
 
 import numpy as np
 
@@ -17,6 +18,10 @@ SPEED_KMH = (5.0, 600.0)
 """Mean speed of a run (km/h)."""
 SAME_SPEED = 0.2
 """Relative difference up to which the column of speeds agrees with positions over time."""
+OVER_PLACE = 0.03
+"""The same where time was had from position and speed: what differs then are samples that do not fit them."""
+IN_TURN = 0.1
+"""Share of the steps at which a position begins to rise, or to fall, above which it is unsorted."""
 HEIGHT = 5.0
 """Maximum range of heights of the contact point (m): no pantograph reaches further."""
 UPLIFT = 1.0
@@ -68,7 +73,8 @@ def check_motion(values: Mapping[str, Array]) -> None:
 def check_axes(run: str, time: Array | None, position: Array | None) -> None:
     """Raise InputError where a run's columns of time (s) and position (m), (n,), are swapped or fall.
 
-    run: words for messages, such as " of run 'a'" or nothing.
+    They are refused, too, where rows are not in order. run: words for messages, such as " of run 'a'" or
+    nothing.
     """
     rises, ahead = (_direction(each) for each in (time, position))
     if rises is not None and rises <= 0 and (ahead is None or ahead > 0):
@@ -77,24 +83,21 @@ def check_axes(run: str, time: Array | None, position: Array | None) -> None:
         raise InputError(
             f"The time{run} does not rise{other}; check whether {them} {advice}, and sort by time."
         )
+    if time is not None and rises is not None and rises < 0:
+        raise InputError(
+            f"The rows{run} run backwards in time, from {time[0]:.6g} to {time[-1]:.6g} s; sort them by time."
+        )
     if time is not None and position is not None and rises and ahead:
         _check_order(run, abs(float(np.ptp(position) / np.ptp(time))))
-    if ahead is not None and ahead == 0:
-        raise InputError(
-            f"The position{run} never changes; check the odometer, or give time and speed instead."
-        )
-    if ahead is not None and ahead < 0:
-        raise InputError(
-            f"The position{run} falls from {position[0]:.6g} to {position[-1]:.6g} m, as the train runs "  # type: ignore[index]
-            "against the chainage; write the position as the first one minus each, so that it rises."
-        )
+    if position is not None:
+        _check_way(run, position, timed=time is not None)
 
 
-def check_speed(run: str, longest: Piece, given: Array | None) -> None:
+def check_speed(run: str, longest: Piece, given: Array | None, *, over_place: bool = False) -> None:
     """Raise InputError for a mean speed that no train has, or that the column of speeds contradicts.
 
-    longest: piece of the run; given: speeds during it (m/s), (m,), where the record has them beside time and
-    position.
+    longest: piece of the run; given: speeds during it (m/s), (m,), at equal steps of time, where the record
+    has them beside positions; over_place: whether the time was had from both.
     """
     speed = longest.speed
     low, high = SPEED_KMH
@@ -103,10 +106,46 @@ def check_speed(run: str, longest: Piece, given: Array | None) -> None:
             f"The mean speed{run} is {to_kmh(speed):,.4g} km/h, outside {low:g} to {high:g}; check the units "
             "of time and position, or of the speed, km/h or m/s."
         )
-    if given is not None and abs(np.mean(given) / speed - 1) > SAME_SPEED:
+    if given is None:
+        return
+    mean = float(np.mean(given))
+    if over_place and abs(mean / speed - 1) > OVER_PLACE:
         raise InputError(
-            f"Column speed has a mean of {to_kmh(float(np.mean(given))):.4g} km/h{run}, and positions over "
+            f"Column speed has a mean of {to_kmh(mean):.4g} km/h{run}, but the way over the time that "
+            f"follows from it is {to_kmh(speed):.4g} km/h; remove samples whose positions repeat or jump, "
+            "or add a column time (s)."
+        )
+    if abs(mean / speed - 1) > SAME_SPEED:
+        raise InputError(
+            f"Column speed has a mean of {to_kmh(mean):.4g} km/h{run}, and positions over "
             f"time one of {to_kmh(speed):.4g} km/h; check the units, m/s or km/h."
+        )
+
+
+def _check_way(run: str, position: Array, *, timed: bool) -> None:
+    """Raise InputError for positions (m), (n,), that never change, fall, or are not in order.
+
+    timed: whether the record has times; then noise of an odometer does no harm.
+    """
+    if np.ptp(position) == 0:
+        raise InputError(
+            f"The position{run} never changes; check the odometer, or give time and speed instead."
+        )
+    ahead, steps = _direction(position), np.sign(np.diff(position))
+    moved = steps[steps != 0]
+    if (moved[1:] != moved[:-1]).sum() > IN_TURN * len(moved) and (not timed or ahead <= 0):
+        advice = "check whether it is the right column" if timed else "sort them by position or time"
+        raise InputError(
+            f"The position{run} falls at {(moved < 0).sum():,} samples and rises at {(moved > 0).sum():,}, "
+            f"in turn, so the rows are not in the order in which a train runs; {advice}."
+        )
+    if ahead < 0:
+        low = position[-1] < position[0]
+        how = f"from {position[0]:.6g} to {position[-1]:.6g} m" if low else "at most samples"
+        raise InputError(
+            f"The position{run} falls {how}, as the train runs against the chainage; write the position as "
+            "that of a support minus each, best of the last support before the record begins, so that it "
+            "rises and supports stay in place."
         )
 
 
@@ -120,6 +159,10 @@ def _check_order(run: str, speed: float) -> None:
         )
 
 
+@overload
+def _direction(values: None) -> None: ...
+@overload
+def _direction(values: Array) -> float: ...
 def _direction(values: Array | None) -> float | None:
     """1 where most steps rise, -1 where most of those that are not 0 fall, 0 where none is either."""
     if values is None:

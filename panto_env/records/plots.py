@@ -58,7 +58,7 @@ def draw_force(axes: Axes, found: Judgement) -> None:
     begin, end = float(samples.position.min()), float(samples.position.max())
     label = "position (m)"
     if found.alignment is not None:
-        numbers = found.alignment.supports_within(begin, end)
+        numbers = found.alignment.supports_within(begin, min(end, found.reach[1]))
         if len(numbers) <= MOST_SUPPORTS:
             marks.mark_supports(axes, map(found.alignment.support, numbers))
             label = marks.POSITION

@@ -16,7 +16,7 @@ from ..base.shown import shortly
 from ..base.table_file import Sheet, write_table
 from . import columns
 from .axes import axes_of
-from .cut import Break, cut
+from .cut import RUNS_BACK, Break, cut
 from .mass_correction import contact_force
 from .plausibility import check_axes, check_force, check_motion, check_speed
 from .record import Piece, Record
@@ -96,9 +96,10 @@ def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
         series: dict[str, Array] = {key: own[key] for key in ("height", "uplift") if key in own}
         found, why = cut(run, axes, force[part], series, own.get("raised"))
         if found:
-            both = {"time", "position", "speed"} <= own.keys()
+            both = {"position", "speed"} <= own.keys()
             longest = max(found, key=lambda piece: len(piece.force))
-            check_speed(words, longest, _during(axes.time, own["speed"], longest) if both else None)
+            given = np.interp(longest.time, axes.time, own["speed"]) if both else None
+            check_speed(words, longest, given, over_place=axes.over_place)
         pieces, breaks = [*pieces, *found], [*breaks, *why]
     _check(pieces)
     return Record(name, tuple(pieces), (*notes, *_sentences(breaks)))
@@ -151,7 +152,8 @@ def _sentences(breaks: Sequence[Break]) -> list[str]:
         count, first = sum(each.count for each in own), own[0]
         place = f"at {first.position:,.1f} m and {first.time:.6g} s"
         how = f"once, {place}" if count == 1 else f"{count} times, first {place}"
-        left = "it is left out" if reason.startswith("a piece") else "the record is cut there"
+        left = "the way back is left out" if reason == RUNS_BACK else "the record is cut there"
+        left = "it is left out" if reason.startswith("a piece") else left
         found.append(f"{reason[0].upper()}{reason[1:]} {how}; {left}.")
     return found
 
@@ -159,7 +161,3 @@ def _sentences(breaks: Sequence[Break]) -> list[str]:
 def _known(values: Mapping[str, Array], key: str) -> Array | None:
     each: Array | None = values.get(key)
     return None if each is None or np.isnan(each).all() else each
-
-
-def _during(time: Array, speed: Array, piece: Piece) -> Array:
-    return np.asarray(speed[(time >= piece.time[0] - 1e-9) & (time <= piece.time[-1] + 1e-9)])

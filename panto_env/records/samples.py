@@ -91,6 +91,23 @@ class Samples:
         return np.concatenate([piece.position for piece in self.record.pieces])
 
     @cached_property
+    def until(self) -> Array:
+        """(n,): position of the next sample of the piece (m), of its last one as the speed has it."""
+        found = []
+        for piece in self.record.pieces:
+            last = piece.position[-1] + piece.time_step * local_speed(piece)[-1]
+            found.append(np.append(piece.position[1:], last))
+        return np.concatenate(found)
+
+    def way(self, inside: NDArray[np.bool_]) -> float:
+        """Way (m) that samples inside, (n,), cover; what several pieces cover counts once."""
+        begin, end = self.position[inside], self.until[inside]
+        order = np.argsort(begin, kind="stable")
+        begin, end = begin[order], np.maximum.accumulate(end[order])
+        covered = np.concatenate([begin[:1], end[:-1]])  # up to where those before have been
+        return float(np.maximum(end - np.maximum(begin, covered), 0.0).sum())
+
+    @cached_property
     def speed(self) -> Array:
         """(n,): local speed (m/s)."""
         return np.concatenate([local_speed(piece) for piece in self.record.pieces])

@@ -83,6 +83,37 @@ def test_both_signs_in_a_file_are_refused(rows, line, shown, tmp_path):
         read_columns(path, COLUMNS)
 
 
+@pytest.mark.parametrize(
+    ("rows", "line", "cells"),
+    [
+        (["0,0,1,5"], 2, 4),  # decimal commas in both columns
+        (["1,2", "# a remark", "", "2,1,5"], 5, 3),
+        (["0.0,1.5", "0.1,1,234.5"], 3, 3),  # a comma between thousands
+        (["0.0;1.5;2"], 2, 3),
+        (["1,5,"], 2, 3),  # without a point anywhere, the comma may be decimal
+    ],
+)
+def test_more_cells_than_headings_are_refused(rows, line, cells, tmp_path):
+    path = tmp_path / "record.csv"
+    header = "time (s);head (mm)" if ";" in rows[0] else "time (s),head (mm)"
+    path.write_text("\n".join([header, *rows]))
+    with pytest.raises(
+        InputError, match=f"Line {line} of .* has {cells} cells under 2 headings; where commas"
+    ):
+        read_columns(path, COLUMNS)
+
+
+@pytest.mark.parametrize(
+    "text", ["time (s),head (mm)\n0.5,1,\n1,2 , ,\n", "time (s);head (mm)\n0,5;1;\n1;2\n"]
+)
+def test_a_separator_at_the_end_of_a_line_is_no_cell(text, tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text(text)
+    found = read_columns(path, COLUMNS)
+    assert found["time"] == pytest.approx([0.5, 1])
+    assert found["head"] == pytest.approx([1e-3, 2e-3])
+
+
 def test_a_point_in_a_column_that_is_not_read_does_not_count(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("time (s);note;head (mm)\n0,5;no. 1;2,5\n")

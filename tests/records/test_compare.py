@@ -130,6 +130,45 @@ def test_another_speed_is_refused(run, record):
     compare(record, replace(run, speed=1.02 * run.speed))
 
 
+def accelerating(record, change):
+    """A record of the same forces by place, of a train whose speed rises evenly by a share of its mean."""
+    (piece,) = record.pieces
+    share = np.linspace(0, 1, len(piece.force))
+    place = piece.position[0] + piece.length * ((1 - change / 2) * share + change / 2 * share**2)
+    series = {
+        name: np.interp(place, piece.position, getattr(piece, name)) for name in ("force", "height", "uplift")
+    }
+    return Record("a", (replace(piece, position=place, **series),))
+
+
+def test_a_speed_that_changes_is_refused(run, record):
+    changes = accelerating(record, 0.4)
+    assert changes.longest.speed == pytest.approx(run.speed)
+    with pytest.raises(
+        InputError,
+        match=r"speed lies between \d+\.\d and 29\d\.\d km/h from .* up to 1[0-9]\.\d % from the run's 250",
+    ):
+        compare(changes, run)
+    assert compare(accelerating(record, 0.04), run).accepted is True
+
+
+def test_a_speed_that_changes_elsewhere_does_no_harm(run, record):
+    (piece,) = record.pieces
+    slow = piece.position < 400  # before the run's evaluated spans, which begin at 540 m
+    step = np.where(slow[1:], 1.06, 1.0) * np.diff(piece.position)
+    place = piece.position[-1] - np.r_[np.cumsum(step[::-1])[::-1], 0.0]
+    found = compare(Record("a", (replace(piece, position=place),)), run)
+    assert found.accepted is True
+
+
+def test_spans_that_two_runs_begin_are_not_compared(run, record):
+    (piece,) = record.pieces
+    short = {name: getattr(piece, name)[piece.position < 995] for name in ("position", "force", "height")}
+    parts = [replace(piece, run=name, uplift=None, **short) for name in ("a", "b")]
+    found = compare(Record("a", tuple(parts)), run)
+    assert [pair.span for pair in found.spans] == list(range(10, 17))
+
+
 def test_another_line_is_not_accepted(record, other_run):
     found = compare(record, other_run)
     assert found.accepted is False

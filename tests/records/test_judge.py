@@ -11,9 +11,10 @@ from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.records.judge import force_spectrum, judge
 from panto_env.records.measured import measured
+from panto_env.records.plots import draw_force
 from panto_env.records.record import Piece, Record
 from panto_env.records.record_file import read_record
-from panto_env.records.samples import SETTLING
+from panto_env.records.samples import SETTLING, Samples
 from panto_env.records.tables import part_tables, requirement_remarks, requirements_table, whole_table
 
 LINE = "en50318-2002"
@@ -169,6 +170,74 @@ def test_what_cannot_be_placed(record):
     table = load_catenary(LINE).model_dump(exclude={"sources", "spans"}, exclude_none=True)
     with pytest.raises(InputError, match="write positions from the line's first support"):
         judge(far, FlexibleCatenaryData.model_validate(table | {"sequence": [{}, {"span_length": 65}] * 10}))
+
+
+def test_the_way_of_several_runs_counts_once():
+    fast, slow = steady(80.0, 1, run="a"), steady(10.0, 2, begin=30.0, run="b")
+    beyond = steady(50.0, 1, begin=70.0, run="c")
+    samples = Samples(Record("a", (fast, slow, beyond)))
+    assert samples.way(samples.run == 0) == pytest.approx(80)
+    assert samples.way(samples.run <= 1) == pytest.approx(80)
+    assert samples.way(samples.run >= 0) == pytest.approx(120)
+    assert samples.way(samples.run >= 1) == pytest.approx(70)
+    assert samples.way(samples.run > 2) == 0
+
+
+def test_a_span_that_two_runs_begin_is_not_covered():
+    once = steady(50.0, 19.9, run="once")  # 995 m: 35 m of the 17th span
+    again = steady(50.0, 19.9, 1.1 * once.force, run="again")
+    found = judge(Record("a", (once, again)), span=60.0)
+    assert [part.where.partition(":")[0] for part in found.of("span")] == [str(k) for k in range(1, 17)]
+    assert found.of("span")[15].figures.distance == pytest.approx(120, abs=1)
+
+
+def test_a_span_that_two_runs_cover_together_is_shown():
+    first, second = steady(50.0, 20.0, run="a"), steady(50.0, 10.0, begin=985.0, run="b")
+    found = judge(Record("a", (first, second)), span=60.0)
+    shown = [part.where.partition(":")[0] for part in found.of("span")]
+    assert "17" in shown  # 960 to 1,020 m: 40 m by the one, 35 m by the other
+
+
+def ended():
+    """A line of 20 spans that ends, so it has no others."""
+    table = load_catenary(LINE).model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    return FlexibleCatenaryData.model_validate(table | {"sequence": [{}, {"span_length": 55}] * 10})
+
+
+def test_spans_beyond_the_line_s_ends_are_not_shown():
+    line = ended()
+    length = line.alignment().length
+    record = Record("a", (steady(50.0, 40, begin=-130.0),))
+    found = judge(record, line)
+    assert [part.where.partition(":")[0] for part in found.of("span")] == [str(k) for k in range(1, 21)]
+    assert found.notes == (
+        f"The record runs from -130 to 1,870 m, and spans are known from 0 to {length:,.0f} m: what lies "
+        "beyond counts in all figures but those by span.",
+    )
+    assert found.reach == (0.0, length)
+    within = Record("a", (steady(50.0, 20, begin=10.0),))
+    assert judge(within, line).notes == ()
+
+
+def test_before_the_first_support_there_are_no_spans():
+    record = Record("a", (steady(50.0, 20, begin=-130.0),))
+    endless = judge(record, load_catenary(LINE))
+    assert endless.of("span")[0].where.startswith("1: 0 to 60 m")
+    assert "spans are known from 0 m on" in endless.notes[-1]
+    assert "spans are known from 0 m on" in judge(record, span=60.0).notes[-1]
+    with pytest.raises(InputError, match="write positions from the line's first support"):
+        judge(Record("a", (steady(50.0, 20, begin=-2000.0),)), load_catenary(LINE))
+
+
+def test_no_supports_are_drawn_beyond_the_line():
+    from matplotlib.figure import Figure
+
+    line = ended()
+    axes = Figure().subplots()
+    draw_force(axes, judge(Record("a", (steady(50.0, 10, begin=line.alignment().length - 300),)), line))
+    places = [x for each in axes.collections for x in np.asarray(each.get_segments()).reshape(-1, 2)[:, 0]]
+    places += [each.get_xdata()[0] for each in axes.lines if len(each.get_xdata()) == 2]
+    assert max(places) <= line.alignment().length + 1e-6
 
 
 def test_a_class_that_a_train_only_passes_has_no_requirements():

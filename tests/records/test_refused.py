@@ -43,6 +43,37 @@ def twice(columns):
     columns["run"] = ["a"] * 2500 + ["b"] * 2500
 
 
+def backwards(columns):
+    columns.update({name: each[::-1] for name, each in columns.items()})
+
+
+def in_pairs(columns):
+    """Without a time, and each two rows in the wrong order."""
+    del columns["time (s)"]
+    order = np.arange(5000).reshape(-1, 2)[:, ::-1].ravel()
+    columns.update({name: each[order] for name, each in columns.items()})
+    columns["speed (m/s)"] = np.full(5000, 50.0)
+
+
+def in_threes(columns):
+    """As ``in_pairs``, with more steps that rise than steps that fall."""
+    in_pairs(columns)
+    order = np.r_[np.arange(4998).reshape(-1, 3)[:, [1, 2, 0]].ravel(), 4998, 4999]
+    columns["position (m)"] = (1000 + 0.1 * np.arange(5000))[order]
+
+
+def noise(columns):
+    columns["position (m)"] = 1000 - 5 * columns["time (s)"] + 0.5 * (-1) ** np.arange(5000)
+
+
+def sensors(*names):
+    def change(columns):
+        force = columns.pop("force (N)")
+        columns.update({f"{name} ({'N' if name[0] == 'f' else 'm/s2'})": force for name in names})
+
+    return change
+
+
 def again(columns):
     columns["run"] = ["a"] * 2000 + ["b"] * 2000 + ["a"] * 1000
 
@@ -53,7 +84,28 @@ REFUSED = {
     "no axes": (drop("time (s)", "position (m)"), "no positions"),
     "no time": (drop("time (s)"), "no time; add a column time"),
     "nothing": (drop("time (s)", "position (m)", "force (N)"), "no samples|no column of a record"),
-    "falling": (scale("position (m)", -1), "as the train runs against the chainage; write the position as"),
+    "falling": (
+        scale("position (m)", -1),
+        "falls from -1000 to -1499.9 m, as the train runs against the chainage; write the position as that "
+        "of a support minus each, best of the last support before the record begins",
+    ),
+    "rows backwards": (backwards, "rows run backwards in time, from 9.998 to 0 s; sort them by time"),
+    "rows in pairs": (
+        in_pairs,
+        "falls at 2,500 samples and rises at 2,499, in turn, .* sort them by position",
+    ),
+    "rows in threes": (in_threes, "in turn, so the rows are not in the order in which a train runs"),
+    "a position without order": (noise, "in turn, .* check whether it is the right column"),
+    "six sensors": (
+        sensors(*[f"force_{k}" for k in range(1, 7)]),
+        r"Column force_5 of .* from 1 to 4, give more than 4 as their sum as one column force \(N\)",
+    ),
+    "sensor 0": (sensors("Force 0", "Force 1"), "Column force_0 of .* is of no sensor that is read"),
+    "sensor 01": (sensors("f01", "f2"), "Column force_01 of .* is of no sensor that is read"),
+    "a fifth accelerometer": (
+        sensors("force_1", "acceleration_5"),
+        r"Column acceleration_5 of .* as their mean as one column acceleration_1 \(m/s2\)",
+    ),
     "kilonewtons in N": (scale("force (N)", 1e-3), "is in kilonewtons, name the unit: --unit force=kN"),
     "newtons in kN": (scale("force (N)", 1, "force (kN)"), "is in newtons, name the unit: --unit force=N"),
     "sign": (scale("force (N)", -1), "turn the sign of the column"),
@@ -101,6 +153,33 @@ def test_refused_in_one_sentence(name, columns, written):
     assert sentence.endswith(".")
     assert not {". ", "? "} & {sentence[k : k + 2] for k in range(len(sentence))}
     assert "record.csv" in sentence
+
+
+def test_a_train_that_mostly_runs_back_has_no_from_and_to(columns, written):
+    ways = np.r_[np.full(2000, 0.2), np.full(3000, -0.1)]
+    columns["position (m)"] = np.cumsum(ways)
+    with pytest.raises(InputError, match="The position falls at most samples, as the train runs against"):
+        read_record(written(columns))
+
+
+def test_a_sensor_that_would_be_left_out_is_refused_in_parquet_too(columns, tmp_path):
+    columns["force_1 (N)"] = columns.pop("force (N)")
+    columns["force_5 (N)"] = columns["force_1 (N)"]
+    pq.write_table(pa.table(columns), tmp_path / "a.parquet")
+    with pytest.raises(InputError, match=r"Column force_5 of .* is of no sensor that is read"):
+        read_record(tmp_path / "a.parquet")
+
+
+def test_decimal_commas_between_commas(columns, tmp_path):
+    rows = [
+        f"{2 * k},{x:.2f},{f:.1f}" for k, (x, f) in enumerate(zip(*list(columns.values())[1:], strict=True))
+    ]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time (ms),position (m),force (N)", *rows]).replace(".", ","))
+    with pytest.raises(
+        InputError, match=r"Line 2 of .* has 5 cells under 3 headings; where commas are decimal"
+    ):
+        read_record(path)
 
 
 def test_a_speed_of_0_gives_no_time(columns, written):
