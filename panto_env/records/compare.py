@@ -196,7 +196,7 @@ def _check_speed(speed: Array, run: Trajectory, begin: float, end: float) -> Non
         low, high = to_kmh(float(speed.min())), to_kmh(float(speed.max()))
         raise InputError(
             f"The record's speed lies between {low:.1f} and {high:.1f} km/h from {begin:,.0f} to {end:,.0f} "
-            f"m, up to {100 * away:.1f} % from the run's {run.speed_kmh:.1f} km/h, where {100 * SAME_SPEED:g} "
+            f"m, up to {100 * away:.1f} % from the run's {run.speed_kmh:.1f} km/h, and {100 * SAME_SPEED:g} "
             "% are allowed; give a part of the record at one speed, and a run at that."
         )
 
