@@ -95,7 +95,7 @@ def fit(
     records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
     if output is not None:
-        check_design(line, names)
+        check_design(design, line, names)
     target = output or values or keep
     place = None if target is None else Path(f"{target}{SUFFIX}")
     settings = {"free": list(names), "tolerances": tolerances}

@@ -9,8 +9,9 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..catalog.loader import file_of, load_catenary, parse_catenary, parse_pantograph
+from ..catalog.loader import file_of, parse_catenary, parse_pantograph
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.schema import CatenaryData
 from .fit import INTERVAL, Fit, Found
 from .toml_text import with_table, with_value
 from .values import damping_of
@@ -19,13 +20,13 @@ SUFFIXES = (".toml",)
 """Of the files that a line and a pantograph are written to."""
 
 
-def check_design(base: str | Path, free: Sequence[str]) -> None:
+def check_design(line: CatenaryData, base: str | Path, free: Sequence[str]) -> None:
     """Refuse a design in whose text fitted values could not be written, before hours are spent on them.
 
-    base: as of ``write_line``; free: kinds of values. Raises InputError with what to change.
+    line: the design; base: as of ``write_line``; free: kinds of values. Raises InputError with what to
+    change.
     """
     text = file_of(base).read_text(encoding="utf-8-sig")
-    line = load_catenary(base)
     if isinstance(line, FlexibleCatenaryData) and "damping" in free:
         for name, value in line.damping:
             if value > 0:

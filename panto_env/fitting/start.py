@@ -33,13 +33,12 @@ def spans_before(
 ) -> int:
     """Spans of the line before the simulated ones; below 0 where these begin before its first support.
 
+    line: one that goes on as it is, before and behind its spans.
     force_of: of a train that begins at rest at the first support of the simulated line, as designed, at the
     places of a piece (N). Only pieces that begin in the line's first span can hold such a start: these are
     asked which of both they are more like. All others have settled.
     """
     span = line.span_length
-    if line.ends:
-        return 0  # nothing is known of what is before
     settled = math.floor(min(float(piece.position[0]) for piece in pieces) / span) - LEAD
     near = [piece for piece in pieces if piece.position[0] < span]
     alike = {0: 0.0, settled: 0.0}

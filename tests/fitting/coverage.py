@@ -45,8 +45,8 @@ GAIN, ZERO = 0.015, 2.5
 LINES = ("uniform", "section", "midst")
 """Kinds of lines: all spans alike, spans that differ, and records from the midst of the first kind."""
 BOTH = LINES[:2]
-MIDST = 64
-"""Spans that trains have run before records from the midst of a line."""
+BEFORE = {"midst": 64}
+"""Spans that trains have run before records of some kinds of lines begin."""
 HEADINGS = (
     "line",
     "model",
@@ -92,7 +92,7 @@ def records_of(
     line, pantograph = design_of(seed, kind), load_pantograph(PANTOGRAPH)
     faster = line.contact_wire.wave_speed / design_of(0, "uniform").contact_wire.wave_speed
     settings: dict[str, Any] = {}
-    before = MIDST if kind == "midst" else 0
+    before = BEFORE.get(kind, 0)
     if not line.ends:
         settings = {"spans": before + SPANS + BEYOND, "distance": (before + SPANS) * line.span_length}
     if wrong == "damping":
@@ -146,7 +146,7 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
     first = found.problem.first_span
-    spans = line.spans if line.ends else (MIDST if kind == "midst" else 0) + SPANS + BEYOND
+    spans = line.spans if line.ends else BEFORE.get(kind, 0) + SPANS + BEYOND
     droppers = len(dropper_positions(line, spans))
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
