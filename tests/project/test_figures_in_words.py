@@ -28,24 +28,23 @@ from .results import (
 )
 
 SENTENCES = [
-    # README
     (
-        "README.md",
+        "docs/benchmark.md",
         "reduces σ by {:.1f} % ({:.1f} to {:.1f}). It is ahead of the best reference that was fitted to "
         "such lines",
         lambda: less("high-speed-as-built", "agent-high-speed"),
     ),
     (
-        "README.md",
+        "docs/benchmark.md",
         "fitted to such lines ({:.1f} %, in {:.0f} % of passes: {:.0f} to {:.0f}) and of all others",
         lambda: (
             less("high-speed-as-built", "adaptive-fb+ff")[0],
             *ahead("high-speed-as-built", "agent-high-speed", "adaptive-fb+ff"),
         ),
     ),
-    ("README.md", "and of all others ({:.1f} % and less)", lambda: less("high-speed-as-built", "lqg")[:1]),
+    ("docs/benchmark.md", "and of all others ({:.1f} % and less)", lambda: less("high-speed-as-built", "lqg")[:1]),
     (
-        "README.md",
+        "docs/benchmark.md",
         "`repetitive` reduces σ by {:.0f} to {:.0f} %, and `agent-any-pantograph`, one network for four "
         "pantographs "
         "that has met none of these lines, by {:.0f} to {:.0f} %, more on each",
@@ -55,7 +54,7 @@ SENTENCES = [
         ),
     ),
     (
-        "README.md",
+        "docs/benchmark.md",
         "by {:.0f} to {:.0f} % (`repetitive`: {:.0f} to {:.0f} %)",
         lambda: (
             *ends(cells("unknown-section", "agent-any-pantograph").values()),
@@ -63,14 +62,14 @@ SENTENCES = [
         ),
     ),
     (
-        "README.md",
+        "docs/benchmark.md",
         "`repetitive` reduces σ by {:.0f} %, `adaptive` with gains fitted to other lines of the family "
         "by {:.1f} %, and "
         "`agent-any-line`, which is told nothing of the line, by {:.1f} % ({:.1f} to {:.1f}, five trainings)",
         lambda: (less("any-line", "repetitive")[0], less("any-line", ON_FAMILY)[0], *less("any-line", FIVE)),
     ),
     (
-        "README.md",
+        "docs/benchmark.md",
         "`agent-trailing` reduces σ by {:.1f} %, the best reference by {:.1f} %",
         lambda: (less("train-trailing", "agent-trailing")[0], less("train-trailing", TRAILING)[0]),
     ),
@@ -260,7 +259,7 @@ def test_sentence_holds(page, sentence, figures):
 
 @pytest.mark.parametrize(("track", "column"), [("known-line", 1), ("as-built", 4)])
 def test_table_of_the_readme(track, column):
-    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8").splitlines()
     rows = [re.split(r"\s*\|\s*", line)[1:-1] for line in lines if line.startswith("| ")]
     found = {row[0]: row for row in rows if len(row) == 5 and row[0] != "policy"}
     for cell in stored(track)["cells"]:

@@ -102,7 +102,7 @@ def details(result: Row) -> list[Table | str]:
 
 
 def markdown(results: Sequence[Row]) -> tuple[str, str]:
-    """The table of README.md and those of docs/speed.md, of the first machine, each between its markers."""
+    """The two blocks of docs/speed.md, of all machines and of the first one, each between its markers."""
     first = _marked(["  \n".join(machines(results)), summary(results).markdown])
     parts = [
         part if isinstance(part, str) else f"**{part.title}**\n\n{part.markdown}"
