@@ -26,7 +26,7 @@ demo: $(READY)
 	  --html $(DEMO)/benchmark.html
 	@echo "The page is $(DEMO)/benchmark.html, the picture $(DEMO)/benchmark.png; every figure is in $(DEMO)/benchmark.json."
 
-# All tracks of the benchmark, with the agents that come with the project, and the page of all.
+# All tracks of the benchmark, with the agents that come with the project, the page of all, and the documents' tables.
 TRACKS := any-line train-trailing train-both known-line as-built without-position head high-speed high-speed-as-built unknown-line unknown-section
 RESULTS := docs/benchmark
 benchmark: $(READY)
@@ -34,6 +34,7 @@ benchmark: $(READY)
 	for track in $(TRACKS); do \
 	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json --force || exit 1; done
 	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json) --output $(RESULTS)/index.html
+	$(BIN)/python -m tests.benchmark_tables
 
 lint: $(READY)
 	$(BIN)/ruff check .

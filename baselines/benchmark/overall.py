@@ -24,7 +24,7 @@ from .intervals import (
 )
 from .settings import REFERENCE
 from .single_pass import Row
-from .statistics import MOVED, Cell, LineAtSpeed, relative_changes
+from .statistics import KEEPS_THE_MEAN, MOVED, Cell, LineAtSpeed, relative_changes
 
 MOVED_PASSES = 1 / 3
 """Share of a track's passes from which on a policy is disqualified for moving the mean by over ``MOVED``.
@@ -49,6 +49,8 @@ class Standing:
     worst: float  # maximum change of any cell (%)
     worst_at: str  # line and speed of that cell
     improved: float  # share of passes with a smaller sigma than the passive one at the same mean force
+    contact_loss: float  # CL, mean over cells (%)
+    cost_change: float  # of CF from the passive one at the same mean force, mean over cells (%)
     effort: float  # rms actuator force, mean over cells (N)
     power: float  # mechanical power, mean over cells (W)
     saturation: float  # share of control steps at the actuator's limit, mean over cells
@@ -166,6 +168,8 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
         worst=worst.change,
         worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
         improved=float(np.mean([cell.improved for cell in cells])),
+        contact_loss=mean("contact_loss"),
+        cost_change=float(np.mean([cell.cost_change for cell in cells])),
         effort=mean("effort"),
         power=mean("power"),
         saturation=mean("saturation"),
@@ -193,6 +197,8 @@ def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clust
         worst=worst.worst,
         worst_at=worst.worst_at,
         improved=mean("improved"),
+        contact_loss=mean("contact_loss"),
+        cost_change=mean("cost_change"),
         effort=mean("effort"),
         power=mean("power"),
         saturation=mean("saturation"),
@@ -218,7 +224,7 @@ def _disqualification(cells: Sequence[Cell]) -> str:
     if moved >= MOVED_PASSES * passes:
         return (
             f"it moves the mean force by more than {100 * MOVED:g} % in {moved} of {passes} passes, "
-            "a third of them or more"
+            f"a third of them or more ({KEEPS_THE_MEAN})"
         )
     return ""
 

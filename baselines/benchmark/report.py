@@ -20,8 +20,9 @@ from .statistics import Cell
 
 FIGURES = {  # with the decimals shown
     "std": 2,
-    "mean": 1,
     "contact_loss": 2,
+    "cost_function": 0,
+    "mean": 1,
     "max": 0,
     "min": 0,
     "max_uplift": 0,
@@ -30,6 +31,8 @@ FIGURES = {  # with the decimals shown
     "power": 1,
     "saturation": 2,
 }
+CHANGES = {"std": "Δσ", "cost_function": "ΔCF", "mean": "ΔF_m"}
+"""Headings of the changes that stand beside figures."""
 OWN_LABELS = {
     "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
     "power": Label("mechanical power of the actuators", "mech. power", "W"),
@@ -37,12 +40,13 @@ OWN_LABELS = {
 }
 LEGEND = (
     "Interquartile means over the seeds, or over all passes. Δσ and ΔCF are relative to a passive pantograph "
-    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. Intervals are for "
-    "95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of the force "
-    "low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is highest. "
-    "Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a cell or "
-    "in a third of all passes, or by more than 5 % in any pass. A method's figures are means over its "
-    "trainings, and its intervals cover their spread."
+    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. CL is paper 1's "
+    "ratio of contact loss, CF its cost function; in the last table both are means over lines and speeds. "
+    "Intervals are for 95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of "
+    "the force low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is "
+    "highest. Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a "
+    "cell or in a third of all passes, or by more than 5 % in any pass. A method's figures are means over "
+    "its trainings, and its intervals cover their spread."
 )
 
 ORACLE = (
@@ -73,9 +77,9 @@ def _overall(outcome: Benchmark) -> Table:
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("policy", overflow="fold")
     best = next((each for each in found if each.rank == 1), None)
-    headings = ["rank", "Δσ (%)", "worst quarter (%)", "worst cell (%)", "passes improved", "of oracle"]
-    headings += ["mean moved in", "better than the next in"]
-    for heading in [*headings, *(["beaten by the first in"] if best else [])]:
+    headings = ["rank", "Δσ (%)", "CL (%)", "ΔCF (%)", "worst\nquarter (%)", "worst cell (%)"]
+    headings += ["passes\nimproved", "of\noracle", "mean\nmoved in", "better than\nthe next in"]
+    for heading in [*headings, *(["beaten by\nthe first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
     after = next_in_ranking(found)
     method_of = {name: each.policy for each in found for name in each.trainings}
@@ -84,6 +88,8 @@ def _overall(outcome: Benchmark) -> Table:
         values = [
             "–" if each.rank is None else str(each.rank),
             f"{number(each.change, 1)}{low_high}",
+            number(each.contact_loss, 2),
+            number(each.cost_change, 0),
             number(each.worst_quarter, 1),
             f"{number(each.worst, 1)} at {each.worst_at}",
             _share(each.improved),
@@ -115,18 +121,21 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     table.add_column("rank", justify="right")
     for name in FIGURES:
         table.add_column(_label(name).column, justify="right")
-        if name == "std":
-            table.add_column("Δσ\n(%)", justify="right", no_wrap=True)
-            table.add_column("ΔF_m\n(%)", justify="right")
-            table.add_column("ΔCF\n(%)", justify="right")
+        if name in CHANGES:
+            table.add_column(f"{CHANGES[name]}\n(%)", justify="right", no_wrap=name == "std")
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
+            changes = {
+                "std": _change(cell),
+                "cost_function": number(cell.cost_change, 0),
+                "mean": number(cell.mean_change, 1),
+            }
             values = []
             for name, decimals in FIGURES.items():
                 values.append(number(_label(name).scale * cell.figures[name], decimals))
-                if name == "std":
-                    values += [_change(cell), number(cell.mean_change, 1), number(cell.cost_change, 0)]
+                if name in changes:
+                    values.append(changes[name])
             rank = "–" if cell.rank is None else str(cell.rank)
             style = "red" if cell.disqualified else "bold" if cell.rank == 1 else ""
             table.add_row(f"{speed:g}" if k == 0 else "", cell.policy, rank, *values, style=style)

@@ -29,6 +29,10 @@ no ranked policy moves the mean of any pass by more than 4.4 %, and `pd` moves i
 """
 
 
+KEEPS_THE_MEAN = "a policy's attribute washout = 1.0 keeps the mean"
+"""Advice to the author of a policy that is disqualified for moving the mean."""
+
+
 class LineAtSpeed(NamedTuple):
     """A line, the pantograph on it, and its speed (km/h)."""
 
@@ -172,10 +176,12 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) ->
         return "the passive pantograph's runs ended early: there is nothing to compare with"
     typical, most = interquartile_mean(means), means[np.argmax(np.abs(means))]
     if abs(typical) > MOVED:
-        return f"it moves the mean force by {_beyond(typical, MOVED)}, more than {100 * MOVED:g} %"
+        moved = _beyond(typical, MOVED)
+        return f"it moves the mean force by {moved}, more than {100 * MOVED:g} % ({KEEPS_THE_MEAN})"
     if abs(most) > MOVED_AT_MOST:
         moved = _beyond(most, MOVED_AT_MOST)
-        return f"it moves the mean force by {moved} in one pass, more than {100 * MOVED_AT_MOST:g} %"
+        most_allowed = f"more than {100 * MOVED_AT_MOST:g} % ({KEEPS_THE_MEAN})"
+        return f"it moves the mean force by {moved} in one pass, {most_allowed}"
     if any(np.isnan(row.pressed_std) for row in rows):
         return "no passive pantograph can reach its mean force"
     return ""

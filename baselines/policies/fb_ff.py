@@ -13,7 +13,7 @@ from panto_env.base.shown import shown
 from panto_env.base.units import METRES_PER_SECOND, to_kmh
 from panto_env.control.context import Context
 
-from .force_law import ForceLaw, number
+from .force_law import ForceLaw, number, time_constant
 
 FORCE_RANGE = (0.0, 300.0)
 """Range (N) to which the feedback clips the contact force (paper 1)."""
@@ -50,13 +50,16 @@ class FeedbackFeedforward(ForceLaw):
         dead_zone: float = 0.0,
         reading: str = "span",
         speed_unit: str = "km/h",
+        washout: float | None = None,
     ) -> None:
         """Take the parameters; raises ValueError for one that is not valid.
 
         gain: N/N, or a table of gains by speed (km/h), linear between these speeds and constant beyond
         them; the default opposes each newton with one newton, see ``Proportional``. theta: phase (rad);
         the default is the paper's for every speed. amplitude: A (N). dead_zone: half its width (N).
-        speed_unit: of v in Eq. 12, for the reading "printed" only.
+        speed_unit: of v in Eq. 12, for the reading "printed" only. washout: time constant (s) of the slow
+        average that the environment subtracts from the force, so that the mean contact force stays; None or 0
+        is the paper's form.
         """
         gains = gain if isinstance(gain, Mapping) else {0.0: gain}
         if not gains:
@@ -74,6 +77,7 @@ class FeedbackFeedforward(ForceLaw):
             raise ValueError(f"speed_unit must be one of {', '.join(SPEED_UNITS)}, not {shown(speed_unit)}")
         self.reading = reading
         self.speed_unit = speed_unit
+        self.washout = time_constant(washout)
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""

@@ -39,6 +39,14 @@ class ForceLaw(ABC):
         """Force (N) for an observation, before the actuator's limit."""
 
 
+def time_constant(washout: object) -> float:
+    """Time constant (s) of a policy's washout, see ``Policy``; 0, for None too, is none.
+
+    Raises ValueError if it is not valid.
+    """
+    return 0.0 if washout is None else number("washout", washout, lowest=0)
+
+
 def number(name: str, value: object, lowest: float = -math.inf) -> float:
     """The value, if it is a finite number of at least ``lowest``. Raises ValueError if it is not."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)

@@ -48,6 +48,7 @@ class Tuning(Settings):
     actuator: dict[str, Any]
     sensors: dict[str, Any]
     line_condition: str
+    washout: float = Field(0.0, description="time constant of the action's washout, 0 for none (s)")
     seeds: tuple[int, ...] = Field(description="of the training's lines and noise")
     passes: int = Field(description="simulated passes that the tuning took")
     std_change: tuple[float, ...] = Field(
@@ -106,7 +107,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
     """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
 
     Stored ones are found by the values of line and pantograph, whatever their names; those that were made on
-    many lines, drawn from a family, are for any line that has none of its own. Raises InputError if
+    many lines, drawn from a family, are for any line that has none of its own. Those that were made with the
+    episode's washout come first; those made with another one are not taken. Raises InputError if
     there are none for them, for the place of the actuator, and for the speed.
     """
     if not isinstance(source, str):
@@ -115,17 +117,22 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
         return np.array(source, dtype=float)
     path = gain_file(source)
     place, tunings = place_of(context.channels), load_gains(path).tunings
-    own = [each for each in tunings if each.is_for(context.catenary, context.pantograph, place)]
-    others = [each for each in tunings if each.is_for_any_line(context.pantograph, place)]
+    able = [each for each in tunings if each.washout in (0.0, context.washout)]
+    able.sort(key=lambda each: each.washout != context.washout)
+    own = [each for each in able if each.is_for(context.catenary, context.pantograph, place)]
+    others = [each for each in able if each.is_for_any_line(context.pantograph, place)]
     if own or others:
         return _at_speed((*own, *others)[0], names, to_kmh(context.speed), path)
     line, pantograph = context.catenary.name, context.pantograph.name
     named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
+    but = ", only for others of these names with other values" if named else ""
+    for each in tunings:
+        if each not in able and each.is_for(context.catenary, context.pantograph, place):
+            but = f", only for a washout of {each.washout:g} s, which the policy must then have"
     raise InputError(
         f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
-        f"at {place}{', only for others of these names with other values' if named else ''}: make them with "
-        f"`panto tune`, give them ({', '.join(names[:4])}{', ...' if len(names) > 4 else ''}) as the "
-        "parameter gains, or take a policy that needs none."
+        f"at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
+        f"{', ...' if len(names) > 4 else ''}) as the parameter gains, or take a policy that needs none."
     )
 
 

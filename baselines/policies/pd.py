@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from panto_env.control.context import Context
 
-from .force_law import ForceLaw, number
+from .force_law import ForceLaw, number, time_constant
 
 
 class ProportionalDerivative(ForceLaw):
@@ -18,8 +18,17 @@ class ProportionalDerivative(ForceLaw):
     Force feedback alone loses contact at speed: the damping is what most published controllers add.
     """
 
-    def __init__(self, gain: float = 1.0, derivative: float = 0.005, damping: float = 150.0) -> None:
+    def __init__(
+        self,
+        gain: float = 1.0,
+        derivative: float = 0.005,
+        damping: float = 150.0,
+        washout: float | None = None,
+    ) -> None:
         """Take ``gain`` (N/N), ``derivative`` (N per N/s) and ``damping`` (N s/m), each 0 or more.
+
+        washout: time constant (s) of the slow average that the environment subtracts from the force, so that
+        the mean contact force stays; None or 0 is the usual form, without one.
 
         The defaults were chosen with `panto benchmark pd:gain=...,derivative=...,damping=... --config
         configs/benchmark.toml` among gains of 0.5, 0.75, 1; derivatives of 0, 0.005, 0.01, 0.015; dampings
@@ -31,6 +40,7 @@ class ProportionalDerivative(ForceLaw):
         self.gain = number("gain", gain, lowest=0)
         self.derivative = number("derivative", derivative, lowest=0)
         self.damping = number("damping", damping, lowest=0)
+        self.washout = time_constant(washout)
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""

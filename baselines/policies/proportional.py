@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .force_law import ForceLaw, number
+from .force_law import ForceLaw, number, time_constant
 
 
 class Proportional(ForceLaw):
@@ -14,8 +14,8 @@ class Proportional(ForceLaw):
     u = gain (F_N - F), F as measured. Where the passive mean force lies below F_N, the mean rises too.
     """
 
-    def __init__(self, gain: float = 1.0) -> None:
-        """Take a ``gain`` (N/N) of 0 or more; raises ValueError otherwise.
+    def __init__(self, gain: float = 1.0, washout: float | None = None) -> None:
+        """Take a ``gain`` (N/N) of 0 or more and a ``washout`` (s) as ``pd`` does, or raise ValueError.
 
         The default comes from `panto benchmark p:gain=0.5 p:gain=1.0 p:gain=1.5 p:gain=2.5 --config
         configs/benchmark.toml` (ideal actuator): on average sigma falls up to a gain of about 1.5, and
@@ -23,6 +23,7 @@ class Proportional(ForceLaw):
         real actuator lower that limit to about 1: choose 0.3 there.
         """
         self.gain = number("gain", gain, lowest=0)
+        self.washout = time_constant(washout)
 
     def force(self, observation: NDArray[np.float32]) -> float:
         """Force (N) for an observation, before the actuator's limit."""

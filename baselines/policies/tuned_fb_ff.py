@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from .fb_ff import FORCE_RANGE
+from .force_law import time_constant
 from .gains import Source
 from .lanes_law import Array, Gain, Observations, TunableLaw
 
@@ -30,9 +31,13 @@ class TunedFeedbackFeedforward(TunableLaw):
         "bias": Gain(1.0),
     }
 
-    def __init__(self, gains: Source = "tuned-fb+ff") -> None:
-        """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains."""
+    def __init__(self, gains: Source = "tuned-fb+ff", washout: float | None = None) -> None:
+        """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains.
+
+        washout: see ``FeedbackFeedforward``; it makes the bias idle.
+        """
         super().__init__(gains)
+        self.washout = time_constant(washout)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""

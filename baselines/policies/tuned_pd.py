@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from panto_env.control.context import Context
 
+from .force_law import time_constant
 from .gains import Source
 from .lanes_law import Array, Gain, Observations, TunableLaw
 
@@ -28,11 +29,12 @@ class TunedProportionalDerivative(TunableLaw):
         "bias": Gain(1.0),
     }
 
-    def __init__(self, gains: Source = "tuned-pd") -> None:
+    def __init__(self, gains: Source = "tuned-pd", washout: float | None = None) -> None:
         """gains: (4,): gain (N/N), derivative (N per N/s), damping (N s/m), bias (N); or the name or path of
-        a file of gains.
+        a file of gains. washout: see ``ProportionalDerivative``; it makes the bias idle.
         """
         super().__init__(gains)
+        self.washout = time_constant(washout)
 
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in this number of lanes."""

@@ -99,6 +99,8 @@ class StoredStanding(ResultTable):
     worst: Number
     worst_at: str
     improved: Number
+    contact_loss: Number = nan  # not in older results
+    cost_change: Number = nan
     effort: Number
     power: Number
     saturation: Number

@@ -7,12 +7,13 @@ from math import isnan
 from statistics import mean
 
 from panto_env.base.table import Table
+from panto_env.terminal import number
 
 from ..benchmark.overall import next_in_ranking, with_feedback
 from ..benchmark.statistics import LineAtSpeed
 from .result import Result, StoredCell, StoredStanding
 
-OVERALL = ("all", "95 %", "worst quarter", "better than next", "mean moved in")
+OVERALL = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
 """Headings of the columns over all passes."""
 TRAINING = "· "
 """Before the name of a method's training."""
@@ -23,9 +24,9 @@ def summary(result: Result) -> Table:
 
     Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
     shows by how much the policy moves the mean, or that it ended early. The last columns are over all passes:
-    the change with its 95 % interval, the mean of the worst quarter of passes, the share of passes in which
-    the policy is better than the next one, with its interval, and in how many it moves the mean by more than
-    1.5 %. A method's trainings follow it.
+    the change with its 95 % interval, CL and the change of CF (both means over cells), the mean of the worst
+    quarter of passes, the share of passes in which the policy is better than the next one, with its interval,
+    and in how many it moves the mean by more than 1.5 %. A method's trainings follow it.
     """
     lines = {place[:2] for place in result.places}
     headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
@@ -47,11 +48,13 @@ def summary(result: Result) -> Table:
 def _overall(one: StoredStanding, after: str | None) -> tuple[str, ...]:
     """The columns ``OVERALL`` of a policy; after: the policy ranked next."""
     moved = f"{one.moved} of {one.passes}"
+    losses = number(one.contact_loss, 2), number(one.cost_change, 0)
     if one.disqualified:
-        return "–", "–", "–", "–", moved
+        return "–", "–", *losses, "–", "–", moved
     return (
         f"{one.change:.1f}",
         "–" if one.interval is None else f"{one.interval[0]:.1f} to {one.interval[1]:.1f}",
+        *losses,
         f"{one.worst_quarter:.1f}",
         str(one.better_than.get(after or "", "–")),
         moved,

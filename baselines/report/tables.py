@@ -71,6 +71,8 @@ def leaderboard(result: Result) -> Table:
     after = next_in_ranking(result.standings)
     columns: list[Column[StoredStanding]] = [
         *_first_columns(result.standings, result.method_of),
+        Column("CL (%)", lambda one: _figure(one.contact_loss, 2)),
+        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
         Column("worst quarter, Δσ (%)", lambda one: _signed(one.worst_quarter, 1)),
         Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
@@ -86,13 +88,15 @@ def leaderboard(result: Result) -> Table:
 
 def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
     """Table of all policies on one line at one speed."""
+    figures = {name: _of_figure(name, decimals) for name, decimals in FIGURES.items()}
     columns: list[Column[StoredCell]] = [
         *_first_columns(cells),
+        *(figures.pop(name) for name in ("std", "contact_loss", "cost_function")),
+        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
         Column("passes improved", lambda one: _share(one.improved)),
         Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
         Column("mean moved in", lambda one: _moved(one.moved, one.seeds)),
-        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
-        *(_of_figure(name, decimals) for name, decimals in FIGURES.items()),
+        *figures.values(),
     ]
     return _table(caption, columns, sorted(cells, key=lambda one: (one.rank is None, one.rank or 0)))
 

@@ -23,6 +23,7 @@ from ..line import OPTIONS
         "sensors",
         "line_condition",
         "control_interval",
+        "washout",
     ),
     defaults=False,
 )
@@ -50,8 +51,9 @@ def tune(
 
     The fit minimises the variance of the contact force on training seeds, near the passive mean force;
     the table shows the result on selection seeds. By default actuator and sensors are "realistic" and
-    the line is "smooth". Gains for the same line, pantograph and place in the file are replaced only with
-    --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
+    the line is "smooth". With --washout gains are for the policy with that washout, tuned-pd:washout=1.
+    Gains for the same line, pantograph, place and washout in the file are replaced only with --force. An
+    interrupted tuning keeps the speeds that are done; the same command continues it.
     """
     from panto_env.cluster.parts import remove_parts
     from panto_env.control.settings import run_settings
@@ -67,7 +69,7 @@ def tune(
     settings = run_settings(
         {"actuator": "realistic", "sensors": "realistic", "line_condition": "smooth"} | given
     )
-    kind, path = tunable(policy), output or gain_file(policy)
+    kind, path = tunable(policy, settings.washout), output or gain_file(policy)
     check_gain_file(path, policy, settings, force)
     count = seeds or SEEDS
     speeds = sorted(set(speed or SPEEDS_KMH))

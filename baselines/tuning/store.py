@@ -44,6 +44,7 @@ def make_tuning(
         actuator=settings.actuator.model_dump(mode="json", exclude_none=True),
         sensors=settings.sensors.model_dump(mode="json", exclude_none=True),
         line_condition=json.dumps(conditions),
+        washout=settings.washout,
         seeds=tuple(seeds),
         passes=sum(each.passes for each in tuned),
         std_change=tuple(round(each.std_change, 4) for each in tuned),
@@ -54,7 +55,7 @@ def make_tuning(
 def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool) -> None:
     """Raise InputError unless a policy's gains can be stored in a file; called before any work begins.
 
-    force: gains in the file for the same line, pantograph and place may be replaced.
+    force: gains in the file for the same line, pantograph, place and washout may be replaced.
     """
     check_output(path, (".toml",))
     if not os.path.isfile(path):
@@ -64,10 +65,11 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
     pantograph = settings.controlled_pantograph
     place = settings.actuator.place
+    alike = [each for each in file.tunings if each.washout == settings.washout]
     if draws_line(settings):
-        held = any(each.is_for_any_line(pantograph, place) for each in file.tunings)
+        held = any(each.is_for_any_line(pantograph, place) for each in alike)
     else:
-        held = any(each.is_for(settings.line, pantograph, place) for each in file.tunings)
+        held = any(each.is_for(settings.line, pantograph, place) for each in alike)
     if held and not force:
         raise InputError(
             f"{path} already holds gains for {pantograph.name} on {line_name(settings)}, "
@@ -76,7 +78,7 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
 
 
 def store(path: Path, policy: str, tuning: Tuning) -> None:
-    """Store a tuning in a file of gains; it replaces one for the same line, pantograph and place."""
+    """Store a tuning in a file of gains; it replaces one for the same case, see ``_case``."""
     old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
     with write_whole(path) as temporary:
@@ -95,9 +97,9 @@ def as_toml(file: GainFile) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _case(tuning: Tuning) -> tuple[str | None, ...]:
+def _case(tuning: Tuning) -> tuple[str | float, ...]:
     line, pantograph = tuning.catenary_sha256, tuning.pantograph_sha256
-    return line or tuning.catenary, pantograph or tuning.pantograph, tuning.place
+    return line or tuning.catenary, pantograph or tuning.pantograph, tuning.place, tuning.washout
 
 
 def _value(value: Any) -> str:

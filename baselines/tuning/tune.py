@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control.settings import RunSettings
-from panto_env.policies import maker_of, policy_names
+from panto_env.policies import maker_of, parameters_of, policy_names
 
 from ..benchmark.seeds import SELECTION, TRAINING
 from ..policies.lanes_law import TunableLaw
@@ -43,20 +43,25 @@ class Tuned:
     mean_change: float  # relative change of the mean force from passive, likewise (-)
 
 
-def tunable(name: str) -> type[TunableLaw]:
-    """Class of the policy with this name. Raises InputError if it can't be tuned."""
+def tunable(name: str, washout: float = 0.0) -> type[TunableLaw]:
+    """Class of the policy with this name. Raises InputError if it can't be tuned, or not with a washout."""
     maker = maker_of(name) if name in policy_names() else None
-    if _has_gains(maker):
+    if _has_gains(maker, washout):
         return maker
     able = []
     for each in policy_names():
         with suppress(InputError):  # a plug-in that can't be loaded
-            able += [each] if _has_gains(maker_of(each)) else []
-    raise InputError(f"'{name}' has no gains to tune; policies with gains are {', '.join(able)}.")
+            able += [each] if _has_gains(maker_of(each), washout) else []
+    what, having = (
+        ("no parameter washout", " and washout") if _has_gains(maker, 0.0) else ("no gains to tune", "")
+    )
+    raise InputError(f"'{name}' has {what}; policies with gains{having} are {', '.join(able)}.")
 
 
-def _has_gains(maker: Any) -> TypeGuard[type[TunableLaw]]:
-    return isinstance(maker, type) and issubclass(maker, TunableLaw)
+def _has_gains(maker: Any, washout: float) -> TypeGuard[type[TunableLaw]]:
+    """Whether it makes a law with gains, and with a washout if there is one."""
+    law = isinstance(maker, type) and issubclass(maker, TunableLaw)
+    return law and (washout == 0.0 or "washout" in parameters_of(maker))
 
 
 def tune_at(policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int) -> Tuned:

@@ -17,7 +17,15 @@ DOCS = Path(__file__).parents[1]
 NOTEBOOKS = sorted((DOCS.parent / "examples").glob("*.ipynb"))
 GENERATED = "generated"
 """Name of the folders, beside the pages that include them, which are not kept."""
-SHOWN = ("fitted-fb+ff", "agent-known-line", "repetitive", "lqg", "tuned-pd", "fb+ff:gain=0.3")
+SHOWN = (
+    "fitted-fb+ff",
+    "agent-known-line",
+    "repetitive",
+    "lqg",
+    "tuned-pd",
+    "fb+ff:washout=1",
+    "pd:washout=1",
+)
 """Policies of the home page's table: the best, the learned one, and some of each kind."""
 HOME_SPEED = 300.0  # km/h
 

@@ -16,7 +16,7 @@ from panto_baselines.policies.proportional import Proportional
 from panto_env import InputError, simulate
 from panto_env.control.context import Context
 from panto_env.envs import PantographEnv
-from panto_env.policies import Policy, find_policy
+from panto_env.policies import Policy, find_policy, wishes
 
 SPEED_KMH = 300.0
 POLICIES = {
@@ -102,6 +102,7 @@ def test_reset_forgets_the_last_episode(name: str) -> None:
     ("source", "words"),
     [
         ("p:gain=-1", "gain must be a finite number of at least 0, not -1"),
+        ("pd:washout=-1", "washout must be a finite number of at least 0, not -1"),
         ("p:gain=high", "gain must be a finite number"),
         ("p:gain=True", "gain must be a finite number"),
         ("pd:damping=1e999", "damping must be a finite number"),
@@ -127,6 +128,13 @@ def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
 
 
 # --- each law ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["p", "pd", "fb+ff", "tuned-pd", "tuned-fb+ff", "skyhook"])
+def test_a_washout_is_a_parameter_and_off_by_default(name: str) -> None:
+    """The papers' form is the default; with it a run takes the slow average of the force off."""
+    assert [wishes(find_policy(f"{name}{given}"))["washout"] for given in ("", ":washout=None")] == [0.0, 0.0]
+    assert wishes(find_policy(f"{name}:washout=1"))["washout"] == 1.0
 
 
 def test_p_is_the_gain_times_what_the_force_lacks() -> None:

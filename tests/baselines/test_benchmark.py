@@ -421,3 +421,19 @@ def test_skyhook_says_how_to_give_gains_where_none_are_stored() -> None:
         simulate("re250", policy="skyhook", speed_kmh=200.0)
     run = simulate("re250", policy="skyhook:gains=[100,0]", speed_kmh=200.0, distance=300.0, spans=7)
     assert np.abs(run.frame_force).max() > 1.0
+
+
+def test_pd_and_fb_ff_are_ranked_with_a_washout() -> None:
+    """As built, at 300 km/h, as `docs/benchmark.md` has them: in the papers' form they move the mean."""
+    laws = ("pd", "fb+ff")
+    line = {"speeds_kmh": [300]}
+    given = load_benchmark("benchmark/as-built").model_dump() | {"seeds": 1, "lines": [line]}
+    given["policies"] = [f"{law}{form}" for law in laws for form in ("", ":washout=1")]
+    found = {
+        each.policy: each
+        for each in benchmark.run(parse(BenchmarkSettings, given, "it"), workers=1).standings
+    }
+    for law in laws:
+        assert "washout = 1.0 keeps the mean" in found[law].disqualified
+        assert found[f"{law}:washout=1"].disqualified == ""
+        assert found[f"{law}:washout=1"].change < -5

@@ -40,7 +40,8 @@ def test_the_qualified_are_ranked_by_sigma_and_the_others_are_not():
         ]
     )
     assert [cell.rank for cell in cells] == [3, None, 2, 1, None, None, None]
-    assert cells[1].disqualified == "it moves the mean force by -1.55 %, more than 1.5 %"
+    advice = "a policy's attribute washout = 1.0 keeps the mean"
+    assert cells[1].disqualified == f"it moves the mean force by -1.55 %, more than 1.5 % ({advice})"
     assert "1 of 1 runs ended early" in cells[5].disqualified
     assert "no passive pantograph can reach its mean force" in cells[6].disqualified
     assert cells[0].disqualified == ""
@@ -63,7 +64,10 @@ def test_a_policy_that_presses_in_one_pass_of_four_is_not_ranked():
     for repeated in (1, 4):
         cell, standing = judged(repeated * [0.0, 0.2, 0.0, 0.0])
         assert (cell.mean_change, cell.rank, standing.rank) == (0.0, None, None)
-        assert cell.disqualified == "it moves the mean force by +20.0 % in one pass, more than 5 %"
+        moved = (
+            "it moves the mean force by +20.0 % in one pass, more than 5 % (a policy's attribute washout = "
+        )
+        assert cell.disqualified.startswith(moved)
     cell, standing = judged([0.0] * 30 + [-0.0501])  # and however seldom it does
     assert (cell.rank, standing.rank) == (None, None)
     cell, standing = judged([0.0] * 30 + [-0.0499])
@@ -75,7 +79,8 @@ def test_a_policy_that_moves_the_mean_a_little_too_far_in_a_third_of_passes_is_n
     assert (cell.disqualified, cell.moved, standing.moved, standing.passes) == ("", 4, 4, 12)
     assert standing.rank is None
     assert standing.disqualified == (
-        "it moves the mean force by more than 1.5 % in 4 of 12 passes, a third of them or more"
+        "it moves the mean force by more than 1.5 % in 4 of 12 passes, a third of them or more "
+        "(a policy's attribute washout = 1.0 keeps the mean)"
     )
     _, standing = judged([0.016, -0.016, 0.016] + [0.0149] * 9)
     assert (standing.rank, standing.moved) == (1, 3)
@@ -160,6 +165,9 @@ def test_standings_are_over_all_cells():
     assert (a.improved, b.improved) == (0.75, 1.0)
     assert {name: one.share for name, one in a.better_than.items()} == {"passive": 0.75, "b": 0.5}
     assert b.better_than["a"].share == 0.5
+    costs = [cell.cost_change for cell in statistics.compare(rows) if cell.policy == "a"]
+    assert a.cost_change == pytest.approx(np.mean(costs))
+    assert a.contact_loss == ONES.contact_loss
     assert (a.worst_quarter, b.worst_quarter) == (pytest.approx(20.0), pytest.approx(-10.0))
     assert [found[name].rank for name in ("passive", "a", "b")] == [3, 1, 1]
     low, high = a.interval

@@ -18,8 +18,8 @@ from ..render.made_up_plots import cells
 
 STORED = Path(__file__).with_name("printed_tables.txt")
 FIRST = Standing(
-    "p", -12.34, (-14.0, -10.5), -3.21, -1.05, "a at 250 km/h", 0.957, 31.4, 2.7, 0.01, 0.62, 24, 1, 2.3, "",
-    1,
+    "p", -12.34, (-14.0, -10.5), -3.21, -1.05, "a at 250 km/h", 0.957, 4.32, -21.4, 31.4, 2.7, 0.01, 0.62,
+    24, 1, 2.3, "", 1,
     {"lqg": "20 of 24", "passive": "24 of 24"},
 )  # fmt: skip
 STANDINGS = (

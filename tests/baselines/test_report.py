@@ -60,6 +60,7 @@ def result(**changes):
         standings.append(
             {"policy": policy, "change": change, "interval": [change - 1, change + 1], "worst": change}
             | {"worst_at": "ln2, 250 km/h", "improved": 1.0, "effort": abs(change), "power": 2.0}
+            | {"contact_loss": 0.5, "cost_change": change / 2}
             | {"saturation": 0.25, "worst_quarter": change + 3, "passes": 4, "moved": 2, "most_moved": -1.6}
             | {"better_than": {other: SHARE for other in names if other != policy}, "trainings": {}}
             | {"disqualified": reason, "rank": None if reason else 4 - rank}
@@ -111,7 +112,7 @@ def test_leaderboard_shows_the_ranked_first_and_why_others_are_not():
     assert [row[0] for row in rows] == ["1", "2", "3", "–"]
     assert [row[1] for row in rows] == ["pd", "p", "passive", f"{HOSTILE}disqualified: it cheats"]
     assert rows[1][2:] == [
-        *("-10.0-11.0 to -9.0", "-7.0", "-10.0at ln2, 250 km/h", "100 %", "75 %50 to 90"),
+        *("-10.0-11.0 to -9.0", "0.50", "-5", "-7.0", "-10.0at ln2, 250 km/h", "100 %", "75 %50 to 90"),
         *("10.0", "2.0", "25 %", "2 of 4", "-1.6"),
     ]
     assert rows[2][headings.index("better than the next in")] == "–"  # the last of the ranked
@@ -360,15 +361,15 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
     table["cells"][1]["oracle_share"] = 0.5  # of p at 250 km/h, whose change is -10
     table["cells"][2] |= {"disqualified": "it presses", "mean_change": 3.2}  # pd at 250 km/h
     made = summary(parse_result(table, "it"))
-    overall = ("all", "95 %", "worst quarter", "better than next", "mean moved in")
+    overall = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
     assert made.headings == ("policy", "250 km/h", "300 km/h", *overall)
-    over_all = ("-9.0", "-10.0 to -8.0", "-6.0", "75 % (50 to 90)", "2 of 4")
+    over_all = ("-9.0", "-10.0 to -8.0", "0.50", "-4", "-6.0", "75 % (50 to 90)", "2 of 4")
     assert made.cells[0] == ("pd", "(-9.0; mean +3.2)", "-9.0", *over_all)  # by the standings' ranks
-    over_all = ("-10.0", "-11.0 to -9.0", "-7.0", "75 % (50 to 90)", "2 of 4")
+    over_all = ("-10.0", "-11.0 to -9.0", "0.50", "-5", "-7.0", "75 % (50 to 90)", "2 of 4")
     assert ("p", "-10.0", "-10.0", *over_all) in made.cells
     assert made.cells[-2][0] == HOSTILE  # not ranked
-    assert made.cells[-2][-5:] == ("–", "–", "–", "–", "2 of 4")
-    assert made.cells[-1] == ("*oracle*", "-20.0", *["–"] * 6)
+    assert made.cells[-2][-7:] == ("–", "–", "0.50", "-10", "–", "–", "2 of 4")
+    assert made.cells[-1] == ("*oracle*", "-20.0", *["–"] * 8)
     passive = next(row for row in made.cells if row[0] == "passive")
     assert passive[1] == "0.0 *"  # the first in the cells of this result by hand
 

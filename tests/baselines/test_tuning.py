@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from panto_baselines.policies.skyhook import Skyhook
 from panto_baselines.tuning.batch import Still, run_batch
 from panto_baselines.tuning.gauss_newton import fit
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store
-from panto_baselines.tuning.tune import MEAN_TOLERANCE, MEAN_WEIGHT, residuals_of, tunable, tune_at
+from panto_baselines.tuning.tune import MEAN_TOLERANCE, MEAN_WEIGHT, Tuned, residuals_of, tunable, tune_at
 from panto_env import InputError, simulate
 from panto_env.control import Task
 from panto_env.control.context import Context
@@ -292,6 +293,26 @@ def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen() -> None:
     assert tuned.passes <= 60 + 11
     with pytest.raises(InputError, match="'pd' has no gains to tune; policies with gains are"):
         tunable("pd")
+
+
+def test_gains_tuned_with_a_washout_are_for_policies_that_have_it(tmp_path: Path) -> None:
+    path, without = tmp_path / "own.toml", run_settings({"accuracy": "fast"} | REAL)
+    made = Tuned(300.0, (0.1, 0.2, 0.3, 0.4), (1.0, 0.9), 10, -0.1, 0.0)
+    names = list(tunable("tuned-pd", washout=1.0).TUNED)
+    with_it = without.model_copy(update={"washout": 1.0})
+    store(path, "tuned-pd", make_tuning(with_it, names, [made], [2000], "a command"))
+    check_gain_file(path, "tuned-pd", without, force=False)
+    washed = a_context(washout=1.0)
+    assert find_gains(str(path), names, washed)[0] == 0.1
+    with pytest.raises(InputError, match="only for a washout of 1 s, which the policy must then have"):
+        find_gains(str(path), names, CONTEXT)
+    other = replace(made, gains=(0.5, 0.2, 0.3, 0.4))
+    store(path, "tuned-pd", make_tuning(without, names, [other], [2000], "a command"))
+    assert [find_gains(str(path), names, each)[0] for each in (washed, CONTEXT)] == [0.1, 0.5]
+    with pytest.raises(InputError, match="already holds gains"):
+        check_gain_file(path, "tuned-pd", with_it, force=False)
+    with pytest.raises(InputError, match=r"'lqg' has no parameter washout; policies .* are .*tuned-pd"):
+        tunable("lqg", washout=1.0)
 
 
 @pytest.mark.parametrize("name", ["periodic", "fitted-fb+ff"])

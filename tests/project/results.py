@@ -52,6 +52,15 @@ def at(track, policy, speed):
     return found
 
 
+def loss(track, policy, speed):
+    """Contact loss CL in a cell of a track on one line (%)."""
+    return next(
+        cell["figures"]["contact_loss"]
+        for cell in stored(track)["cells"]
+        if cell["policy"] == policy and cell["speed_kmh"] == speed
+    )
+
+
 def passes(track, policy):
     """Change of σ in each pass of a policy (%)."""
     rows = [row for row in stored(track)["rows"] if row["policy"] == policy]

@@ -37,3 +37,17 @@ def test_unknown_names_are_refused_with_those_that_are_known():
         load_training("pp0")
     with pytest.raises(InputError, match=r"benchmark file ppo does not exist; .* known are benchmark, "):
         load_benchmark("ppo")
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in names("benchmark") if name.startswith("benchmark/")] + ["demo"]
+)
+def test_every_track_has_pd_and_fb_ff_with_a_washout_and_as_papers_have_them(name):
+    settings = load_benchmark(FOLDER / f"{name}.toml")
+    laws = {"pd"} if settings.sensors.blind else {"pd", "fb+ff"}  # fb+ff needs the place within the span
+    assert {form for law in laws for form in (law, f"{law}:washout=1")} <= set(settings.policies)
+
+
+@pytest.mark.parametrize("page", ["extend", "leaderboard", "policies", "benchmark"])
+def test_pages_for_authors_of_policies_name_the_washout(page):
+    assert "`washout" in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")

@@ -20,6 +20,7 @@ from .results import (
     cells,
     ends,
     less,
+    loss,
     of_trainings,
     passes,
     ranked,
@@ -83,6 +84,11 @@ SENTENCES = [
         "docs/benchmark.md",
         "of {} places in the rankings below, {} have none",
         lambda: (len(ranked()), sum(each["moved"] == 0 for each in ranked())),
+    ),
+    (
+        "docs/policies.md",
+        "at 400 km/h CL is {:.1f} % with `pd`, {:.1f} % with `pd:washout=1`, and {:.1f} % with the passive",
+        lambda: [loss("high-speed-as-built", policy, 400) for policy in ("pd", "pd:washout=1", "passive")],
     ),
     # Agents
     (
