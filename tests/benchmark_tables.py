@@ -1,4 +1,4 @@
-"""The tables of docs/benchmark.md from the stored results of the benchmark: python -m tests.benchmark_tables.
+"""The tables of README.md and docs/benchmark.md from the stored results: python -m tests.benchmark_tables.
 
 `make benchmark` calls it. Each table stays where it is; one of a new track comes last.
 """
@@ -10,15 +10,29 @@ import re
 from panto_baselines.report.result import read_result
 from panto_baselines.report.summary import summary
 from panto_env.base.files import write_whole
+from panto_env.base.table import Table
 
 from .documents import ROOT
 
 PAGE = ROOT / "docs" / "benchmark.md"
+README = ROOT / "README.md"
+RESULTS = ROOT / "docs" / "benchmark"
+BEGIN, END = "<!-- python -m tests.benchmark_tables -->", "<!-- end -->"
+TRACK = "unknown-line"
+SHOWN = {
+    "agent-any-pantograph": "learned; one network for four pantographs",
+    "agent-any-line": "learned; told nothing of the line",
+    "repetitive": "learns the span during the run",
+    "fb+ff:washout=1": "paper 1's feedback and feed-forward",
+    "pd:washout=1": "proportional-derivative feedback",
+    "passive": "no control",
+}
+"""Policies of the README's table, and what each is."""
 
 
 def with_tables(text: str) -> str:
     """The page's text with the tables of the stored results."""
-    for path in sorted((ROOT / "docs" / "benchmark").glob("*.json")):
+    for path in sorted(RESULTS.glob("*.json")):
         result = read_result(path)
         table = summary(result)
         block = f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
@@ -28,7 +42,27 @@ def with_tables(text: str) -> str:
     return text
 
 
+def of_readme() -> str:
+    """The README's table between its markers."""
+    standings = {each.policy: each for each in read_result(RESULTS / f"{TRACK}.json").standings}
+    rows = []
+    for policy, what in SHOWN.items():
+        own = standings[policy]
+        change = "not ranked" if own.rank is None else f"{own.change:.1f}"
+        if own.rank is not None and own.interval is not None:
+            change += f" ({own.interval[0]:.1f} to {own.interval[1]:.1f})"
+        rows.append((f"`{policy}`", what, change, f"{own.contact_loss:.2f}", f"{own.cost_change:+.0f}"))
+    table = Table("", ("policy", "", "Δσ (%)", "CL (%)", "ΔCF (%)"), tuple(rows), text_columns=2)
+    return f"{BEGIN}\n\n{table.markdown.rstrip()}\n\n{END}"
+
+
+def with_table_of_readme(text: str) -> str:
+    """The README's text with its table."""
+    return re.sub(f"{BEGIN}.*?{END}", lambda _: of_readme(), text, flags=re.DOTALL)
+
+
 if __name__ == "__main__":
-    written = with_tables(PAGE.read_text(encoding="utf-8"))
-    with write_whole(PAGE) as temporary:
-        temporary.write_text(written, encoding="utf-8")
+    for page, written in ((PAGE, with_tables), (README, with_table_of_readme)):
+        text = written(page.read_text(encoding="utf-8"))
+        with write_whole(page) as temporary:
+            temporary.write_text(text, encoding="utf-8")

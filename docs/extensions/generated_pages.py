@@ -8,7 +8,6 @@ from typing import Any
 import gymnasium
 from sphinx.application import Sphinx
 
-from panto_baselines.report.result import read_result
 from panto_env.control.settings import default, fields
 from panto_env.envs import BARE, IDS, PantographEnv
 from panto_env.envs.settings import EnvironmentSettings, VectorSettings
@@ -17,17 +16,6 @@ DOCS = Path(__file__).parents[1]
 NOTEBOOKS = sorted((DOCS.parent / "examples").glob("*.ipynb"))
 GENERATED = "generated"
 """Name of the folders, beside the pages that include them, which are not kept."""
-SHOWN = (
-    "fitted-fb+ff",
-    "agent-known-line",
-    "repetitive",
-    "lqg",
-    "tuned-pd",
-    "fb+ff:washout=1",
-    "pd:washout=1",
-)
-"""Policies of the home page's table: the best, the learned one, and some of each kind."""
-HOME_SPEED = 300.0  # km/h
 
 
 def sections() -> dict[str, str]:
@@ -126,32 +114,12 @@ def part(name: str) -> str:
     return "\n\n".join((heads(name, env), *(f"## {title}\n\n{body}" for title, body in parts.items()))) + "\n"
 
 
-def home_table() -> str:
-    """Stored results of the benchmark at one speed."""
-    columns = []
-    for track in ("known-line", "as-built"):
-        result = read_result(DOCS / "benchmark" / f"{track}.json")
-        columns.append({c.policy: c for c in result.cells if c.speed_kmh == HOME_SPEED})
-    rows = [
-        (name, *(f"{cells[name].change:+.1f} %" if name in cells else "not run" for cells in columns))
-        for name in SHOWN
-    ]
-    headings = ("Policy", "σ, line as designed", "σ, line as built")
-    return (
-        f"{table(headings, rows)}\n\nChange of the contact force's standard deviation σ at "
-        f"{HOME_SPEED:g} km/h, against a passive pantograph that presses with the same mean force; the "
-        "actuator's limit is ±100 N, sensors are late and noisy. All policies, tracks and intervals: "
-        "[the benchmark](benchmark.md)."
-    )
-
-
 def write(app: Sphinx) -> None:
     """Write the parts, where they are not as they should be."""
     bare = [(f"`{name}`", said(value)) for name, value in BARE.items()]
     environments = DOCS / "environments" / GENERATED
     wanted = {environments / f"{name}.md": part(name) for name in IDS} | {
         environments / "bare.md": table(("Argument", "Value"), bare),
-        DOCS / GENERATED / "home.md": home_table(),
         # Sphinx takes no page from elsewhere.
         **{DOCS / path.name: path.read_text(encoding="utf-8") for path in NOTEBOOKS},
     }

@@ -176,7 +176,7 @@ def test_commands_of_a_page_run(page, folder):
 
 
 @pytest.mark.parametrize("page", [page for page in pages() if python(page)])
-def test_python_of_a_page_runs(page, folder):
+def test_python_of_a_page_runs(page, folder, capsys):
     names = {"__name__": page}
     if page in PREPARED:
         subprocess.run(PREPARED[page].split(), cwd=folder, check=True, capture_output=True)
@@ -185,6 +185,15 @@ def test_python_of_a_page_runs(page, folder):
         for long, short in SHORTENED.get(page, {}).items():
             text = text.replace(long, short)
         exec(compile("\n" * (block.line - 1) + text, ROOT / page, "exec"), names)
+        printed = capsys.readouterr().out
+        if page == "README.md" and "\nprint(" in text:  # what it prints stands at the block's end
+            assert printed and text.endswith("".join(f"# {line}\n" for line in printed.splitlines()))
+
+
+def test_the_first_page_is_short():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 100
+    assert len(text.split()) <= 900
 
 
 def test_no_exception_is_left_of_a_document_that_has_changed():
