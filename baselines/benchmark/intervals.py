@@ -22,6 +22,8 @@ TRIM = 0.25
 """Share of the values that the interquartile mean leaves out at each end."""
 RESAMPLES = 2000
 CONFIDENCE = 0.95
+FEWEST_LINES = 3
+"""Lines from which on a spread between them says something of others."""
 ROUNDING = 1e-12
 """Variance below which nothing but rounding varies: of changes in percent, and of shares of passes."""
 
@@ -96,7 +98,26 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
     # Half of what lies between is a standard deviation that a few far-off resamples do not stretch.
     low, high = np.quantile(means, norm.cdf((-1.0, 1.0)))
     own = np.array([interquartile_mean(row) for row in rows])
-    parts = [_Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom), *_between(own)]
+    return _around(own, _Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom))
+
+
+def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
+    """95 % interval of the same mean, for other lines, of which these are taken as a random sample.
+
+    A t interval: the variance is that between the lines' own means, which holds what seeds draw, too. None
+    with fewer than ``FEWEST_LINES`` lines, if nothing varies, or for a nan.
+    """
+    rows = np.atleast_2d(values)
+    lines = [rows[:, clusters.line == line].mean() for line in np.unique(clusters.line)]
+    if np.isnan(rows).any() or len(lines) < FEWEST_LINES:
+        return None
+    own = np.array([interquartile_mean(row) for row in rows])
+    return _around(own, _Part(float(np.var(lines, ddof=1)) / len(lines), len(lines) - 1))
+
+
+def _around(own: Array, drawn: _Part) -> Interval | None:
+    """Interval about the mean of the trainings' means, (trainings,), by the variance of what is drawn."""
+    parts = [drawn, *_between(own)]
     variance = sum(part.variance for part in parts)
     if variance < ROUNDING:
         return None

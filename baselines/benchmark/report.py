@@ -13,6 +13,7 @@ from rich.text import Text
 from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
+from .intervals import Interval
 from .overall import next_in_ranking, with_feedback
 from .run import Benchmark
 from .settings import REFERENCE
@@ -40,19 +41,20 @@ OWN_LABELS = {
 }
 LEGEND = (
     "Interquartile means over the seeds, or over all passes. Δσ and ΔCF are relative to a passive pantograph "
-    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. CL is paper 1's "
-    "ratio of contact loss, CF its cost function; in the last table both are means over lines and speeds. "
-    "Intervals are for 95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of "
-    "the force low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is "
-    "highest. Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a "
-    "cell or in a third of all passes, or by more than 5 % in any pass. A method's figures are means over "
-    "its trainings, and its intervals cover their spread."
+    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. Intervals are for "
+    "95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of the force "
+    "low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is highest. "
+    "Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a cell or "
+    "in a third of all passes, or by more than 5 % in any pass. A method's figures are means over its "
+    "trainings, and its intervals cover their spread. CL is paper 1's ratio of contact loss, CF its cost "
+    "function; over all lines they are means over cells. Intervals are for these lines, or for others "
+    "like them, as if these were a random sample."
 )
 
 ORACLE = (
     "oracle: the smallest σ found for the same actuator when the line is known, over the same spans "
-    "(`panto oracle --stored`), mean over seeds of its own. It is a local optimum: a share above 100 % is "
-    "possible."
+    "(`panto oracle --stored`), mean over seeds of its own, which "
+    "shares are over too. It is a local optimum: a share above 100 % is possible."
 )
 
 
@@ -81,10 +83,13 @@ def _overall(outcome: Benchmark) -> Table:
     headings += ["passes\nimproved", "of\noracle", "mean\nmoved in", "better than\nthe next in"]
     for heading in [*headings, *(["beaten by\nthe first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
+    others = [each.policy for each in found if each.interval_for_lines is not None]
+    if others:
+        table.add_column("95 %, for\nother lines (%)", justify="right", no_wrap=True)
     after = next_in_ranking(found)
     method_of = {name: each.policy for each in found for name in each.trainings}
     for each in found:
-        low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
+        low_high = "" if each.interval is None else f" ({_between(each.interval)})"
         values = [
             "–" if each.rank is None else str(each.rank),
             f"{number(each.change, 1)}{low_high}",
@@ -99,10 +104,16 @@ def _overall(outcome: Benchmark) -> Table:
         ]
         if best is not None:
             values.append(str(best.better_than.get(each.policy, "–")))
+        if others:
+            values.append(_between(each.interval_for_lines) or "–")
         style = "red" if each.disqualified else "bold" if each is best else ""
         method = method_of.get(each.policy)
         table.add_row(f"{method}: {each.policy}" if method else each.policy, *values, style=style)
     return table
+
+
+def _between(interval: Interval | None) -> str:
+    return "" if interval is None else f"{interval[0]:+.1f} to {interval[1]:+.1f}"
 
 
 def _share(value: float) -> str:
@@ -126,11 +137,8 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
-            changes = {
-                "std": _change(cell),
-                "cost_function": number(cell.cost_change, 0),
-                "mean": number(cell.mean_change, 1),
-            }
+            beside = (_change(cell), number(cell.cost_change, 0), number(cell.mean_change, 1))
+            changes = dict(zip(CHANGES, beside, strict=True))
             values = []
             for name, decimals in FIGURES.items():
                 values.append(number(_label(name).scale * cell.figures[name], decimals))

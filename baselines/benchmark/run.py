@@ -23,7 +23,7 @@ from panto_env.metrics.labels import HEADINGS
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.catenary.schema import CLEAR
 
-from ..oracle.stored import stored_ratio
+from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played
 from .controls import ORACLE_TAPE, policy_of
@@ -60,7 +60,7 @@ class Benchmark:
                 "actions_sha256": actions.digest(self.played),
                 "spans": self.spans,
                 "standings": [asdict(each) for each in self.standings],
-                "cells": [asdict(cell) | {"oracle_share": cell.oracle_share} for cell in self.cells],
+                "cells": [asdict(cell) for cell in self.cells],
                 "rows": [row.as_dict() for row in self.rows],
                 "traces": [asdict(each) for each in self.traces],
             }
@@ -149,14 +149,15 @@ def outcome_of(
     return Benchmark(settings, spans, rows, cells, standing, traces, played)
 
 
-def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:
-    """Change of sigma (%) by line and speed, for the cells that have a stored oracle."""
+def stored_bounds(
+    settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]
+) -> dict[LineAtSpeed, dict[int, float]]:
+    """Changes of sigma (%) of the stored oracles, by line and speed, and by seed."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, covered)
-            if ratio is not None:
-                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = 100 * (ratio - 1)
+            changes = stored_changes(along(settings, line) | {"speed_kmh": speed}, covered)
+            found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
     return found
 
 

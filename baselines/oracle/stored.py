@@ -189,8 +189,17 @@ def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int]) -> float | No
     None if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
     control interval and computation over exactly these spans; sensors do not matter.
     """
+    one = _stored(given, spans)
+    return None if one is None else float(one["ratio"])
+
+
+def stored_changes(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[int, float]:
+    """Changes of σ (%) from the passive run of the oracle that ``stored_ratio`` finds, by seed; or none."""
+    passes = (_stored(given, spans) or {"passes": []})["passes"]
+    return {each["seed"]: 100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes}
+
+
+def _stored(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[str, Any] | None:
     sought = fingerprint(given)
-    for one in stored_cells():
-        if one["asked"]["fingerprint"] == sought and tuple(one["spans"]) == spans:
-            return float(one["ratio"])
-    return None
+    cells = (each for each in stored_cells() if each["asked"]["fingerprint"] == sought)
+    return next((each for each in cells if tuple(each["spans"]) == spans), None)

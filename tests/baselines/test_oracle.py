@@ -327,6 +327,8 @@ def test_stored_oracles_are_what_simulate_says_today():
 def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
     given, spans = {"speed_kmh": 300, "actuator": "realistic", "line_condition": "smooth"}, (10, 19)
     ratio = stored.stored_ratio(given, spans)
+    assert np.mean(list(stored.stored_changes(given, spans).values())) == pytest.approx(100 * (ratio - 1))
+    assert stored.stored_changes(given, (4, 9)) == {}
     assert ratio is not None
     assert 0.2 < ratio < 0.75
     assert stored.stored_ratio(given | {"sensors": "realistic", "observation": "full"}, spans) == ratio
