@@ -22,8 +22,6 @@ TRIM = 0.25
 """Share of the values that the interquartile mean leaves out at each end."""
 RESAMPLES = 2000
 CONFIDENCE = 0.95
-FEWEST_LINES = 3
-"""Lines from which on a spread between them says something of others."""
 ROUNDING = 1e-12
 """Variance below which nothing but rounding varies: of changes in percent, and of shares of passes."""
 
@@ -104,12 +102,11 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
 def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
     """95 % interval of the same mean, for other lines, of which these are taken as a random sample.
 
-    A t interval: the variance is that between the lines' own means, which holds what seeds draw, too. None
-    with fewer than ``FEWEST_LINES`` lines, if nothing varies, or for a nan.
+    A t interval by the spread of the lines' own means. None for a nan, or with fewer than three lines.
     """
     rows = np.atleast_2d(values)
     lines = [rows[:, clusters.line == line].mean() for line in np.unique(clusters.line)]
-    if np.isnan(rows).any() or len(lines) < FEWEST_LINES:
+    if np.isnan(rows).any() or len(lines) < 3:
         return None
     own = np.array([interquartile_mean(row) for row in rows])
     return _around(own, _Part(float(np.var(lines, ddof=1)) / len(lines), len(lines) - 1))

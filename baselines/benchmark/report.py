@@ -13,7 +13,6 @@ from rich.text import Text
 from panto_env.metrics.labels import LABELS, Label
 from panto_env.terminal import number
 
-from .intervals import Interval
 from .overall import next_in_ranking, with_feedback
 from .run import Benchmark
 from .settings import REFERENCE
@@ -83,13 +82,12 @@ def _overall(outcome: Benchmark) -> Table:
     headings += ["passes\nimproved", "of\noracle", "mean\nmoved in", "better than\nthe next in"]
     for heading in [*headings, *(["beaten by\nthe first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
-    others = [each.policy for each in found if each.interval_for_lines is not None]
-    if others:
-        table.add_column("95 %, for\nother lines (%)", justify="right", no_wrap=True)
     after = next_in_ranking(found)
     method_of = {name: each.policy for each in found for name in each.trainings}
     for each in found:
-        low_high = "" if each.interval is None else f" ({_between(each.interval)})"
+        low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
+        if each.interval_for_lines is not None:
+            low_high += "; other lines ({:+.1f} to {:+.1f})".format(*each.interval_for_lines)
         values = [
             "–" if each.rank is None else str(each.rank),
             f"{number(each.change, 1)}{low_high}",
@@ -104,16 +102,10 @@ def _overall(outcome: Benchmark) -> Table:
         ]
         if best is not None:
             values.append(str(best.better_than.get(each.policy, "–")))
-        if others:
-            values.append(_between(each.interval_for_lines) or "–")
         style = "red" if each.disqualified else "bold" if each is best else ""
         method = method_of.get(each.policy)
         table.add_row(f"{method}: {each.policy}" if method else each.policy, *values, style=style)
     return table
-
-
-def _between(interval: Interval | None) -> str:
-    return "" if interval is None else f"{interval[0]:+.1f} to {interval[1]:+.1f}"
 
 
 def _share(value: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -29,6 +29,9 @@ no ranked policy moves the mean of any pass by more than 4.4 %, and `pd` moves i
 """
 
 
+LEARNT = (
+    "played again alone, a pass of it has other actions: it learns from other passes, or draws without a seed"
+)
 ADVICE = "a policy's attribute washout = 1.0 keeps the mean"
 """Advice to the author of a policy that is disqualified for moving the mean."""
 
@@ -75,11 +78,14 @@ def mean_range(passive: float) -> tuple[float, float]:
 
 
 def compare(
-    rows: Sequence[Row], oracles: Mapping[LineAtSpeed, Mapping[int, float]] = MappingProxyType({})
+    rows: Sequence[Row],
+    oracles: Mapping[LineAtSpeed, Mapping[int, float]] = MappingProxyType({}),
+    learnt: Collection[str] = (),
 ) -> tuple[Cell, ...]:
     """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference.
 
-    oracles: change of sigma (%) of the stored oracles, by line and speed, and by seed.
+    oracles: change of sigma (%) of the stored oracles, by line and speed, and by seed. learnt: policies that
+    learn from one pass for another, or play no pass twice in the same way; they are not ranked.
     """
     groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
@@ -88,14 +94,17 @@ def compare(
     return tuple(
         cell
         for place, rows_of_policies in groups.items()
-        for cell in _ranked_cells(rows_of_policies, oracles.get(place, {}))
+        for cell in _ranked_cells(rows_of_policies, oracles.get(place, {}), learnt)
     )
 
 
-def _ranked_cells(rows_of_policies: dict[str, list[Row]], oracle: Mapping[int, float]) -> list[Cell]:
+def _ranked_cells(
+    rows_of_policies: dict[str, list[Row]], oracle: Mapping[int, float], learnt: Collection[str]
+) -> list[Cell]:
     """Cells of all policies on one line at one speed."""
     passive_rows = rows_of_policies[REFERENCE]
     cells = [_cell(rows, passive_rows, oracle) for rows in rows_of_policies.values()]
+    cells = [replace(cell, disqualified=LEARNT) if cell.policy in learnt else cell for cell in cells]
     changes = sorted(cell.change for cell in cells if not cell.disqualified)
     return [
         cell if cell.disqualified else replace(cell, rank=1 + changes.index(cell.change)) for cell in cells

@@ -183,23 +183,15 @@ def stored_actions(given: Mapping[str, Any]) -> NDArray[np.float64] | None:
     return None
 
 
-def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int]) -> float | None:
-    """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
+def stored_changes(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[int, float]:
+    """Change of σ (%) from the passive run by seed, of the stored oracle for settings of a run by name.
 
-    None if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
+    Empty if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
     control interval and computation over exactly these spans; sensors do not matter.
     """
-    one = _stored(given, spans)
-    return None if one is None else float(one["ratio"])
-
-
-def stored_changes(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[int, float]:
-    """Changes of σ (%) from the passive run of the oracle that ``stored_ratio`` finds, by seed; or none."""
-    passes = (_stored(given, spans) or {"passes": []})["passes"]
-    return {each["seed"]: 100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes}
-
-
-def _stored(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[str, Any] | None:
     sought = fingerprint(given)
-    cells = (each for each in stored_cells() if each["asked"]["fingerprint"] == sought)
-    return next((each for each in cells if tuple(each["spans"]) == spans), None)
+    for one in stored_cells():
+        if one["asked"]["fingerprint"] == sought and tuple(one["spans"]) == spans:
+            pairs = ((each["seed"], each["oracle"]["std"] / each["passive"]["std"]) for each in one["passes"])
+            return {seed: 100 * (ratio - 1) for seed, ratio in pairs}
+    return {}

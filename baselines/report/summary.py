@@ -24,10 +24,9 @@ def summary(result: Result) -> Table:
 
     Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
     shows by how much the policy moves the mean, or that it ended early. The last columns are over all passes:
-    the change with its 95 % intervals, for other seeds on these lines and, from three lines on, for other
-    lines; CL and the change of CF (both means over cells), the mean of the worst quarter of passes, the share
-    of passes in which the policy is better than the next one, with its interval, and in how many it moves the
-    mean by more than 1.5 %. A method's trainings follow it.
+    the change with its 95 % interval, the mean of the worst quarter of passes, the share of passes in which
+    the policy is better than the next one, with its interval, and in how many it moves the mean by more than
+    1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
     """
     lines = {place[:2] for place in result.places}
     headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
