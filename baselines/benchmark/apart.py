@@ -13,10 +13,12 @@ import atexit
 import json
 import os
 import pickle
+import re
 import select
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NoReturn
@@ -27,6 +29,8 @@ from numpy.typing import NDArray
 from panto_env.analysis.pool import LINEAR_ALGEBRA_THREADS
 from panto_env.base.errors import InputError
 from panto_env.control.context import Context
+from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_env.control.settings import run_settings
 from panto_env.policies import PolicyError, find_policy, policy_names
 
 from .policy_process import (
@@ -36,6 +40,7 @@ from .policy_process import (
     END,
     ENDED,
     FAILED,
+    HEADER,
     LONGEST,
     OBSERVATION,
     core,
@@ -50,6 +55,10 @@ PREPARATION_LIMIT = 600.0
 """Time (s) within which it must be loaded, and prepare for an episode: kernels may be compiled for that."""
 INTERPRETER = "PANTO_POLICY_PYTHON"
 """Variable that names the Python of policies, which has this package too; by default it is this one."""
+ENVIRONMENT = re.compile("PATH|HOME|LANG|LC_.*|TZ|TMPDIR|LD_LIBRARY_PATH|.*_CACHE_(DIR|HOME)|NUMBA_.*")
+"""Variables of the environment that a policy's process gets; others may hold secrets."""
+END_LIMIT = 5.0
+"""Time (s) within which its process ends by itself where another user's can't be killed."""
 MODULE = "panto_baselines.benchmark.policy_process"
 
 
@@ -124,7 +133,8 @@ class _PolicyProcess:
                 [python, "-P", "-m", MODULE],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                env=os.environ | variables,
+                env={name: os.environ[name] for name in filter(ENVIRONMENT.fullmatch, os.environ)}
+                | variables,
                 process_group=0,  # interrupts from the keyboard are left to this process
                 bufsize=0,
             )
@@ -153,7 +163,14 @@ class _PolicyProcess:
         if self._open[:1] != [source.encode()]:
             self._source = source
             self._descend(source.encode())
-            self._wishes = json.loads(self._answer("being loaded", PREPARATION_LIMIT))
+            answer = self._answer("being loaded", PREPARATION_LIMIT)
+            try:
+                self._wishes = json.loads(answer)
+                if not self._wishes.keys() <= {*OBSERVATION_SETTINGS, "washout"}:
+                    raise ValueError("unknown names")
+                run_settings(self._wishes)
+            except (InputError, ValueError, AttributeError, RecursionError) as error:
+                self._fail("being loaded", f"what it wishes is not valid: {error}".removesuffix("."))
         return self._wishes
 
     def begin(self, source: str, context: Context) -> None:
@@ -177,13 +194,14 @@ class _PolicyProcess:
         return np.frombuffer(answer)
 
     def close(self) -> None:
-        """End the process, and all that it has forked."""
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
+        """End the process, and all that it has forked; another user's ends as its pipes are closed."""
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 pipe.close()
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(END_LIMIT)
 
     def _descend(self, *contents: bytes) -> None:
         """End the processes that were begun with something else, or with the last of these, and begin it."""
@@ -205,17 +223,24 @@ class _PolicyProcess:
 
     def _answer(self, when: str, limit: float, expected: bytes = DONE) -> bytes:
         """Content of the next answer. Raises PolicyError where it is another one, or late."""
-        if not self._arrival.poll(1000 * limit):
-            self._fail(when, f"it took more than {limit:g} s")
-        answer = os.read(self._answers, LONGEST)
-        kind, content = answer[:1], answer[1:]
+        end, answer, length = time.monotonic() + limit, b"", HEADER
+        while len(answer) < length:
+            if not self._arrival.poll(1000 * max(0.0, end - time.monotonic())):
+                self._fail(when, f"it took more than {limit:g} s")
+            if not (more := os.read(self._answers, LONGEST)):
+                self._fail(when, "its process ended")
+            answer += more
+            length = HEADER + int.from_bytes(answer[1:HEADER].ljust(HEADER - 1, b"\xff"), "big")
+            if len(answer) >= HEADER and not len(answer) <= length <= LONGEST:
+                self._fail(when, "its process sent something else than an answer")
+        kind, content = answer[:1], answer[HEADER:]
         if kind == expected:
             return content
         words = content.decode(errors="replace")
-        if kind == FAILED:
+        if kind == FAILED and self._source in words:  # otherwise it may blame another policy
             close()
             raise PolicyError(words)
-        self._fail(when, f"its process {words or 'ended'}")
+        self._fail(when, f"its process {words or 'ended'}" if kind == ENDED else words.removesuffix("."))
 
     def _fail(self, when: str, why: str) -> NoReturn:
         close()

@@ -96,7 +96,25 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
     # Half of what lies between is a standard deviation that a few far-off resamples do not stretch.
     low, high = np.quantile(means, norm.cdf((-1.0, 1.0)))
     own = np.array([interquartile_mean(row) for row in rows])
-    parts = [_Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom), *_between(own)]
+    return _around(own, _Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom))
+
+
+def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
+    """95 % interval of the same mean, for other lines, of which these are taken as a random sample.
+
+    A t interval by the spread of the lines' own means. None for a nan, or with fewer than three lines.
+    """
+    rows = np.atleast_2d(values)
+    lines = [rows[:, clusters.line == line].mean() for line in np.unique(clusters.line)]
+    if np.isnan(rows).any() or len(lines) < 3:
+        return None
+    own = np.array([interquartile_mean(row) for row in rows])
+    return _around(own, _Part(float(np.var(lines, ddof=1)) / len(lines), len(lines) - 1))
+
+
+def _around(own: Array, drawn: _Part) -> Interval | None:
+    """Interval about the mean of the trainings' means, (trainings,), by the variance of what is drawn."""
+    parts = [drawn, *_between(own)]
     variance = sum(part.variance for part in parts)
     if variance < ROUNDING:
         return None

@@ -18,13 +18,14 @@ from .intervals import (
     Interval,
     Share,
     interquartile_mean,
+    interval_for_lines,
     interval_of_mean,
     share_of,
     worst_quarter,
 )
 from .settings import REFERENCE
 from .single_pass import Row
-from .statistics import KEEPS_THE_MEAN, MOVED, Cell, LineAtSpeed, relative_changes
+from .statistics import ADVICE, MOVED, Cell, LineAtSpeed, relative_changes
 
 MOVED_PASSES = 1 / 3
 """Share of a track's passes from which on a policy is disqualified for moving the mean by over ``MOVED``.
@@ -45,6 +46,7 @@ class Standing:
     policy: str  # or the method's name
     change: float  # of sigma from the passive one at the same mean force, interquartile mean of passes (%)
     interval: Interval | None  # 95 % interval of ``change``; None: see interval_of_mean
+    interval_for_lines: Interval | None  # 95 % interval for other lines; None with fewer than three
     worst_quarter: float  # the same change, mean of the quarter of passes where it is largest (%)
     worst: float  # maximum change of any cell (%)
     worst_at: str  # line and speed of that cell
@@ -164,6 +166,7 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
         policy=policy,
         change=100 * interquartile_mean(changes),
         interval=interval_of_mean(100 * changes, clusters),
+        interval_for_lines=interval_for_lines(100 * changes, clusters),
         worst_quarter=100 * worst_quarter(changes),
         worst=worst.change,
         worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
@@ -193,6 +196,7 @@ def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clust
         policy=method,
         change=mean("change"),
         interval=interval_of_mean(100 * changes, clusters),
+        interval_for_lines=interval_for_lines(100 * changes, clusters),
         worst_quarter=mean("worst_quarter"),
         worst=worst.worst,
         worst_at=worst.worst_at,
@@ -224,7 +228,7 @@ def _disqualification(cells: Sequence[Cell]) -> str:
     if moved >= MOVED_PASSES * passes:
         return (
             f"it moves the mean force by more than {100 * MOVED:g} % in {moved} of {passes} passes, "
-            f"a third of them or more ({KEEPS_THE_MEAN})"
+            f"a third of them or more ({ADVICE})"
         )
     return ""
 

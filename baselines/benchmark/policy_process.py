@@ -33,8 +33,8 @@ BEGIN, OBSERVATION, END = b"b", b"o", b"e"
 the number of the core on which the other side runs, and the observation."""
 DONE, FAILED, ENDED = b"+", b"!", b"."
 """First byte of an answer: content, a sentence about the policy's error, or how a process has ended."""
-LONGEST = 4096
-"""Maximum length of an answer (bytes): a pipe passes so much on in one piece."""
+HEADER, LONGEST = 5, 65_536
+"""Length of an answer's kind and, in 4 bytes, of its content's length; maximum of an answer (bytes)."""
 DIE_WITH_PARENT, DUMPABLE = 1, 4
 """Options of Linux's ``prctl``."""
 NO_CORE = b"\xff\xff"
@@ -93,8 +93,9 @@ class Channel:
         return request[3:]
 
     def answer(self, kind: bytes, content: bytes = b"") -> None:
-        """Send an answer, cut to ``LONGEST``."""
-        os.write(self._answers, (kind + content)[:LONGEST])
+        """Send an answer, its content cut so that both are no longer than ``LONGEST``."""
+        content = content[: LONGEST - HEADER]
+        os.write(self._answers, kind + len(content).to_bytes(HEADER - 1, "big") + content)
 
 
 def serve(channel: Channel, begin: Callable[[bytes], None]) -> None:

@@ -18,6 +18,7 @@ from panto_env.cluster import spread
 
 from . import actions
 from .run import outcome_of, passes_of
+from .seeds import salt_hash
 from .settings import BenchmarkSettings
 from .single_pass import run_pass
 
@@ -58,10 +59,16 @@ def replay(
         passes = list(passes_of(settings, spans))
         kept = actions.read(actions.beside(result), expected)
         named = [row["policy"] for row in rows]
+        learnt = tuple(table.get("learnt", ()))
+        salted = table["salt_sha256"]
     except (LookupError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{result} is no result of `panto benchmark --output RESULT.json`.") from error
+    if salted != (None if settings.salt is None else salt_hash(settings.salt)):
+        raise InputError(
+            f"{result} has a salt_sha256 that is not its salt's: its seeds are not those promised."
+        )
     if not len(rows) == len(passes) == len(kept):
         raise InputError(
             f"{result} has {len(rows)} rows and the actions of {len(kept)} passes; make it again."
@@ -83,7 +90,7 @@ def replay(
     )
     follows = None
     if len(again) == len(rows) and not any(each.difference for each in replayed):
-        outcome = outcome_of(settings, spans, again).as_dict()
+        outcome = outcome_of(settings, spans, again, learnt).as_dict()
         follows = all(table[part] == outcome[part] for part in ("standings", "cells", "traces"))
     return Replay(replayed, follows)
 

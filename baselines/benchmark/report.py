@@ -40,19 +40,20 @@ OWN_LABELS = {
 }
 LEGEND = (
     "Interquartile means over the seeds, or over all passes. Δσ and ΔCF are relative to a passive pantograph "
-    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. CL is paper 1's "
-    "ratio of contact loss, CF its cost function; in the last table both are means over lines and speeds. "
-    "Intervals are for 95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of "
-    "the force low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is "
-    "highest. Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a "
-    "cell or in a third of all passes, or by more than 5 % in any pass. A method's figures are means over "
-    "its trainings, and its intervals cover their spread."
+    "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. Intervals are for "
+    "95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of the force "
+    "low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is highest. "
+    "Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a cell or "
+    "in a third of all passes, or by more than 5 % in any pass. A method's figures are means over its "
+    "trainings, and its intervals cover their spread. CL is paper 1's ratio of contact loss, CF its cost "
+    "function; over all lines they are means over cells. Intervals are for these lines, or for others "
+    "like them, as if these were a random sample."
 )
 
 ORACLE = (
     "oracle: the smallest σ found for the same actuator when the line is known, over the same spans "
-    "(`panto oracle --stored`), mean over seeds of its own. It is a local optimum: a share above 100 % is "
-    "possible."
+    "(`panto oracle --stored`), mean over seeds of its own, which "
+    "shares are over too. It is a local optimum: a share above 100 % is possible."
 )
 
 
@@ -85,6 +86,8 @@ def _overall(outcome: Benchmark) -> Table:
     method_of = {name: each.policy for each in found for name in each.trainings}
     for each in found:
         low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
+        if each.interval_for_lines is not None:
+            low_high += "; other lines ({:+.1f} to {:+.1f})".format(*each.interval_for_lines)
         values = [
             "–" if each.rank is None else str(each.rank),
             f"{number(each.change, 1)}{low_high}",
@@ -126,11 +129,8 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
-            changes = {
-                "std": _change(cell),
-                "cost_function": number(cell.cost_change, 0),
-                "mean": number(cell.mean_change, 1),
-            }
+            beside = (_change(cell), number(cell.cost_change, 0), number(cell.mean_change, 1))
+            changes = dict(zip(CHANGES, beside, strict=True))
             values = []
             for name, decimals in FIGURES.items():
                 values.append(number(_label(name).scale * cell.figures[name], decimals))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -23,10 +23,10 @@ from panto_env.metrics.labels import HEADINGS
 from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.catenary.schema import CLEAR
 
-from ..oracle.stored import stored_ratio
+from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played
-from .controls import ORACLE_TAPE, policy_of
+from .controls import ORACLE_TAPE, control_of, policy_of
 from .overall import Standing, standings
 from .seeds import salt_hash
 from .settings import BenchmarkSettings, Line
@@ -49,6 +49,7 @@ class Benchmark:
     standings: tuple[Standing, ...]  # one per policy that runs on every line
     traces: tuple[Trace, ...]  # of the passes under the first seed that did not end early
     played: tuple[Played, ...] = field(repr=False, compare=False)  # in the rows' passes
+    learnt: tuple[str, ...] = ()  # policies that are not ranked for it, see ``compare``
 
     def as_dict(self) -> dict[str, Any]:
         """The whole outcome as plain data for JSON: nan becomes None."""
@@ -59,8 +60,9 @@ class Benchmark:
                 "salt_sha256": None if self.settings.salt is None else salt_hash(self.settings.salt),
                 "actions_sha256": actions.digest(self.played),
                 "spans": self.spans,
+                "learnt": self.learnt,
                 "standings": [asdict(each) for each in self.standings],
-                "cells": [asdict(cell) | {"oracle_share": cell.oracle_share} for cell in self.cells],
+                "cells": [asdict(cell) for cell in self.cells],
                 "rows": [row.as_dict() for row in self.rows],
                 "traces": [asdict(each) for each in self.traces],
             }
@@ -111,9 +113,24 @@ def run(
             passes = one_by_one(jobs, progress=progress)
         else:
             passes = spread(jobs, workers=workers, ray=ray, progress=progress)
+        learnt = _learnt(jobs, passes)
     finally:
         apart.close()
-    return outcome_of(settings, spans, passes)
+    return outcome_of(settings, spans, passes, learnt)
+
+
+def _learnt(jobs: Sequence[Callable[[], Pass]], passes: Sequence[Pass]) -> tuple[str, ...]:
+    """Policies of Python files whose last and first pass, each played again alone, differ in a bit."""
+    own: dict[str, list[int]] = {}
+    for k, each in enumerate(passes):
+        if each.row.policy.partition(":")[0].endswith(".py") and not control_of(each.row.policy):
+            own.setdefault(each.row.policy, []).append(k)
+
+    def differs(k: int) -> bool:
+        apart.close()
+        return actions.digest([jobs[k]().played]) != actions.digest([passes[k].played])
+
+    return tuple(policy for policy, places in own.items() if differs(places[-1]) or differs(places[0]))
 
 
 def _check_policies(settings: BenchmarkSettings) -> None:
@@ -138,26 +155,30 @@ def passes_of(
 
 
 def outcome_of(
-    settings: BenchmarkSettings, spans: tuple[tuple[int, int], ...], passes: Sequence[Pass]
+    settings: BenchmarkSettings,
+    spans: tuple[tuple[int, int], ...],
+    passes: Sequence[Pass],
+    learnt: tuple[str, ...] = (),
 ) -> Benchmark:
-    """Outcome of all passes."""
+    """Outcome of all passes; learnt: see ``compare``."""
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows, stored_bounds(settings, spans))
+    cells = compare(rows, stored_bounds(settings, spans), learnt)
     played = tuple(each.played for each in passes)
     standing = standings(rows, cells, settings.trainings)
-    return Benchmark(settings, spans, rows, cells, standing, traces, played)
+    return Benchmark(settings, spans, rows, cells, standing, traces, played, learnt)
 
 
-def stored_bounds(settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]) -> dict[LineAtSpeed, float]:
-    """Change of sigma (%) by line and speed, for the cells that have a stored oracle."""
+def stored_bounds(
+    settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]
+) -> dict[LineAtSpeed, dict[int, float]]:
+    """Changes of sigma (%) of the stored oracles, by line and speed, and by seed."""
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            ratio = stored_ratio(along(settings, line) | {"speed_kmh": speed}, covered)
-            if ratio is not None:
-                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = 100 * (ratio - 1)
-    return found
+            changes = stored_changes(along(settings, line) | {"speed_kmh": speed}, covered)
+            found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
+    return {place: changes for place, changes in found.items() if changes}
 
 
 def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

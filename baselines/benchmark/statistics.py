@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -29,7 +29,10 @@ no ranked policy moves the mean of any pass by more than 4.4 %, and `pd` moves i
 """
 
 
-KEEPS_THE_MEAN = "a policy's attribute washout = 1.0 keeps the mean"
+LEARNT = (
+    "played again alone, a pass of it has other actions: it learns from other passes, or draws without a seed"
+)
+ADVICE = "a policy's attribute washout = 1.0 keeps the mean"
 """Advice to the author of a policy that is disqualified for moving the mean."""
 
 
@@ -63,14 +66,10 @@ class Cell:
     moved: int  # passes in which it is more than 1.5 %
     improved: float  # share of passes with a smaller sigma than the passive pantograph at the same mean
     spread: float  # standard deviation of sigma over the seeds, relative to its mean (%)
-    oracle: float | None  # change of sigma that the stored oracle of this cell reaches (%); None without one
+    oracle: float | None  # change of sigma that the stored oracle reaches (%); None without a pass of both
+    oracle_share: float | None  # of the oracle's gain, over the passes that it ran; None likewise
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
-
-    @property
-    def oracle_share(self) -> float | None:
-        """Share of the stored oracle's gain; None if no oracle is stored."""
-        return None if self.oracle is None else self.change / self.oracle + 0.0  # no minus zero
 
 
 def mean_range(passive: float) -> tuple[float, float]:
@@ -79,11 +78,14 @@ def mean_range(passive: float) -> tuple[float, float]:
 
 
 def compare(
-    rows: Sequence[Row], oracles: Mapping[LineAtSpeed, float] = MappingProxyType({})
+    rows: Sequence[Row],
+    oracles: Mapping[LineAtSpeed, Mapping[int, float]] = MappingProxyType({}),
+    learnt: Collection[str] = (),
 ) -> tuple[Cell, ...]:
     """Cells of all rows, in the rows' order of lines, speeds and policies; passive is the reference.
 
-    oracles: change of sigma (%) of the stored oracles, by line and speed.
+    oracles: change of sigma (%) of the stored oracles, by line and speed, and by seed. learnt: policies that
+    learn from one pass for another, or play no pass twice in the same way; they are not ranked.
     """
     groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
@@ -92,21 +94,24 @@ def compare(
     return tuple(
         cell
         for place, rows_of_policies in groups.items()
-        for cell in _ranked_cells(rows_of_policies, oracles.get(place))
+        for cell in _ranked_cells(rows_of_policies, oracles.get(place, {}), learnt)
     )
 
 
-def _ranked_cells(rows_of_policies: dict[str, list[Row]], oracle: float | None) -> list[Cell]:
+def _ranked_cells(
+    rows_of_policies: dict[str, list[Row]], oracle: Mapping[int, float], learnt: Collection[str]
+) -> list[Cell]:
     """Cells of all policies on one line at one speed."""
     passive_rows = rows_of_policies[REFERENCE]
     cells = [_cell(rows, passive_rows, oracle) for rows in rows_of_policies.values()]
+    cells = [replace(cell, disqualified=LEARNT) if cell.policy in learnt else cell for cell in cells]
     changes = sorted(cell.change for cell in cells if not cell.disqualified)
     return [
         cell if cell.disqualified else replace(cell, rank=1 + changes.index(cell.change)) for cell in cells
     ]
 
 
-def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cell:
+def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float]) -> Cell:
     """Cell of one policy on one line at one speed, without its rank."""
     first = rows[0]
     tables = [row.as_dict() for row in rows]
@@ -120,6 +125,8 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cel
     # Pass by pass, with the same line, speed, seed and noise.
     paired = zip(rows, passive_rows, strict=True)
     means = np.array([_mean_moved(row, passive) for row, passive in paired])
+    both = [(own, oracle[row.seed]) for own, row in zip(changes, rows, strict=True) if row.seed in oracle]
+    reached, bound = np.mean(both, axis=0).tolist() if both else (0.0, None)
     return Cell(
         policy=first.policy,
         catenary=first.catenary,
@@ -135,7 +142,8 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: float | None) -> Cel
         most_moved=100 * float(means[np.argmax(np.abs(means))]),  # nan if any is nan
         moved=int(np.sum(np.abs(means) > MOVED)),
         improved=float("nan") if np.isnan(changes).any() else float(np.mean(changes < 0)),
-        oracle=oracle,
+        oracle=bound,
+        oracle_share=None if bound is None else 100 * reached / bound + 0.0,  # no minus zero
         spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
         disqualified=_disqualification(rows, passive_rows, means),
         rank=None,
@@ -176,12 +184,12 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) ->
         return "the passive pantograph's runs ended early: there is nothing to compare with"
     typical, most = interquartile_mean(means), means[np.argmax(np.abs(means))]
     if abs(typical) > MOVED:
-        moved = _beyond(typical, MOVED)
-        return f"it moves the mean force by {moved}, more than {100 * MOVED:g} % ({KEEPS_THE_MEAN})"
+        return f"it moves the mean force by {_beyond(typical, MOVED)}, more than {100 * MOVED:g} % ({ADVICE})"
     if abs(most) > MOVED_AT_MOST:
         moved = _beyond(most, MOVED_AT_MOST)
-        most_allowed = f"more than {100 * MOVED_AT_MOST:g} % ({KEEPS_THE_MEAN})"
-        return f"it moves the mean force by {moved} in one pass, {most_allowed}"
+        return (
+            f"it moves the mean force by {moved} in one pass, more than {100 * MOVED_AT_MOST:g} % ({ADVICE})"
+        )
     if any(np.isnan(row.pressed_std) for row in rows):
         return "no passive pantograph can reach its mean force"
     return ""

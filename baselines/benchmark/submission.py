@@ -53,6 +53,7 @@ class Checked:
 
     card: Card
     policy: str  # as the benchmark calls it
+    requirements: tuple[str, ...]
     outcome: Benchmark
 
     @property
@@ -70,15 +71,29 @@ class Checked:
         return next(each for each in self.outcome.standings if each.policy == policy)
 
 
-def read_submission(folder: str | Path) -> tuple[Card, str]:
-    """Card and policy of a submission. Raises InputError, naming file and key, where it is not whole."""
-    path = Path(folder) / CARD
+def read_submission(folder: str | Path) -> tuple[Card, str, tuple[str, ...]]:
+    """Card, policy and requirements of a submission; nothing of it has run.
+
+    Raises InputError, naming file and key, where it is not whole, has characters that control a terminal, or
+    a link that leaves the folder.
+    """
+    path, required = Path(folder) / CARD, Path(folder) / REQUIREMENTS
     card = parse(Card, read_toml(path), str(path))
     file, *rest = card.policy.split(":", 1)
     source = Path(folder) / file
     if not source.is_file():
         raise InputError(f"{path} names the policy '{card.policy}', but there is no file {source}.")
-    return card, ":".join((str(source), *rest))
+    for each in (path, source, required):
+        if not each.resolve().is_relative_to(Path(folder).resolve()):
+            raise InputError(f"{each} is a link that leaves the folder; put the file itself there.")
+    try:
+        requirements = tuple(required.read_text("utf-8").split()) if required.exists() else ()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{required} could not be read: write it as text in UTF-8.") from error
+    words = " ".join((*requirements, *card.authors, *(str(value) for key, value in card if key != "authors")))
+    if not all(each.isprintable() or each in "\n\t" for each in words):
+        raise InputError(f"{folder}: card and requirements may hold printable characters only.")
+    return card, ":".join((str(source), *rest)), requirements
 
 
 def check(
@@ -92,12 +107,12 @@ def check(
     settings: of the track, whose policies don't run. Raises InputError for a submission that is not whole,
     and for a policy that fails.
     """
-    card, policy = read_submission(folder)
+    card, policy, requirements = read_submission(folder)
     lines = tuple(line.model_copy(update={"policies": ()}) for line in settings.lines)
     policies = (REFERENCE, policy, f"{TAPE}{policy}")
     changes = {"policies": policies, "lines": lines, "trainings": {}, "trusted": False}
     judged = settings.model_copy(update=changes)
-    return Checked(card, policy, run(judged, workers, progress))
+    return Checked(card, policy, requirements, run(judged, workers, progress))
 
 
 def place_among(change: float, others: Sequence[float]) -> int:

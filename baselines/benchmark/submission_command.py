@@ -53,13 +53,13 @@ def check(
         print_json({"card": checked.card.model_dump(mode="json"), "result": checked.outcome.as_dict()})
         return
     console = PlainConsole()
-    for line in _report(checked, folder, [each.change for each in ranked]):
+    for line in _report(checked, [each.change for each in ranked]):
         console.print(line, soft_wrap=True)
 
 
-def _report(checked: Checked, folder: Path, others: list[float]) -> list[str]:
+def _report(checked: Checked, others: list[float]) -> list[str]:
     """What is said of a submission, line by line."""
-    from .submission import REQUIREMENTS, place_among
+    from .submission import place_among
 
     card, standing, tape = checked.card, checked.standing, checked.tape
     interval = standing.interval
@@ -71,8 +71,8 @@ def _report(checked: Checked, folder: Path, others: list[float]) -> list[str]:
         f"Worst: {standing.worst:+.1f} %, {standing.worst_at}; ahead of passive in {standing.improved:.0%} "
         "of passes",
     ]
-    if (folder / REQUIREMENTS).is_file():
-        lines.append(f"It requires: {', '.join((folder / REQUIREMENTS).read_text('utf-8').split())}")
+    if checked.requirements:
+        lines.append(f"It requires: {', '.join(checked.requirements)}")
     if standing.disqualified:
         return [*lines, f"It would not be ranked: {standing.disqualified}."]
     where = f", at place {place_among(standing.change, others)} of {len(others) + 1}" if others else ""

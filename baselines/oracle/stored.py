@@ -183,14 +183,15 @@ def stored_actions(given: Mapping[str, Any]) -> NDArray[np.float64] | None:
     return None
 
 
-def stored_ratio(given: Mapping[str, Any], spans: tuple[int, int]) -> float | None:
-    """σ of the stored oracle over the passive run's, mean over its seeds, for settings of a run by name.
+def stored_changes(given: Mapping[str, Any], spans: tuple[int, int]) -> dict[int, float]:
+    """Change of σ (%) from the passive run by seed, of the stored oracle for settings of a run by name.
 
-    None if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
+    Empty if there is no oracle for exactly this line, pantograph, speed, actuator, condition of the line,
     control interval and computation over exactly these spans; sensors do not matter.
     """
     sought = fingerprint(given)
     for one in stored_cells():
         if one["asked"]["fingerprint"] == sought and tuple(one["spans"]) == spans:
-            return float(one["ratio"])
-    return None
+            pairs = ((each["seed"], each["oracle"]["std"] / each["passive"]["std"]) for each in one["passes"])
+            return {seed: 100 * (ratio - 1) for seed, ratio in pairs}
+    return {}

@@ -57,9 +57,9 @@ class FeedbackFeedforward(ForceLaw):
         gain: N/N, or a table of gains by speed (km/h), linear between these speeds and constant beyond
         them; the default opposes each newton with one newton, see ``Proportional``. theta: phase (rad);
         the default is the paper's for every speed. amplitude: A (N). dead_zone: half its width (N).
-        speed_unit: of v in Eq. 12, for the reading "printed" only. washout: time constant (s) of the slow
-        average that the environment subtracts from the force, so that the mean contact force stays; None or 0
-        is the paper's form.
+        speed_unit: of v in Eq. 12, for the reading "printed" only.
+        washout: time constant (s) of the force's slow average, which the environment subtracts, so that the
+        mean contact force stays; None or 0 is the paper's form.
         """
         gains = gain if isinstance(gain, Mapping) else {0.0: gain}
         if not gains:

@@ -40,10 +40,7 @@ class ForceLaw(ABC):
 
 
 def time_constant(washout: object) -> float:
-    """Time constant (s) of a policy's washout, see ``Policy``; 0, for None too, is none.
-
-    Raises ValueError if it is not valid.
-    """
+    """Time constant (s) of a policy's washout, 0 for None too. Raises ValueError if it is not valid."""
     return 0.0 if washout is None else number("washout", washout, lowest=0)
 
 

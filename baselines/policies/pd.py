@@ -27,9 +27,7 @@ class ProportionalDerivative(ForceLaw):
     ) -> None:
         """Take ``gain`` (N/N), ``derivative`` (N per N/s) and ``damping`` (N s/m), each 0 or more.
 
-        washout: time constant (s) of the slow average that the environment subtracts from the force, so that
-        the mean contact force stays; None or 0 is the usual form, without one.
-
+        washout: see ``FeedbackFeedforward``.
         The defaults were chosen with `panto benchmark pd:gain=...,derivative=...,damping=... --config
         configs/benchmark.toml` among gains of 0.5, 0.75, 1; derivatives of 0, 0.005, 0.01, 0.015; dampings
         of 100, 150, 200. With the ideal actuator they come within 0.3 % of the minimum mean sigma; with the

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from .force_law import time_constant
 from .gains import Source
 from .lanes_law import Array, Gain, Observations, TunableLaw
 
@@ -23,13 +22,9 @@ class Skyhook(TunableLaw):
 
     TUNED: ClassVar[Mapping[str, Gain]] = {"frame": Gain(20.0), "head": Gain(20.0)}
 
-    def __init__(self, gains: Source = "skyhook", washout: float | None = None) -> None:
-        """gains: (2,): frame and head (N s/m); or the name or path of a file of gains.
-
-        washout: see ``ProportionalDerivative``. Raises ValueError for one that is not valid.
-        """
+    def __init__(self, gains: Source = "skyhook") -> None:
+        """gains: (2,): frame and head (N s/m); or the name or path of a file of gains."""
         super().__init__(gains)
-        self.washout = time_constant(washout)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""

@@ -33,7 +33,6 @@ class TunedFeedbackFeedforward(TunableLaw):
 
     def __init__(self, gains: Source = "tuned-fb+ff", washout: float | None = None) -> None:
         """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains.
-
         washout: see ``FeedbackFeedforward``; it makes the bias idle.
         """
         super().__init__(gains)

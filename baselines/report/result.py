@@ -69,7 +69,8 @@ class StoredCell(AtPlace):
     improved: Number
     disqualified: str
     rank: int | None
-    oracle_share: float | None = None  # share of the oracle's gain; None if no oracle was run
+    oracle: float | None = None  # change of σ (%) in the passes that an oracle ran; None without one
+    oracle_share: float | None = None  # share of its gain, in these passes
 
 
 class Trace(AtPlace):
@@ -95,6 +96,7 @@ class StoredStanding(ResultTable):
     policy: str
     change: Number
     interval: Interval
+    interval_for_lines: Interval = None  # not in older results
     worst_quarter: Number
     worst: Number
     worst_at: str

@@ -24,9 +24,9 @@ def summary(result: Result) -> Table:
 
     Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
     shows by how much the policy moves the mean, or that it ended early. The last columns are over all passes:
-    the change with its 95 % interval, CL and the change of CF (both means over cells), the mean of the worst
-    quarter of passes, the share of passes in which the policy is better than the next one, with its interval,
-    and in how many it moves the mean by more than 1.5 %. A method's trainings follow it.
+    the change with its 95 % interval, the mean of the worst quarter of passes, the share of passes in which
+    the policy is better than the next one, with its interval, and in how many it moves the mean by more than
+    1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
     """
     lines = {place[:2] for place in result.places}
     headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
@@ -51,9 +51,12 @@ def _overall(one: StoredStanding, after: str | None) -> tuple[str, ...]:
     losses = number(one.contact_loss, 2), number(one.cost_change, 0)
     if one.disqualified:
         return "–", "–", *losses, "–", "–", moved
+    between = "–" if one.interval is None else "{:.1f} to {:.1f}".format(*one.interval)
+    if one.interval_for_lines is not None:
+        between += " (other lines {:.1f} to {:.1f})".format(*one.interval_for_lines)
     return (
         f"{one.change:.1f}",
-        "–" if one.interval is None else f"{one.interval[0]:.1f} to {one.interval[1]:.1f}",
+        between,
         *losses,
         f"{one.worst_quarter:.1f}",
         str(one.better_than.get(after or "", "–")),
@@ -78,6 +81,6 @@ def _text(cells: Sequence[StoredCell]) -> str:
 def _oracle(result: Result, place: LineAtSpeed) -> str:
     """Change of sigma (%) of the stored oracle for a line at a speed, or ""."""
     for cell in result.cells:
-        if cell.place == place and cell.oracle_share:
-            return f"{cell.change / cell.oracle_share:.1f}"
+        if cell.place == place and cell.oracle is not None:
+            return f"{cell.oracle:.1f}"
     return ""

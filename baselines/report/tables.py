@@ -181,6 +181,8 @@ def _change(one: StoredStanding | StoredCell, scale: Scale) -> Entry:
         return Entry("–")
     low, high = one.interval or (one.change, one.change)
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
+    if isinstance(one, StoredStanding) and one.interval_for_lines is not None:
+        note += "; other lines {} to {}".format(*(signed(end, 1) for end in one.interval_for_lines))
     inside = scale.lowest <= low and high <= scale.highest
     bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
     return Entry(signed(one.change, 1), _key(one.change), note, bar)

@@ -51,9 +51,9 @@ def tune(
 
     The fit minimises the variance of the contact force on training seeds, near the passive mean force;
     the table shows the result on selection seeds. By default actuator and sensors are "realistic" and
-    the line is "smooth". With --washout gains are for the policy with that washout, tuned-pd:washout=1.
-    Gains for the same line, pantograph, place and washout in the file are replaced only with --force. An
-    interrupted tuning keeps the speeds that are done; the same command continues it.
+    the line is "smooth". Gains for the same line, pantograph and place in the file are replaced only with
+    --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
+    With --washout gains are for the policy with that washout: tuned-pd:washout=1.
     """
     from panto_env.cluster.parts import remove_parts
     from panto_env.control.settings import run_settings

@@ -52,10 +52,8 @@ def tunable(name: str, washout: float = 0.0) -> type[TunableLaw]:
     for each in policy_names():
         with suppress(InputError):  # a plug-in that can't be loaded
             able += [each] if _has_gains(maker_of(each), washout) else []
-    what, having = (
-        ("no parameter washout", " and washout") if _has_gains(maker, 0.0) else ("no gains to tune", "")
-    )
-    raise InputError(f"'{name}' has {what}; policies with gains{having} are {', '.join(able)}.")
+    what = f"no gains to tune{' with a washout' if washout else ''}"
+    raise InputError(f"'{name}' has {what}; policies with gains are {', '.join(able)}.")
 
 
 def _has_gains(maker: Any, washout: float) -> TypeGuard[type[TunableLaw]]:

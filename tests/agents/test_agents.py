@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -380,6 +381,10 @@ class TestCommand:
         table = panto("evaluate", report["best"], "--speed", 280, "--seeds", 2)
         assert "standard deviation" in table.stdout
         assert "280" in table.stdout
+        lines = table.stdout.strip().splitlines()
+        assert lines[0] == lines[-1]
+        assert lines[0].startswith("mean of all: σ")
+        assert not re.search(r"v/c|Doppler|reflection", table.stdout)  # no controller changes them
 
         refused = panto("train", config, "--seed", 3, "--steps", 128)
         assert isinstance(refused.exception, InputError)

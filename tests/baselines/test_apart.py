@@ -210,6 +210,104 @@ def test_its_python_may_be_another(monkeypatch, tmp_path):
         play(policy)
 
 
+def test_another_user_s_processes_end_as_their_pipes_are_closed(monkeypatch):
+    """They can't be killed; those that go on do not hold the benchmark up."""
+
+    def forbidden(group, number):
+        raise PermissionError
+
+    find_apart("pd", trusted=False)
+    children = [each for each in family(os.getpid()) if each != os.getpid()]
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "killpg", forbidden)
+        patched.setattr(apart, "END_LIMIT", 60.0)
+        begun = time.monotonic()
+        apart.close()
+    assert time.monotonic() - begun < 20
+    wait_for(lambda: not any(map(alive, children)), 5)
+
+
+def test_another_user_s_process_that_goes_on_is_left(tmp_path, monkeypatch):
+    policy = PolicyApart(written(tmp_path, "time.sleep(60)"))
+    group = apart._process(0)._process.pid
+    task, _ = ready_pass("passive", {"distance": 310.0}, 1)
+    policy.reset(task.context(0))
+    monkeypatch.setattr(apart, "ACT_LIMIT", 0.5)
+    kill = os.killpg
+    monkeypatch.setattr(os, "killpg", lambda *given: (_ for _ in ()).throw(PermissionError))
+    monkeypatch.setattr(apart, "END_LIMIT", 0.5)
+    with pytest.raises(InputError, match=r"took more than 0\.5 s"):
+        policy.act(task.results.observation[0])
+    kill(group, 9)
+
+
+def test_a_policy_s_process_gets_no_secrets_from_the_environment(tmp_path, monkeypatch):
+    monkeypatch.setenv("A_TOKEN", "secret")
+    monkeypatch.chdir(tmp_path)
+    apart.close()
+    play(written(tmp_path, "Path('seen.json').write_text(json.dumps(dict(os.environ))); return np.zeros(1)"))
+    seen = json.loads(Path("seen.json").read_text())
+    assert {"PATH", "OMP_NUM_THREADS"} <= seen.keys()
+    assert "A_TOKEN" not in seen
+
+
+ANSWER = """
+import os, stat
+answer = {answer}
+for fd in range(3, 20):
+    try:
+        if stat.S_ISFIFO(os.fstat(fd).st_mode):
+            os.write(fd, answer)
+    except OSError:
+        pass
+"""
+
+
+def sent(kind, content):
+    return kind + len(content).to_bytes(4, "big") + content
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        sent(b"+", b'{"_number": 7, "reset": 3}'),
+        sent(b"+", b'{"memory": "all"}'),
+        sent(b"+", b"[" * 30_000),
+        sent(b"+", b"\xff\xfe"),
+        sent(b"+", b"7"),
+        sent(b"!", b"The policy 'passive' failed in act: it is bad."),
+        b"+\xff\xff\xff\xff",
+        sent(b"+", b"{}") * 2,
+    ],
+)
+def test_an_answer_that_is_none_blames_the_policy_that_sent_it(answer, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(ANSWER.format(answer=answer) + POLICY.format(body="return np.zeros(1)"))
+    with pytest.raises(InputError) as caught:
+        find_apart(f"{path}:Policy", trusted=False)
+    assert str(caught.value).startswith(f"The policy '{path}:Policy' failed in being loaded: ")
+    assert find_apart("passive", trusted=False).washout == 0.0
+
+
+def test_wishes_of_any_length_arrive_and_are_judged(tmp_path):
+    """256 entries of the memory are more than a pipe passes on in one piece."""
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "import numpy as np\n"
+        "class Mine:\n"
+        "    memory = tuple(k / 255.123456789 for k in range(1, 256))\n"
+        "    def reset(self, context): self.memory_entries = len(context.layout.entries)\n"
+        "    def act(self, observation): return np.zeros(1)\n"
+    )
+    assert len(find_apart(f"{path}:Mine", trusted=False).memory) == 255
+    path.write_text(path.read_text().replace("range(1, 256)", "range(512)"))
+    apart.close()
+    with pytest.raises(
+        InputError, match=r"The policy '.*mine.py:Mine' failed .*: .*memory must be increasing"
+    ):
+        find_apart(f"{path}:Mine", trusted=False)
+
+
 def test_its_processes_end_with_it():
     apart.close()
     others = set(family(os.getpid()))

@@ -130,7 +130,7 @@ def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
 # --- each law ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["p", "pd", "fb+ff", "tuned-pd", "tuned-fb+ff", "skyhook"])
+@pytest.mark.parametrize("name", ["p", "pd", "fb+ff", "tuned-pd", "tuned-fb+ff"])
 def test_a_washout_is_a_parameter_and_off_by_default(name: str) -> None:
     """The papers' form is the default; with it a run takes the slow average of the force off."""
     assert [wishes(find_policy(f"{name}{given}"))["washout"] for given in ("", ":washout=None")] == [0.0, 0.0]

@@ -4,8 +4,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from panto_baselines.benchmark import statistics
+from panto_baselines.benchmark.intervals import Clusters, interval_for_lines, interval_of_mean
 from panto_baselines.benchmark.overall import standings, without_feedback
 from panto_baselines.benchmark.single_pass import Row
 from panto_env.metrics.figures import Figures
@@ -205,14 +207,41 @@ def test_share_of_a_stored_oracle():
         row("a", line="easy", std=0.8),
         row("a", line="hard", std=0.9),
     ]
-    cells = statistics.compare(rows, {("easy", "pantograph", 300.0): -40.0})
+    cells = statistics.compare(rows, {("easy", "pantograph", 300.0): {0: -40.0}})
     found = {(cell.policy, cell.catenary): cell.oracle_share for cell in cells}
     assert found["a", "easy"] == pytest.approx(0.5)
     assert found["passive", "easy"] == 0.0
     assert found["a", "hard"] is None
     assert [each.oracle_share for each in standings(rows, cells)] == [None, None]
-    both = {(line, "pantograph", 300.0): -40.0 for line in ("easy", "hard")}
+    both = {(line, "pantograph", 300.0): {0: -40.0} for line in ("easy", "hard")}
     assert standings(rows, statistics.compare(rows, both))[1].oracle_share == pytest.approx(0.375)
+
+
+def test_the_share_of_an_oracle_is_over_the_passes_that_it_ran():
+    """The third seed, where the policy is at its worst, was not the oracle's."""
+    rows = [
+        *(row(seed=k) for k in range(3)),
+        *(row("a", k, std=std) for k, std in enumerate((0.8, 0.6, 2.0))),
+    ]
+    place = ("easy", "pantograph", 300.0)
+    rows = [replace(each, catenary="easy") for each in rows]
+    found = statistics.compare(rows, {place: {0: -40.0, 1: -60.0, 7: -99.0}})[1]
+    assert found.oracle_share == pytest.approx(30 / 50)
+    assert found.oracle == pytest.approx(-50.0)
+    elsewhere = statistics.compare(rows, {place: {7: -99.0}})[1]
+    assert (elsewhere.oracle, elsewhere.oracle_share) == (None, None)
+
+
+def test_an_interval_for_other_lines_is_that_of_the_lines_means():
+    changes = np.array([-0.6, -0.58, -0.5, -0.52, -0.4, -0.42])
+    clusters = Clusters(np.repeat(np.arange(3), 2), np.tile(np.arange(2), 3))
+    low, high = interval_for_lines(changes, clusters)
+    half = stats.t.ppf(0.975, 2) * stats.sem([-0.59, -0.51, -0.41])
+    middle = np.mean([-0.58, -0.52, -0.5, -0.42])
+    assert (low, high) == pytest.approx((middle - half, middle + half))
+    within = interval_of_mean(changes, clusters)
+    assert high - low > 3 * (within[1] - within[0])
+    assert interval_for_lines(changes[:4], Clusters(clusters.line[:4], clusters.seed[:4])) is None
 
 
 def test_a_method_s_result_is_over_its_trainings():

@@ -18,13 +18,22 @@ from ..render.made_up_plots import cells
 
 STORED = Path(__file__).with_name("printed_tables.txt")
 FIRST = Standing(
-    "p", -12.34, (-14.0, -10.5), -3.21, -1.05, "a at 250 km/h", 0.957, 4.32, -21.4, 31.4, 2.7, 0.01, 0.62,
-    24, 1, 2.3, "", 1,
+    "p", -12.34, (-14.0, -10.5), None, -3.21, -1.05, "a at 250 km/h", 0.957, 4.32, -21.4, 31.4, 2.7,
+    0.01, 0.62, 24, 1, 2.3, "", 1,
     {"lqg": "20 of 24", "passive": "24 of 24"},
 )  # fmt: skip
 STANDINGS = (
     FIRST,
-    replace(FIRST, policy="lqg", change=-8.0, interval=None, rank=2, oracle_share=None, better_than={}),
+    replace(
+        FIRST,
+        policy="lqg",
+        change=-8.0,
+        interval=None,
+        rank=2,
+        oracle_share=None,
+        interval_for_lines=(-20.0, 4.0),
+        better_than={},
+    ),
     replace(FIRST, policy="ppo", rank=3, trainings={"ppo-1": -7.0, "ppo-2": -9.0}, better_than={}),
     replace(FIRST, policy="ppo-1", change=-7.0, rank=None, better_than={}),
     replace(FIRST, policy="q", disqualified="it moves the mean", rank=None, improved=np.nan, better_than={}),

@@ -122,6 +122,39 @@ def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
         replay(alone)
 
 
+def test_a_salt_that_was_not_promised_is_found(result, tmp_path):
+    def other(table, passes):
+        table["salt_sha256"] = "0" * 64
+
+    with pytest.raises(InputError, match="a salt_sha256 that is not its salt's"):
+        replay(changed(result, tmp_path, other), workers=1)
+
+
+def test_a_policy_that_learns_from_earlier_passes_is_not_ranked(tmp_path):
+    """Through a file that its process leaves behind."""
+    notes, path = tmp_path / "notes", tmp_path / "mine.py"
+    path.write_text(
+        "from pathlib import Path\nimport numpy as np\n"
+        "class Mine:\n"
+        f"    notes = Path({str(notes)!r})\n"
+        "    def reset(self, context):\n"
+        "        known = self.notes.read_text() if self.notes.exists() else ''\n"
+        "        self.notes.write_text(known + 'x')\n"
+        "        self.action = np.full(1, 1e-3 * len(known))\n"
+        "    def act(self, observation): return self.action\n"
+        "class Honest(Mine):\n"
+        "    def reset(self, context): self.action = np.full(1, 1e-3)\n"
+    )
+    learns, honest = f"{path}:Mine", f"{path}:Honest"
+    table = {"policies": [learns, honest], "lines": [LINE], "seeds": 2}
+    outcome = benchmark.run(parse(BenchmarkSettings, table, "the benchmark"), workers=1)
+    found = {each.policy: each for each in outcome.standings}
+    assert "it learns from other passes" in found[learns].disqualified
+    assert (found[learns].rank, found[honest].disqualified) == (None, "")
+    outcome.save(tmp_path / "out.json")
+    assert replay(tmp_path / "out.json", workers=1).follows
+
+
 def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
     """An ideal actuator does what it is commanded: its forces in the record are the commands."""
     settings = parse(BenchmarkSettings, {"line_condition": "new", "actuator": "ideal"}, "the benchmark")

@@ -358,12 +358,21 @@ def test_a_column_with_gaps_keeps_them_last(tmp_path):
 
 def test_a_document_s_table_holds_every_policy_place_and_oracle():
     table = result()
-    table["cells"][1]["oracle_share"] = 0.5  # of p at 250 km/h, whose change is -10
+    table["cells"][1] |= {"oracle": -20.0, "oracle_share": 0.5}
+    table["standings"][2]["interval_for_lines"] = [-20.0, 2.0]
     table["cells"][2] |= {"disqualified": "it presses", "mean_change": 3.2}  # pd at 250 km/h
     made = summary(parse_result(table, "it"))
     overall = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
     assert made.headings == ("policy", "250 km/h", "300 km/h", *overall)
-    over_all = ("-9.0", "-10.0 to -8.0", "0.50", "-4", "-6.0", "75 % (50 to 90)", "2 of 4")
+    over_all = (
+        "-9.0",
+        "-10.0 to -8.0 (other lines -20.0 to 2.0)",
+        "0.50",
+        "-4",
+        "-6.0",
+        "75 % (50 to 90)",
+        "2 of 4",
+    )
     assert made.cells[0] == ("pd", "(-9.0; mean +3.2)", "-9.0", *over_all)  # by the standings' ranks
     over_all = ("-10.0", "-11.0 to -9.0", "0.50", "-5", "-7.0", "75 % (50 to 90)", "2 of 4")
     assert ("p", "-10.0", "-10.0", *over_all) in made.cells

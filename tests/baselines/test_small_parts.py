@@ -8,7 +8,7 @@ import pytest
 from panto_baselines.benchmark import returns as returns_of
 from panto_baselines.benchmark.controls import BLIND, TAPE, control_of, policy_of
 from panto_baselines.benchmark.replay import _difference
-from panto_baselines.benchmark.submission import REQUIREMENTS, read_submission
+from panto_baselines.benchmark.submission import Card, read_submission
 from panto_baselines.benchmark.submission_command import _report
 from panto_baselines.oracle.solver import MEAN_TOLERANCE, MEAN_WEIGHT, _mean_met, merit
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
@@ -77,11 +77,12 @@ CHECKED = SimpleNamespace(
         disqualified="",
     ),
     tape=SimpleNamespace(change=-1.26),
+    requirements=(),
 )
 
 
-def test_a_submission_s_report_line_by_line(tmp_path):
-    lines = _report(CHECKED, tmp_path, [-30.0, -10.0])
+def test_a_submission_s_report_line_by_line():
+    lines = _report(CHECKED, [-30.0, -10.0])
     assert lines == [
         "Mine by A, B (MIT)",
         "Learnt from: re250",
@@ -89,12 +90,14 @@ def test_a_submission_s_report_line_by_line(tmp_path):
         "Worst: +3.2 %, re250 at 200 km/h; ahead of passive in 88% of passes",
         "It would be ranked, at place 2 of 3.",
     ]
-    assert _report(CHECKED, tmp_path, [])[-1] == "It would be ranked."
-    (tmp_path / REQUIREMENTS).write_text("one==1\ntwo==2\n")
+    assert _report(CHECKED, [])[-1] == "It would be ranked."
     standing = SimpleNamespace(
         **vars(CHECKED.standing) | {"interval": None, "disqualified": "it moves the mean"}
     )
-    lines = _report(SimpleNamespace(**vars(CHECKED) | {"standing": standing}), tmp_path, [-30.0])
+    lines = _report(
+        SimpleNamespace(**vars(CHECKED) | {"standing": standing, "requirements": ("one==1", "two==2")}),
+        [-30.0],
+    )
     assert lines[2] == "Change of sigma: -20.0 %; its tape: -1.3 %"
     assert lines[-2:] == ["It requires: one==1, two==2", "It would not be ranked: it moves the mean."]
 
@@ -103,13 +106,14 @@ def test_a_submission_s_report_line_by_line(tmp_path):
     "given", ["mine.safetensors", "mine.safetensors:gain=1", "mine.safetensors:a=1,b=c:d"]
 )
 def test_a_submission_s_policy_is_its_file_with_its_parameters(tmp_path, given, monkeypatch):
-    card = SimpleNamespace(policy=given)
+    given_with = {"authors": ("A",), "description": "d", "licence": "MIT", "learnt_from": "nothing"}
+    card = Card(name="Mine", policy=given, **given_with)
     monkeypatch.setattr("panto_baselines.benchmark.submission.read_toml", lambda path: {})
     monkeypatch.setattr("panto_baselines.benchmark.submission.parse", lambda *_: card)
     with pytest.raises(InputError, match=r"but there is no file .*mine\.safetensors\.$"):
         read_submission(tmp_path)
     (tmp_path / "mine.safetensors").touch()
-    assert read_submission(tmp_path) == (card, str(tmp_path / given))
+    assert read_submission(tmp_path) == (card, str(tmp_path / given), ())
 
 
 @pytest.mark.parametrize(("length", "read"), [(1.0, True), (0.72, True), (0.70, False), (0.0, False)])

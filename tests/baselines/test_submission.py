@@ -91,3 +91,32 @@ def test_a_card_that_is_not_whole_is_refused(folder, key, value, words):
 def test_a_folder_without_a_card_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"card.toml could not be read: there is no such file"):
         read_submission(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda own: (own / "requirements.txt").write_bytes(b"\xff\xfen"), "write it as text in UTF-8"),
+        (lambda own: (own / "requirements.txt").write_text("numpy\x1b[2J"), "printable characters only"),
+        (lambda own: named(own, "Mine\\u001b]0;x"), "printable characters only"),
+        (lambda own: linked(own, "requirements.txt"), "requirements.txt is a link that leaves the folder"),
+        (lambda own: linked(own, "policy.py"), "policy.py is a link that leaves the folder"),
+        (lambda own: linked(own, "card.toml"), "card.toml is a link that leaves the folder"),
+    ],
+)
+def test_what_is_not_whole_is_refused_before_anything_runs(folder, monkeypatch, change, words):
+    monkeypatch.setattr("panto_baselines.benchmark.submission.run", lambda *_: pytest.fail("it ran"))
+    change(folder)
+    done = checked(folder)
+    assert isinstance(done.exception, InputError)
+    assert words in str(done.exception)
+
+
+def named(folder, name):
+    card = folder / "card.toml"
+    card.write_text(card.read_text().replace('"Damped frame"', f'"{name}"'))
+
+
+def linked(folder, name):
+    outside = (folder / name).rename(folder.parent / name)
+    (folder / name).symlink_to(outside)

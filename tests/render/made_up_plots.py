@@ -109,7 +109,13 @@ def cells():
         figures = {"std": 20.0 + 2 * k if k != 3 else np.nan, "mean": 120.0 + k}
         change, interval = -3.0 * k, None if k == 2 else (-3.0 * k - 2, -3.0 * k + 4)
         rest = {"cost_change": 0.0, "mean_change": 0.0, "most_moved": 0.0, "moved": 0, "improved": 1.0}
-        rest |= {"spread": 0.0, "oracle": None, "disqualified": "moved" * (k == 5), "rank": None}
+        rest |= {
+            "spread": 0.0,
+            "oracle": None,
+            "oracle_share": None,
+            "disqualified": "moved" * (k == 5),
+            "rank": None,
+        }
         yield Cell(policy, "a", "b", speed, 4, 120.0, figures, change, interval, **rest)
 
 
