@@ -86,7 +86,7 @@ def _numbers(entry: Any) -> Iterator[_Number]:
             yield _Number(key, key + of_span, unit, given)
         elif key == "droppers.sag":  # those near a support may be as small as can be
             yield _Number(key, f"the largest of {key}{of_span}", unit, max(given, key=abs))
-        elif isinstance(given, tuple):
+        elif isinstance(given, tuple) and key != "force_over_height":  # of pairs
             for number, value in enumerate(given, start=1):
                 ground = " to the ground" if key in CHAINS and number == len(given) else ""
                 yield _Number(key + ground, f"number {number} of {key}{of_span}", unit, value)

@@ -61,7 +61,6 @@ class Episode(NamedTuple):
     washout_share: float  # weight of a control step in the washout's average; 0: there is no washout
     loss_limit: int  # plant steps without contact that end an episode
     head_range: float  # height of the head (m) over or under the line's own that ends an episode
-    levels: Array  # (supports,): the line's own height at each (m); none where it is level
 
 
 def new_episode(
@@ -114,7 +113,6 @@ def new_episode(
         washout_share=_share(settings.control_interval, settings.washout),
         loss_limit=round(LOSS_TIME / plant.time_step),
         head_range=HEAD_RANGE,
-        levels=np.array(plant.catenary.contact_heights),
     )
 
 

@@ -7,13 +7,14 @@ hash of the sources and of the run's settings.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import AccuracyWarning, InputError
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from ..plant.pantograph.schema import PantographData
@@ -25,6 +26,8 @@ from .settings import RunSettings, as_designed
 TOLERANCE = 0.05
 """Maximum difference (N) between the mean force and its target."""
 MOST_RUNS = 10
+LEAST_LEFT = 0.8
+"""Share of the lift that springs leave to the contact, below which a warning says so (own choice)."""
 KNOT_DISTANCE = 5.0
 """Maximum distance (km/h) between the speeds at which a range is trimmed. Between them the force is
 interpolated, and the mean is within about 0.3 N of its target."""
@@ -70,6 +73,18 @@ def target_mean(settings: RunSettings, speed: float, collector: int = 0) -> floa
 def trimmed(settings: RunSettings, speed: float) -> bool:
     """Whether any pantograph must meet a mean force at a speed (m/s)."""
     return any(target_mean(settings, speed, number) is not None for number in range(len(settings.riding)))
+
+
+def warn_of_spring(settings: RunSettings) -> None:
+    """Warn where a pantograph's spring to the ground takes much of a lift that is not trimmed."""
+    for number, own in enumerate(settings.riding):
+        share, lift = own.share_at_head, own.nominal_force(settings.speeds[0])
+        if share < LEAST_LEFT and target_mean(settings, settings.speeds[0], number) is None:
+            taken = (
+                f"The spring to the ground takes {(1 - share) * lift:.0f} of the {lift:.0f} N that lift "
+                f"'{own.name}', at the contact wire's height: see mean_force (--mean-force)."
+            )
+            warnings.warn(taken, AccuracyWarning, stacklevel=1)  # from one place: it comes once
 
 
 def trim_of_pass(

@@ -18,20 +18,20 @@ from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from ..plant.state import Row
-from ..plant.valid_range import LARGEST_HEIGHT, Ending, reason
+from ..plant.valid_range import LARGEST_HEIGHT, LARGEST_SPEED, Ending, reason
 from .identity import identity
 from .mean_force import named
 from .state import TaskRow
 from .task_state import TaskState
 
 LARGEST_DEVIATION = 2e3
-"""Mean deviation of the contact force (N), ten times any real one: beyond it a computation has diverged."""
+"""Mean deviation of the contact force from its static value (N), ten times any real one: it has diverged."""
 
 
 def diverged(task: TaskState, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
     """Whether rows, (n,), have diverged, as their ending or an impossible value shows.
 
-    deviation: mean, from the nominal force (N). height: of the wire (m).
+    deviation: mean, from what springs leave of the nominal force (N). height: of the wire (m).
     """
     possible = (deviation < LARGEST_DEVIATION) & (np.abs(height) < LARGEST_HEIGHT)
     endings = task.episode.table[rows, TaskRow.ENDING]
@@ -43,8 +43,21 @@ def divergence(task: TaskState, lane: int) -> str:
     plant = task.plant
     return (
         f"The computation of {named(task.settings.riding)} on '{plant.catenary.name}' at "
-        f"{to_kmh(task.speed[lane]):g} km/h diverged, so it has no result; {_way_out(plant)}."
+        f"{to_kmh(task.speed[lane]):g} km/h diverged, so it has no result: "
+        f"{_bound(task, lane)}; {_way_out(plant)}."
     )
+
+
+def _bound(task: TaskState, lane: int) -> str:
+    """Which bound a lane's computation passed that nothing passes but what diverges, as a clause."""
+    rows = task.plant.run.table[:, lane]
+    for what, row in (("the collector head", Row.STATE), ("the contact wire", Row.WIRE_HEIGHT)):
+        height = rows[np.abs(rows[:, row]).argmax(), row]
+        if not abs(height) <= LARGEST_HEIGHT:
+            return f"{what} came to a height of {height:.3g} m, which is not within ±{LARGEST_HEIGHT:g} m"
+    if _ending(task, lane) is Ending.DIVERGED:
+        return f"a wire moved faster than {LARGEST_SPEED:g} m/s"
+    return f"the contact force was over {LARGEST_DEVIATION:,g} N from its static value in the mean"
 
 
 def _way_out(plant: Plant) -> str:
@@ -80,7 +93,7 @@ def _of_collector(
     on_line = slice(int(np.searchsorted(position, 0.0)), steps)
     rows = task.samples.rows[lane, 1 : steps + 1, collector][on_line]
     if len(rows):
-        deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - nominal_force))
+        deviation = np.mean(np.abs(rows[:, Row.CONTACT_FORCE] - pantograph.share_at_head * nominal_force))
         highest = np.max(np.abs(rows[:, Row.WIRE_HEIGHT]))
         row = np.array([lane * task.agents])
         if diverged(task, row, deviation[None], highest[None])[0]:
@@ -136,10 +149,11 @@ def ending(task: TaskState, lane: int) -> str:
         return ""
     plant = task.plant
     steps, line = plant.of(lane, Row.STEP), plant.catenary
+    why = reason(which, line.free_uplift) + (f": {_bound(task, lane)}" if which is Ending.DIVERGED else "")
     time, position = steps * plant.time_step, float(plant.position(lane, steps)[0])
     return (
         f"The run ended early at {position:.1f} m (span {plant.alignment.span_of(position)}, "
-        f"{time:.2f} s): {reason(which, line.free_uplift)}."
+        f"{time:.2f} s): {why}."
     )
 
 

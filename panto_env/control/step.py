@@ -66,9 +66,9 @@ def ending_of_head(run, episode, collector, lane, ending):
     """Why a run ends because of a collector's head; ``ending`` unless it does."""
     own = run.table[collector, lane]
     height = own[ROW.STATE]
-    if episode.levels.size > 0:
+    if run.levels.size > 0:
         x = place_on_line(run, collector, lane, own[ROW.STEP])
-        height -= between_supports(episode.alignment, episode.levels, x)
+        height -= between_supports(run.alignment, run.levels, x)
     if not abs(height) <= episode.head_range:
         ending = ENDING.HEAD
     if not abs(own[ROW.STATE]) <= LARGEST_HEIGHT:  # nor is NaN

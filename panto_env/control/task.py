@@ -22,7 +22,7 @@ from .entries import DEVIATIONS, ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
 from .extent import new_plant
 from .length import EpisodeLength
-from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed
+from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
 from .normalise import normalised
 from .observation import layout
 from .passive_run import ADVICE, PassiveRun
@@ -59,6 +59,7 @@ class Task(TaskState):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.line.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or use another line.")
+        warn_of_spring(settings)
         self.settings, self.actuator, self.trim = settings, settings.actuator, trim
         plant = new_plant(settings, lanes)
         self.length = length = EpisodeLength(settings, plant)
@@ -206,6 +207,8 @@ class Task(TaskState):
             )
         distance = figures["distance"]
         deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
+        shares = np.array([own.share_at_head for own in self.settings.riding])[collectors]
+        deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
         return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
 
     def divergence(self, lane: int) -> str:

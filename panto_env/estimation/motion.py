@@ -28,7 +28,7 @@ class Motion:
     head_velocity: Array | None  # (n,): m/s; None: not measured
     frame_velocity: Array | None  # (n,): m/s; None: not measured
     # (n,): of an actuator on the frame, from this sample to the next (N); and how much more than ``lift`` a
-    # train's aerodynamic uplift is at its present speed, which it knows
+    # train's lift is at its present speed and place, which it knows
     frame_force: Array
     head_force: Array  # (n,): of an actuator between head and the mass below it, as above (N)
     lift: float  # static force and aerodynamic uplift on the lowest mass (N), at the mean speed
@@ -55,7 +55,7 @@ class Motion:
 
 def on_frame(run: Trajectory) -> Array:
     """Known force on the frame of a run, (n,) (N), beyond its nominal force; see ``Motion``."""
-    return run.frame_force + (run.lift - run.nominal_force)
+    return run.frame_force + (run.lift - run.nominal_force) + run.lift_by_height
 
 
 def warn_of_wind(run: Trajectory) -> None:

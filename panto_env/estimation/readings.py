@@ -135,7 +135,7 @@ def filter_sample(sensors, own, rows):
     """Estimate a lane's contact force from a sample, and move the filter's state on to the next."""
     size, count = sensors.kept.shape[0], sensors.driven.shape[1]
     sample, after = rows[size:], rows[size + count + 1 :]
-    on_frame, on_head = own[ROW.LIFT] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
+    on_frame, on_head = own[ROW.LIFT] + own[ROW.BY_HEIGHT] + own[ROW.FRAME_FORCE], own[ROW.HEAD_FORCE]
     force = 0.0
     for j in range(size):
         force += sensors.force_of_state[j] * rows[j]

@@ -160,7 +160,7 @@ class Passes:
         if not (np.isfinite(force).all() and np.abs(force).max(initial=0.0) < LARGEST_FORCE):
             raise InputError(
                 "A simulated pass diverged while the line was fitted; check the pantograph, or free fewer "
-                "values."
+                f"values: its contact force came to {np.abs(force).max():,.0f} N."
             )
         return force
 

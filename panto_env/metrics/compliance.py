@@ -30,6 +30,7 @@ class LineFacts:
     uplift_stop: bool = False  # whether a stop at the support limits the uplift
     dropper_reflection: float = math.nan  # of a wave at a dropper (-)
     support_reflection: float = math.nan  # of a wave at a support, at the rate of passing them (-)
+    contact_heights: tuple[float, ...] = ()  # (supports,): over the nominal one (m); none where it is level
 
     @classmethod
     def of(cls, line: CatenaryData, wave_speed: float, speed: float) -> LineFacts:
@@ -45,6 +46,7 @@ class LineFacts:
             uplift_stop=line.uplift_stop,
             dropper_reflection=dropper,
             support_reflection=support,
+            contact_heights=line.contact_heights,
         )
 
 

@@ -21,6 +21,7 @@ from ..base.errors import InputError
 from ..base.files import check_output, write_whole
 from ..base.units import to_kmh
 from ..plant.alignment import Alignment, Spans
+from ..plant.pantograph.schema import PantographData
 from .compliance import LineFacts, compliance
 from .criterion import Criterion
 from .droppers import evaluated, near_train
@@ -253,6 +254,15 @@ class Trajectory:
         coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
         more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.drifts else 0.0
         return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)
+
+    @property
+    def lift_by_height(self) -> Array | float:
+        """What the contact wire's height as designed adds to ``lift`` in each step, (n,) (N)."""
+        heights = self.line.contact_heights
+        if not heights or "pantograph" not in self.design:
+            return 0.0
+        own = np.interp(self.position, self.alignment.supports[: len(heights)], heights)
+        return np.asarray(PantographData.model_validate(self.design["pantograph"]).lift_over(own))
 
     @property
     def stride(self) -> float:

@@ -58,6 +58,7 @@ class Plant:
         winds = [condition.weather for condition in runs.conditions if condition.wind]
         for own in train.collectors:
             check_wind(winds, runs.speeds[0], own.pantograph)
+            own.pantograph.check_heights(catenary.name, catenary.contact_heights)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
             lanes=lanes,
@@ -81,6 +82,8 @@ class Plant:
             self._set_pantograph(number, every, own.pantograph)
         self.actuators = actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
+        tables = [own.pantograph.force_over_height or () for own in train.collectors]
+        knots = sorted({0.0, *(height for table in tables for height, _ in table)})
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),
             distance=tuple(float(collector.distance) for collector in train.collectors),
@@ -91,6 +94,9 @@ class Plant:
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
             wind=aligned_zeros((lanes, GUST_ROWS if winds else 0)),
+            alignment=self.alignment.arrays,
+            levels=np.array(catenary.contact_heights),
+            over_height=np.array([knots, *(own.pantograph.force_over(knots) for own in train.collectors)]),
             lowest_force=-np.inf if bilateral else 0.0,
         )
         copy_whole(*self.arrays)
@@ -207,7 +213,9 @@ class Plant:
         lifts = nominal_forces + run.aerodynamic[collector] * (now**2 - strides**2)
         wind = winds_at(run.wind[lanes], -own.distance, 0.0) if run.wind.shape[1] else 0.0
         by_wind = run.aerodynamic[collector] * wind * (2 * now + wind)
-        state = rest_state(pantographs or own.pantograph, lifts + by_wind, heights, compliance)
+        begin = run.levels[:1].sum()  # height there; 0 on a level line
+        by_height = np.array([each.lift_over(begin) for each in pantographs or [own.pantograph]])
+        state = rest_state(pantographs or own.pantograph, lifts + by_wind + by_height, heights, compliance)
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         table = np.zeros((len(lanes), run.table.shape[2]))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..backend import NOT_NEGATIVE, constants, inlined
 from ..base.arrays import Array
+from .alignment import AlignmentArrays
 
 
 class Place(IntEnum):
@@ -44,8 +45,9 @@ class Row(IntEnum):
     SECOND_FORCE = 19  # contact force on the second wire, part of CONTACT_FORCE (N)
     WIND = 20  # what wind adds to LIFT (N), which no sensor sees
     FIRST_FORCE = 21  # contact force on the first wire, the rest of CONTACT_FORCE (N)
+    BY_HEIGHT = 22  # what the contact wire's local height adds to LIFT (N), which a train knows
     # An even number, for processors compute states in pairs.
-    STATE = 22  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
+    STATE = 24  # displacements (m), then velocities (m/s) of the pantograph, head first; behind these the
     # same at the step's end, without the contact force
 
 
@@ -64,6 +66,9 @@ class Run(NamedTuple):
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     wind: Array  # (lanes, GUST_ROWS): mean and gusts; no rows where none blows
+    alignment: AlignmentArrays
+    levels: Array  # (supports,): the contact wire's own height at each (m); none where it is level
+    over_height: Array  # (1 + collectors, heights): m, and what each static force is more there (N)
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 

@@ -17,7 +17,7 @@ from .catenary.protocol import (
 from .contact import contact_force, shared_forces
 from .pantograph.step import PART, add_contact_force, move_freely
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
-from .train import lift, lift_by_wind, mean_stride, place_on_line
+from .train import lift, lift_by_height, lift_by_wind, mean_stride, place_on_line
 from .trigonometry import cosine_of_turns
 
 
@@ -38,10 +38,13 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
         own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
     if run.wind.shape[1] > 0:
         own[ROW.WIND] = lift_by_wind(run, contact, lane, own[ROW.STEP] + 0.5)
+    x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
+    if run.levels.size > 0:
+        parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
+        own[ROW.BY_HEIGHT] = lift_by_height(run, contact, parts[PART.LOCAL_SPRING], x)
     if run.driven[contact] > 0:
         drive(actuators, pantographs, contact, own, own[ROW.COMMAND :], lane)
     move_freely(pantographs, contact, own, lane)
-    x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
     own[ROW.IRREGULARITY] = irregularity(run, x, lane)
     before, middle = place_contact(line, wire, lane, contact, x)
     own[ROW.WIRE_BEFORE] = before

@@ -9,6 +9,7 @@ from typing import Self
 from ..backend import inlined
 from ..base.errors import InputError
 from .actuators import ActuatorSettings, actuator_settings
+from .alignment import between_supports
 from .drift import drifted_way, drifting_stride
 from .pantograph.schema import PantographData
 from .sensors import SensorSettings, sensor_settings
@@ -129,6 +130,18 @@ def lift_by_wind(run, collector, lane, steps):
     x, now = position(run, collector, lane, steps), stride(run, collector, lane, steps)
     wind = wind_at(run.wind[lane], x, steps)
     return run.aerodynamic[collector] * (wind * (now + now + wind))
+
+
+@inlined
+def lift_by_height(run, collector, spring, x):
+    """Lift (N) that the line's height at x (m) adds, by a table and a spring to the ground about it (N/m)."""
+    height = between_supports(run.alignment, run.levels, x)
+    heights, forces = run.over_height[0], run.over_height[1 + collector]
+    force = spring * height + forces[0]
+    for k in range(heights.size - 1):
+        wide = heights[k + 1] - heights[k]
+        force += min(max(height - heights[k], 0.0), wide) * (forces[k + 1] - forces[k]) / wide
+    return force
 
 
 @inlined

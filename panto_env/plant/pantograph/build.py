@@ -67,7 +67,7 @@ def parts(
     bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
     share = max(catenary.contact_share, 1.0 - bearable / gain if gain else 0.0)
     damping = pantograph.contact_damping / time_step
-    scalars = [compliance, damping, share, pantograph.frame_friction]
+    scalars = [compliance, damping, share, pantograph.frame_friction, pantograph.local_spring]
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 

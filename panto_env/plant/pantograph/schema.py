@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from ...base.errors import InputError
 from ...base.explanation import comma_hint
 from ...base.ranges import Between
 from ...base.settings import Settings
@@ -23,6 +25,7 @@ STIFFEST_CONTACT = 1e6
 SOFTEST_SPRING = 1.0
 """Minimum spring between two masses (N/m): with less the frame's lift does not reach the head."""
 Contact = Annotated[float, Between(1e3, STIFFEST_CONTACT, "N/m")]
+StaticForce = Annotated[float, Between(0, 1000, "N")]
 
 
 class PantographData(Settings):
@@ -43,8 +46,15 @@ class PantographData(Settings):
         description="whether static force and aerodynamic uplift are applied as they are, or state the mean "
         "contact force, for which the static force is trimmed: applied or mean",
     )
-    static_force: Annotated[float, Between(0, 1000, "N")] = Field(
-        description="lifting force on the lowest mass (N)"
+    static_force: StaticForce = Field(description="lifting force on the lowest mass (N)")
+    force_over_height: tuple[tuple[Annotated[float, Between(-3, 3, "m")], StaticForce], ...] | None = Field(
+        None,
+        min_length=2,
+        description="pairs of height over the nominal one, rising, and static force; linear between (m, N)",
+    )
+    frame_spring: Literal["local", "nominal"] = Field(
+        "local",
+        description="height of the contact wire about which the spring to the ground acts, local or nominal",
     )
     # Up to ten times EN 50367's 0.00097; the same in N/(m/s)^2, 0.0126, is refused.
     aerodynamic_coefficient: Annotated[float, Between(0, 0.01, "N/(km/h)^2")] = Field(
@@ -74,6 +84,14 @@ class PantographData(Settings):
                     f"stiffnesses must be at least {SOFTEST_SPRING:g} N/m, except the last, to the ground: "
                     f"nothing holds mass {number} up with {spring:g} N/m below it"
                 )
+        if self.force_over_height is not None:
+            heights, forces = zip(*self.force_over_height, strict=True)
+            if not (np.diff(heights) > 0).all() or not heights[0] <= 0 <= heights[-1]:
+                raise ValueError("heights of force_over_height must rise, from 0 or below to 0 or above")
+            if not np.isclose(np.interp(0.0, heights, forces), self.static_force, rtol=0.01):
+                raise ValueError(
+                    f"force_over_height must be static_force, {self.static_force:g} N, at height 0"
+                )
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
         return self
@@ -83,6 +101,34 @@ class PantographData(Settings):
         """Whether the contact is stiffer or more damped than that of a collector strip."""
         stiffness = 0.0 if self.contact_stiffness == "rigid" else self.contact_stiffness
         return stiffness > HARD_STIFFNESS or self.contact_damping > HARD_DAMPING
+
+    @property
+    def share_at_head(self) -> float:
+        """Share of a force on the lowest mass that springs leave to a head held where none is strained."""
+        return 1 / (1 + self.stiffnesses[-1] * sum(1 / each for each in self.stiffnesses[:-1]))
+
+    @property
+    def local_spring(self) -> float:
+        """Spring to the ground that acts about the contact wire's local height (N/m), 0 where none does."""
+        return self.stiffnesses[-1] if self.frame_spring == "local" else 0.0
+
+    def force_over(self, height: Any) -> Any:
+        """By how much the static force at a height (m), or at each of an array, exceeds that at 0 (N)."""
+        heights, forces = zip(*(self.force_over_height or ((0.0, 0.0),)), strict=True)
+        return np.interp(height, heights, forces) - np.interp(0.0, heights, forces)
+
+    def lift_over(self, height: Any) -> Any:
+        """What the contact wire's local height (m), or each of an array, adds to the lift (N): 0 at 0."""
+        return self.local_spring * height + self.force_over(height)
+
+    def check_heights(self, line: str, heights: tuple[float, ...]) -> None:
+        """Raise InputError unless ``force_over_height`` holds all heights (m) of a line of this name."""
+        held = [height for height, _ in self.force_over_height or ()]
+        if held and heights and not held[0] <= min(heights) <= max(heights) <= held[-1]:
+            raise InputError(
+                f"The contact wire of line '{line}' hangs at {min(heights):g} to {max(heights):g} m; give "
+                f"force_over_height of '{self.name}' at all of it, not at {held[0]:g} to {held[-1]:g} m."
+            )
 
     def nominal_force(self, speed: Any) -> Any:
         """Force that lifts the pantograph (N) at a train speed (m/s), or at each of an array."""

@@ -20,7 +20,8 @@ class Part(IntEnum):
     STRIP_DAMPING = 1  # of the damper parallel to it, divided by the time step (N/m)
     IMPLICIT_SHARE = 2  # of the wire's height in the contact law, 0 explicit, 1 implicit
     FRAME_FRICTION = 3  # maximum dry friction of the frame (N)
-    CONTACT_INPUT = 4  # n rows
+    LOCAL_SPRING = 4  # to the ground, about the contact wire's local height (N/m)
+    CONTACT_INPUT = 5  # n rows
 
 
 PART = constants(Part)
@@ -58,7 +59,7 @@ def move_apart(pantographs, collector, own, place, first, lane):
     """
     size = pantographs.sizes[collector]
     parts = pantographs.table[collector, own_row(pantographs.table[collector], lane)]
-    on_frame, on_head = own[ROW.LIFT] + own[ROW.WIND], 0.0
+    on_frame, on_head = own[ROW.LIFT] + own[ROW.WIND] + own[ROW.BY_HEIGHT], 0.0
     upper, inputs = first, PART.CONTACT_INPUT + 2 * size
     if place == PLACE.FRAME:
         upper, inputs = first + size // 2 - 1, PART.CONTACT_INPUT + size
@@ -82,7 +83,7 @@ def move_freely(pantographs, collector, own, lane):
     frame_input = parts[PART.CONTACT_INPUT + size :]
     head_input = parts[PART.CONTACT_INPUT + 2 * size :]
     transition, state = parts[PART.CONTACT_INPUT + 3 * size :], own[ROW.STATE :]
-    on_frame = (own[ROW.LIFT] + own[ROW.WIND]) + own[ROW.FRAME_FORCE]
+    on_frame = (own[ROW.LIFT] + own[ROW.WIND] + own[ROW.BY_HEIGHT]) + own[ROW.FRAME_FORCE]
     on_head = own[ROW.HEAD_FORCE]
     free_state = own[ROW.STATE + size :]
     for r in range(0, size, 2):  # in pairs, which a processor computes side by side

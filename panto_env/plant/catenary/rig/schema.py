@@ -119,6 +119,11 @@ class RigData(CatenaryData):
         """Source of a value that lines of every kind have, by default that of ``line``."""
         return self.sources.get(name) or self.line.source_of(name)
 
+    @property
+    def contact_heights(self) -> tuple[float, ...]:
+        """Heights of the computed line at its supports."""
+        return self.line.contact_heights
+
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans of the computed line lie."""
         return self.line.alignment(spans)
