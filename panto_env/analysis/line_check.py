@@ -157,6 +157,22 @@ def span_tables(spans: Sequence[SpanCheck]) -> list[Table]:
     ]
 
 
+def elasticity_table(checks: Sequence[LineCheck]) -> Table:
+    """Elasticity of lines whose spans are all alike, with published figures in brackets."""
+    rows = []
+    for line, found in ((each.line, each.elasticities) for each in checks):
+        own = (1e3 * found[PLACES // 2], 1e3 * found[0], non_uniformity(found))
+        told: tuple[str, ...] = ("", "", "")
+        if given := line.published:
+            factors = ((given.mid_span, 1e3), (given.support, 1e3), (given.non_uniformity, 1.0))
+            told = tuple("" if each is None else f" ({factor * each:g})" for each, factor in factors)
+        ratio = line.span_length / (found[PLACES // 2] * sum(wire.tension for wire in line.wires))
+        cells = (f"{value:#.3g}{other}" for value, other in zip(own, told, strict=True))
+        rows.append((line.name, *cells, f"{ratio:.2f}"))
+    headings = ("mid-span (mm/N)", "support (mm/N)", "non-uniformity (%)", "span / (mid-span × tensions)")
+    return Table("Elasticity (in brackets: published, see `panto list LINE`)", ("line", *headings), rows)
+
+
 def _yields(span: SpanCheck) -> tuple[str, str]:
     if np.isnan(span.non_uniformity):
         return "–", "–"

@@ -54,7 +54,7 @@ def line(
 
     Exits with 1 if a limit of EN 50119 is broken.
     """
-    from ..analysis.line_check import check, span_tables
+    from ..analysis.line_check import check, elasticity_table, span_tables
 
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
@@ -85,7 +85,9 @@ def line(
             for table in (*span_tables(found.spans), dropper_table(found.droppers)):
                 print_table(table)
             print_criteria(criteria, f"Line {chosen.name} at rest")
-            if chosen.sequence:
+            if not chosen.sequence:
+                print_table(elasticity_table([found]))
+            else:
                 console.print(
                     "Elasticity is left out in the first and the last span, where anchors hold the wires."
                 )
