@@ -85,12 +85,12 @@ def line(
             for table in (*span_tables(found.spans), dropper_table(found.droppers)):
                 print_table(table)
             print_criteria(criteria, f"Line {chosen.name} at rest")
-            if not chosen.sequence:
-                print_table(elasticity_table([found]))
-            else:
+            if chosen.sequence:
                 console.print(
                     "Elasticity is left out in the first and the last span, where anchors hold the wires."
                 )
+            else:
+                print_table(elasticity_table([found]))
             for each in broken:
                 alert(f"{each.name} is not kept.")
     if broken:
