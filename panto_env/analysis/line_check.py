@@ -166,8 +166,8 @@ def elasticity_table(checks: Sequence[LineCheck]) -> Table:
         told = (1e3 * (given.mid_span or 0), 1e3 * (given.support or 0), given.non_uniformity)
         pairs = zip((middle, 1e3 * found[0], non_uniformity(found)), told, strict=True)
         cells = (f"{own:#.3g} ({other:g})" if other else f"{own:#.3g}" for own, other in pairs)
-        ratio = line.span_length / (1e-3 * middle * sum(wire.tension for wire in line.wires))
-        rows.append((line.name, *cells, f"{ratio:.2f}"))
+        stiffness = 1e3 * line.span_length / middle  # N
+        rows.append((line.name, *cells, f"{stiffness / sum(wire.tension for wire in line.wires):.2f}"))
     headings = ("mid-span (mm/N)", "support (mm/N)", "non-uniformity (%)", "span / (mid-span × tensions)")
     return Table("Elasticity (in brackets: published, see `panto list LINE`)", ("line", *headings), rows)
 
