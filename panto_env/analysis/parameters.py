@@ -26,7 +26,7 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
     names = []
     for key, field in type(entry).model_fields.items():
         value = getattr(entry, key)
-        if isinstance(value, Settings):
+        if isinstance(value, Settings) and key != "published":  # on which nothing depends
             names += parameter_names(value, f"{family}.{key}")
         elif isinstance(value, tuple):
             names += _places(value, f"{family}.{key}")

@@ -11,7 +11,7 @@ from ..plant.catenary import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from .loader import available, load_catenary, load_pantograph
 
-WORDS = ("name", "description", "sources")
+WORDS = ("name", "description", "sources", "published")
 """Keys that say nothing of the values."""
 
 

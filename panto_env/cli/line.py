@@ -54,7 +54,7 @@ def line(
 
     Exits with 1 if a limit of EN 50119 is broken.
     """
-    from ..analysis.line_check import check, span_tables
+    from ..analysis.line_check import check, elasticity_table, span_tables
 
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
@@ -89,6 +89,8 @@ def line(
                 console.print(
                     "Elasticity is left out in the first and the last span, where anchors hold the wires."
                 )
+            else:
+                print_table(elasticity_table([found]))
             for each in broken:
                 alert(f"{each.name} is not kept.")
     if broken:

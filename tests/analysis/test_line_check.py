@@ -5,13 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from panto_env.analysis.line_check import check, span_tables
+from panto_env import simulate
+from panto_env.analysis.line_check import check, elasticity_table, span_tables
 from panto_env.analysis.line_plot import plot_line
-from panto_env.catalog import load_catenary
+from panto_env.analysis.parameters import parameter_names
+from panto_env.catalog import available, load_catenary
+from panto_env.catalog.content import content_of
 from panto_env.catalog.en50119 import gradient_limits, highest_speed
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import solve
+
+from ..command import panto
+from ..documents import ROOT
 
 HEIGHTS = [0.0, 0.0, -0.065, -0.13, -0.13, 0.0]
 LENGTHS = [65.0, 65.0, 65.0, 50.0, 65.0, 65.0]
@@ -99,3 +105,41 @@ def test_classes_of_speed():
     assert highest_speed(2.0, 1.1) == 160.0
     assert highest_speed(0.0, 0.0) == math.inf
     assert highest_speed(30.0, 0.0) == 0.0
+
+
+def test_published_figures_stand_beside_those_of_the_line():
+    line = load_catenary("re330-stitched")
+    found = check(line, 100.0)
+    ((name, middle, support, uneven, _),) = elasticity_table([found]).rows
+    yields = 1e3 * found.elasticities
+    assert (name, middle, support) == ("re330-stitched", f"{yields[24]:.3f} (0.44)", f"{yields[0]:.3f} (0.4)")
+    assert uneven == f"{non_uniformity(yields):.1f} (8)"
+    told = panto("line", "re330-stitched").stdout
+    assert f"{yields[24]:.3f} (0.44)" in told
+    assert "(" not in "".join(elasticity_table([check(load_catenary("ln2"), 100.0)]).rows[0])
+    # A published figure is no value of the line: it changes no run, and cannot be varied.
+    assert content_of(line) == content_of(line.model_copy(update={"published": None}))
+    assert not any("published" in each for each in parameter_names(line, "catenary"))
+
+
+def test_the_page_has_the_elasticity_of_every_line_whose_spans_are_alike():
+    lines = (load_catenary(name) for name in available("catenary"))
+    alike = [each for each in lines if isinstance(each, FlexibleCatenaryData) and not each.sequence]
+    table = elasticity_table([check(each, 100.0) for each in alike]).markdown
+    assert table in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["re330-stitched", "re250-stitched"])
+def test_droppers_of_the_german_lines_are_those_that_were_seen(name):
+    line, stiffer = load_catenary(name), load_catenary(name.removesuffix("-stitched"))
+    assert line.droppers.positions[0] == 5.0
+    assert np.diff(line.droppers.positions) == pytest.approx(9.17, abs=0.01)
+    assert line.sources["droppers.positions"].startswith("seen: ")
+    assert line.droppers == stiffer.droppers
+
+
+def test_a_line_built_for_250_km_h_takes_200():
+    """It was 0.46 with droppers of our own choice; EN 50367 allows 0.3."""
+    found = simulate("re250-stitched", "dsa380", 200.0, mean_force="en50367").summary()
+    assert found.std / found.mean == pytest.approx(0.33, abs=0.01)
+    assert found.contact_loss == 0.0

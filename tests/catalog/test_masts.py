@@ -45,7 +45,7 @@ def test_masts_give_lengths_and_heights(separator, decimal, tmp_path):
     assert heights == (0.0, 0.0, 0.0, 0.0, -0.05, -0.15, -0.05, 0.0)  # over that at the first mast
     assert encumbrances == (1.8, 1.8, 1.8, 1.8, 1.6, 1.3, 1.6, 1.8)
     assert spans[0].droppers == load_catenary("re250").droppers
-    assert len(spans[4].droppers.positions) == 6
+    assert len(spans[4].droppers.positions) == 5
     assert line.name == "mine"
     assert line.sources["sequence"] == "masts.csv"
     assert line.sources["contact_wire.tension"] == "recalled: medium confidence"

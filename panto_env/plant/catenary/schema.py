@@ -19,7 +19,7 @@ NO_SOURCE, BY_DEFAULT = "no source is named", "default, as none is given"
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 CLEAR = 8
 """Spans of a line beyond the last one of a pass: no usual window about the train then reaches the line's end,
-whose anchor reflects waves (under re250 at 350 km/h it adds 8 % to sigma and 4 points to CL)."""
+whose anchor reflects waves (under sweden-st15 at 330 km/h it adds 15 % to sigma and 2 points to CL)."""
 SHORTEST_SPAN, LONGEST_SPAN = 2.0, 200.0  # m
 """Two and a half times the longest span of usual lines."""
 SpanLength: TypeAlias = Annotated[float, Between(SHORTEST_SPAN, LONGEST_SPAN, "m")]

@@ -97,6 +97,17 @@ class StitchWire(Settings):
     clamp_mass: Clamp = Field(0.0, description="each clamp, on the messenger (kg)")
 
 
+Elasticity: TypeAlias = Annotated[float, Between(1e-5, 0.01, "m/N")]
+
+
+class Published(Settings):
+    """What others give as a line's elasticity (EN 50119); runs do not depend on it."""
+
+    mid_span: Elasticity | None = Field(None, description="published elasticity in mid-span (m/N)")
+    support: Elasticity | None = Field(None, description="published elasticity at a support (m/N)")
+    non_uniformity: Annotated[float, Between(0, 100, "%")] | None = Field(None, description="published (%)")
+
+
 Encumbrance: TypeAlias = Annotated[float, Between(0.05, 10, "m")]
 ContactHeight: TypeAlias = Annotated[float, Between(-2, 2, "m")]
 

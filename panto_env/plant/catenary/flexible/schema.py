@@ -21,6 +21,7 @@ from .parts import (
     Encumbrance,
     EndSupport,
     Overlap,
+    Published,
     Span,
     SteadyArm,
     StitchWire,
@@ -88,6 +89,7 @@ class FlexibleCatenaryData(CatenaryData):
     overlaps: tuple[Overlap, ...] = Field(
         (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
+    published: Published | None = Field(None, description="elasticity as others give it, for `panto line`")
     as_found: LineCondition | None = Field(
         None,
         description="how the line was found to differ from its design, such as by `panto fit`: a line "
