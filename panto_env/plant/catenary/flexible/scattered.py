@@ -18,6 +18,9 @@ from .arrays import MESSENGER, PAD
 from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of, share_ends
 
+STILL = 0.25
+"""Last part of a window, in spans, that is at rest once it has moved on; stitch wires reach so far."""
+
 
 @inlined
 def displacement_at(x, node, constants):
@@ -119,6 +122,40 @@ def at_line_end(line, wire, lane):
 
 
 @inlined
+def share_left(line, local):
+    """Share of its motion that is left to a node of the window once this has moved on; local: its number.
+
+    Towards where the window ended the line comes to rest, as what is beyond: the window's end swings freely
+    where the line has a support, and a step of some millimetres there would be 300 N in a dropper.
+    """
+    per_span = line.rows * WIDTH // line.window
+    apart = (line.rows * WIDTH - local) / per_span - 1.0 - STILL  # spans from where all is at rest
+    share = min(max(apart / (1.0 - STILL), 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+@inlined
+def _come_to_rest(line, wire, lane):
+    """Bring the wires' nodes to rest where a new span begins."""
+    u, d = wire.displacement[lane], wire.increment[lane]
+    for i in range(u.shape[1]):
+        for j in range(WIDTH):
+            share = share_left(line, j * line.rows + i - PAD)
+            for w in range(u.shape[0]):
+                u[w, i, j] *= share
+                d[w, i, j] *= share
+
+
+@inlined
+def _ease(line, wire, lane, along, held, n, first, start):
+    """Bring the past of link n of those whose sets begin with ``first`` to rest as its nodes."""
+    sets, slot = held.node.shape[1], n % held.number.shape[1]
+    s, j, share = first + slot % sets, slot // sets, share_left(line, along.first[n, 0] + 1 - start)
+    gap = wire.gap[lane, s, j]
+    wire.extension[lane, s, j] = share * (wire.extension[lane, s, j] + gap) - gap
+
+
+@inlined
 def take_window(line, wire, lane):
     """Take in what is in a lane's window at its present place; what has entered is at rest."""
     scattered, held = line.scattered, wire.scattered
@@ -127,6 +164,8 @@ def take_window(line, wire, lane):
         travelled = wire.travelled[lane]
         start = travelled * (nodes // line.window)
         at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
+        if not at_start:
+            _come_to_rest(line, wire, lane)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
         if line.pairs > 1:
             _hold_anchors(wire.displacement[lane], wire.increment[lane], wire.inertia[lane], line.rows)
@@ -141,6 +180,8 @@ def take_window(line, wire, lane):
         while n < scattered.links.number.size and (at_end or scattered.links.enters[n] < end):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
                 _rest(line, wire, lane, scattered.links, held.links, n, 0)
+            else:
+                _ease(line, wire, lane, scattered.links, held.links, n, 0, start)
             n += 1
         if scattered.deficit.size > 0:
             _take_stitches(line, wire, lane, start, end, at_start, at_end)
@@ -161,12 +202,14 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
     n = held.stitches.begin[lane] & NOT_NEGATIVE
     sets, nodes = held.stitches.node.shape[1], scattered.stitches.empty.size - STITCH.INERTIA
     while n < scattered.stitches.number.size and (at_end or scattered.stitches.enters[n] < end):
-        if _enter(scattered.stitches, held.stitches, lane, n, start, line.rows):
-            slot = n % held.stitches.number.shape[1]
-            for k in range(nodes):
-                row = slot % sets * nodes + k
-                held.displacement[lane, row, slot // sets] = 0.0
-                held.increment[lane, row, slot // sets] = 0.0
+        new = _enter(scattered.stitches, held.stitches, lane, n, start, line.rows)
+        slot, clamp = n % held.stitches.number.shape[1], scattered.stitches.first[n, 0] + 1 - start
+        length = scattered.stitches.first[n, 1] - scattered.stitches.first[n, 0]
+        for k in range(nodes):
+            row = slot % sets * nodes + k
+            share = 0.0 if new else share_left(line, clamp + length * k / (nodes - 1))
+            held.displacement[lane, row, slot // sets] *= share
+            held.increment[lane, row, slot // sets] *= share
         n += 1
     _leave(scattered.hung, held.hung, lane, start, at_start)
     n, first = held.hung.begin[lane] & NOT_NEGATIVE, held.links.node.shape[1]
@@ -178,6 +221,8 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
             upper = (above % sets * nodes + scattered.upper[n]) * WIDTH + above // sets
             held.hung.node[lane, slot % own, 4, slot // own] = upper
             held.hung.node[lane, slot % own, 5, slot // own] = upper + WIDTH
+        else:
+            _ease(line, wire, lane, scattered.hung, held.hung, n, first, start)
         n += 1
 
 
