@@ -21,6 +21,7 @@ from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
 from .beams import GRAVITY, HELD, Beams, Profile, add_to_band
+from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
 from .spans import spans_of
 from .static import solve
@@ -83,8 +84,7 @@ class DefectiveLine:
             nodes = [*nodes, *stitches.clamps]
             divided = [_divided(span, own, nodes, begin) for span, begin in begins]
         else:
-            within = np.unique(np.round(stitches.clamps % data.span_length, 9))
-            divided = [_divided(each[0], own, [*nodes, *within])] * spans
+            divided = [_divided(each[0], own, [*nodes, *(stitches.clamps % data.span_length)])] * spans
         firsts = np.cumsum(
             [0, *(len(lengths) for _, lengths, _ in divided)]
         )  # numbers of the supports' nodes
@@ -132,7 +132,7 @@ class DefectiveLine:
         unused[:: self._per_node] = unused[1 :: self._per_node] = False
         unused[2 :: self._per_node] = unused[3 :: self._per_node] = False
         for k in range(len(stitches.support)):
-            first, last = (int(np.argmin(np.abs(places - end[k]))) for end in (stitches.begin, stitches.end))
+            first, last = index_at(places, [stitches.begin[k], stitches.end[k]])
             rope = above[first:last] + 2  # its nodes are the messenger's, but for its ends
             unused[np.unique(rope)] = False
             unused[[rope[0, 0], rope[-1, 2]]] = True
@@ -182,7 +182,7 @@ class DefectiveLine:
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
-        return self._per_node * int(np.argmin(np.abs(self._places - position))) + 2 * CONTACT
+        return self._per_node * int(index_at(self._places, position)) + 2 * CONTACT
 
     def solve(
         self,
@@ -253,7 +253,7 @@ def _divided(
     begin: where the span begins (m); None where spans are alike, and all are divided in the same way.
     """
     breaks = own.breaks([0.0, *span.droppers.positions, span.span_length], nodes, begin)
-    return breaks, np.diff(breaks), np.searchsorted(breaks, span.droppers.positions)
+    return breaks, np.diff(breaks), index_at(breaks, span.droppers.positions)
 
 
 def _own(counts: Sequence[int], span: int) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Self, TypeAlias
+from bisect import bisect
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Self, TypeAlias
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from ....base.arrays import Array, Index
 from ....base.explanation import comma_hint
 from ....base.ranges import Between
 from ....base.settings import Settings
@@ -14,7 +17,33 @@ from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength, Wire
 
 CLOSEST = 0.1
 """Least distance between two droppers, or between one and a support (m)."""
+SAME = 1e-3
+"""Places along a line that are no farther from each other are one (m). No line is set out more exactly, and
+shorter elements of a wire lose all digits: of one of 1e-6 m droppers became metres too long."""
 Clamp = Annotated[float, Between(0, 10, "kg")]
+
+
+def nearer(distance: Any, least: float) -> Any:
+    """Whether distances of places are less than they must be (m)."""
+    return distance < least - SAME
+
+
+def places_of(own: Iterable[float], further: Iterable[float] = (), apart: float = SAME) -> Array:
+    """Places in their order (m): own ones, then those of further ones that are not at one of them already.
+
+    apart: distance up to which they are the same (m).
+    """
+    found = sorted(own)
+    for place in further:
+        k = bisect(found, place)
+        if all(abs(place - each) > apart for each in found[max(k - 1, 0) : k + 1]):
+            found.insert(k, place)
+    return np.array(found)
+
+
+def index_at(places: Array, x: Any) -> Index:
+    """Which of some places, in their order, is the one at x (m), of the shape of x: the nearest."""
+    return np.searchsorted((places[1:] + places[:-1]) / 2, x)
 
 
 class Conductor(Wire):
@@ -57,7 +86,7 @@ class Droppers(Settings):
                 f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
                 f"but {len(self.sag)} sags{comma_hint(len(self.positions), len(self.sag))}"
             )
-        if any(b - a < CLOSEST for a, b in zip(self.positions, self.positions[1:], strict=False)):
+        if any(nearer(b - a, CLOSEST) for a, b in zip(self.positions, self.positions[1:], strict=False)):
             raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")
         if (self.stiffness is None) == (self.axial_stiffness is None):
             raise ValueError("give either stiffness or axial_stiffness, and only one of them")
@@ -177,5 +206,5 @@ def check_inside(positions: Sequence[float], span_length: float) -> None:
     last = positions[-1]
     if last >= span_length:
         raise ValueError(f"dropper at {last} m lies outside the span of {span_length} m")
-    if span_length - last < CLOSEST:
+    if nearer(span_length - last, CLOSEST):
         raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")

@@ -18,6 +18,10 @@ from .arrays import MESSENGER, PAD
 from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of, share_ends
 
+EASED = 8.0
+"""Share of a span, as its inverse, over which wires come to rest towards a new span. With longer
+ramps the wires in overlaps send back more than they do without any."""
+
 
 @inlined
 def displacement_at(x, node, constants):
@@ -119,6 +123,50 @@ def at_line_end(line, wire, lane):
 
 
 @inlined
+def calm_from(line, start):
+    """Number of the window's node from which the line is at rest when the window has just moved to ``start``.
+
+    There it ended, or the first stitch wire begins of those that come in: they were not there before, and
+    what would have hung from them swung freely. A step of some millimetres would be 300 N in a dropper.
+    """
+    nodes = line.rows * WIDTH
+    ended = nodes - nodes // line.window
+    calm, stitches = ended - PAD, line.scattered.stitches
+    for n in range(stitches.number.size):
+        if start + ended <= stitches.enters[n] < start + nodes:
+            calm = min(calm, stitches.first[n, 0] - start)
+    return calm
+
+
+@inlined
+def share_left(line, calm, node):
+    """Share of its motion that a node of the window keeps, ``calm`` being the first at rest: an even ramp."""
+    share = min(max((calm - node) * EASED * line.window / (line.rows * WIDTH), 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+@inlined
+def _come_to_rest(line, wire, lane, calm):
+    """Bring the wires to rest towards a new span."""
+    u, d = wire.displacement[lane], wire.increment[lane]
+    for i in range(u.shape[1]):
+        for j in range(WIDTH):
+            share = share_left(line, calm, j * line.rows + i - PAD)
+            for w in range(u.shape[0]):
+                u[w, i, j] *= share
+                d[w, i, j] *= share
+
+
+@inlined
+def _ease(line, wire, lane, held, n, first, node, calm):
+    """Bring link n of those whose sets begin with ``first`` to rest as the wires at a node of the window."""
+    sets, slot = held.node.shape[1], n % held.number.shape[1]
+    s, j = first + slot % sets, slot // sets
+    gap, share = wire.gap[lane, s, j], share_left(line, calm, node)
+    wire.extension[lane, s, j] = share * (wire.extension[lane, s, j] + gap) - gap
+
+
+@inlined
 def take_window(line, wire, lane):
     """Take in what is in a lane's window at its present place; what has entered is at rest."""
     scattered, held = line.scattered, wire.scattered
@@ -127,6 +175,8 @@ def take_window(line, wire, lane):
         travelled = wire.travelled[lane]
         start = travelled * (nodes // line.window)
         at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
+        calm = calm_from(line, start)
+        _come_to_rest(line, wire, lane, calm)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
         if line.pairs > 1:
             _hold_anchors(wire.displacement[lane], wire.increment[lane], wire.inertia[lane], line.rows)
@@ -141,13 +191,16 @@ def take_window(line, wire, lane):
         while n < scattered.links.number.size and (at_end or scattered.links.enters[n] < end):
             if _enter(scattered.links, held.links, lane, n, start, line.rows):
                 _rest(line, wire, lane, scattered.links, held.links, n, 0)
+            else:
+                node = scattered.links.first[n, 0] + 1 - start
+                _ease(line, wire, lane, held.links, n, 0, node, calm)
             n += 1
         if scattered.deficit.size > 0:
-            _take_stitches(line, wire, lane, start, end, at_start, at_end)
+            _take_stitches(line, wire, lane, start, end, at_start, at_end, calm)
 
 
 @inlined
-def _take_stitches(line, wire, lane, start, end, at_start, at_end):
+def _take_stitches(line, wire, lane, start, end, at_start, at_end, calm):
     """Take in stitch wires, and the droppers that hang from them."""
     scattered, held = line.scattered, wire.scattered
     deficit, last = held.deficit[lane], line.rows * WIDTH
@@ -161,12 +214,14 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
     n = held.stitches.begin[lane] & NOT_NEGATIVE
     sets, nodes = held.stitches.node.shape[1], scattered.stitches.empty.size - STITCH.INERTIA
     while n < scattered.stitches.number.size and (at_end or scattered.stitches.enters[n] < end):
-        if _enter(scattered.stitches, held.stitches, lane, n, start, line.rows):
-            slot = n % held.stitches.number.shape[1]
-            for k in range(nodes):
-                row = slot % sets * nodes + k
-                held.displacement[lane, row, slot // sets] = 0.0
-                held.increment[lane, row, slot // sets] = 0.0
+        new = _enter(scattered.stitches, held.stitches, lane, n, start, line.rows)
+        slot, clamp = n % held.stitches.number.shape[1], scattered.stitches.first[n, 0] + 1 - start
+        length = scattered.stitches.first[n, 1] - scattered.stitches.first[n, 0]
+        for k in range(nodes):
+            row = slot % sets * nodes + k
+            share = 0.0 if new else share_left(line, calm, clamp + length * k / (nodes - 1))
+            held.displacement[lane, row, slot // sets] *= share
+            held.increment[lane, row, slot // sets] *= share
         n += 1
     _leave(scattered.hung, held.hung, lane, start, at_start)
     n, first = held.hung.begin[lane] & NOT_NEGATIVE, held.links.node.shape[1]
@@ -178,6 +233,8 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end):
             upper = (above % sets * nodes + scattered.upper[n]) * WIDTH + above // sets
             held.hung.node[lane, slot % own, 4, slot // own] = upper
             held.hung.node[lane, slot % own, 5, slot // own] = upper + WIDTH
+        else:
+            _ease(line, wire, lane, held.hung, n, first, scattered.hung.first[n, 0] + 1 - start, calm)
         n += 1
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ....base.arrays import Array
 from ..schema import Wire
 from .beams import GRAVITY, HELD, Beams, Profile
+from .parts import index_at, places_of
 from .shape import Rope
 from .stitches import Stitches, as_wire
 
@@ -40,7 +41,7 @@ class StitchedMessenger:
         first, last = ends
         own = stitches.carrying < 0
         clamps = stitches.clamps[(stitches.clamps > first) & (stitches.clamps < last)]
-        self.breaks = np.unique(np.concatenate([ends, supports, clamps, x[own]]))
+        self.breaks = places_of(ends, [*supports, *clamps, *x[own]])
         count = len(self.breaks) - (slopes is None)
         self._height = 2 * (np.arange(len(self.breaks)) % count)  # unknown of each node
         self._size = 2 * count
@@ -86,7 +87,7 @@ class StitchedMessenger:
 
     def _at(self, places: Array) -> Any:
         """Unknowns that are the messenger's height at places where it has nodes (m)."""
-        return self._height[np.searchsorted(self.breaks, places)]
+        return self._height[index_at(self.breaks, places)]
 
     def _add(self, wire: Wire, lengths: Array, unknowns: Any) -> tuple[Beams, Array]:
         beams = Beams(wire, lengths)
@@ -154,7 +155,7 @@ class StitchedMessenger:
             pieces[which] = beams.pieces(state[unknowns], bulge)
         if not repeats:
             return Profile(self.breaks, pieces, self._decay, repeats=False)
-        turn = int(np.searchsorted(self.breaks, 0.0))
+        turn = int(index_at(self.breaks, 0.0))
         order = np.roll(np.arange(len(pieces)), -turn)
         lengths = np.diff(self.breaks)[order]
         return Profile(np.append(0.0, np.cumsum(lengths)), pieces[order], self._decay[order])

@@ -12,7 +12,7 @@ from ....base.errors import InputError
 from ....base.remember import remembered
 from ..schema import Wire
 from .overlaps import tension_lengths
-from .parts import CLOSEST
+from .parts import CLOSEST, SAME, nearer
 from .schema import FlexibleCatenaryData
 from .spans import spans_of
 
@@ -81,7 +81,7 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
     x = np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung])
     begin, end, carrying = place - half, place + half, np.full(len(x), -1)
     for number in range(len(there)):
-        carrying[(x > begin[number]) & (x < end[number])] = number
+        carrying[(x > begin[number] + SAME) & (x < end[number] - SAME)] = number
     stitches = Stitches(
         np.array(there, dtype=np.int64),
         begin,
@@ -156,10 +156,10 @@ def _check(line: FlexibleCatenaryData, stitches: Stitches, x: Array) -> None:
                 f"{name} has a tension of {stitches.tension[k]:g} N, more than {100 * MOST_TENSION:g} % of "
                 f"the messenger's {messenger:g} N, from which it takes it; give less."
             )
-        if k and stitches.begin[k] < stitches.end[k - 1] + CLOSEST:
+        if k and nearer(stitches.begin[k] - stitches.end[k - 1], CLOSEST):
             raise InputError(f"{name} reaches to the one before it; give shorter ones (stitch_wire.length).")
         near = np.abs(x[:, None] - [stitches.begin[k], stitches.end[k]]).min(axis=1)
-        close = np.flatnonzero((near < NEAREST) & (stitches.carrying == k))
+        close = np.flatnonzero(nearer(near, NEAREST) & (stitches.carrying == k))
         if len(close):
             raise InputError(
                 f"{name} carries a dropper {near[close[0]]:.2g} m from its clamp, and "

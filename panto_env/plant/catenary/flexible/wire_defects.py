@@ -17,6 +17,7 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
+from .parts import places_of
 from .schema import FlexibleCatenaryData
 
 RAMP = 1.0
@@ -82,11 +83,7 @@ class WireDefects(NamedTuple):
             places = [position % span for position in positions]
         else:
             places = [each - begins for each in positions if begins <= each < begins + span]
-        breaks = list(own)
-        for place in places:
-            if min(abs(place - each) for each in breaks) > NEAREST:
-                breaks.append(place)
-        return np.array(sorted(breaks))
+        return places_of(own, places, NEAREST)
 
     def mass_of_nodes(self, x: Array, spacing: float, wire: Wire) -> Array:
         """Additional mass (kg) of the nodes of a grid at x (m), (n,), relative to a new wire.
