@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
-from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
 from panto_env.base.errors import InputError
@@ -133,8 +132,8 @@ class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Whether lanes do what a wrapper does: a ``Monitor``'s work, and no other's."""
-        return [issubclass(wrapper_class, Monitor)] * len(self._lanes(indices))
+        """False for each lane: no lane has a wrapper of its own."""
+        return [False] * len(self._lanes(indices))
 
     def _lanes(self, indices: Any) -> Sequence[int]:
         lanes: Sequence[int] = self._get_indices(indices)

@@ -208,6 +208,8 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
         return torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
 
     def _draw(self, seed: int | None) -> None:
+        if seed is None and self._running:  # go on with the generator
+            seed = int(torch.randint(2**62, (1,), generator=self._random, device=self.device))
         first = int(seeding.np_random()[1]) if seed is None else seed
         self._lanes.draw_starts(lambda start: seeding.np_random(first + start * self._agents)[0])
         self._random.manual_seed(first % 2**63)
@@ -262,8 +264,8 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
         if not _dense(actions) or actions.shape != self._shape or actions.dtype not in FLOATS:
             kind = tuple(actions.shape) if _dense(actions) else str(actions.layout)
             raise InputError(
-                f"Actions must be dense floating-point numbers of shape {self._shape}, not {actions.dtype} of "
-                f"{kind}."
+                f"Actions must be dense floating-point numbers of shape {self._shape}, not "
+                f"{actions.dtype} of {kind}."
             )
         if actions.requires_grad:
             raise InputError(

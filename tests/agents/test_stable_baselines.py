@@ -167,13 +167,18 @@ def base_of(env):
     return (env.envs[0] if "envs" in vars(env) else env.env).unwrapped
 
 
-@pytest.mark.parametrize("chain", CHAINS)
-@pytest.mark.parametrize("kind", [PPO, SAC])
+@pytest.mark.parametrize(
+    ("kind", "chain"),
+    [(PPO, chain) for chain in CHAINS]
+    # Stable-Baselines3's buffer takes no stacks of what VecNormalize has normalised.
+    + [(SAC, chain) for chain in CHAINS if chain != "stacks on VecNormalize"],
+)
 def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
     more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}
     model = trained(kind, CHAINS[chain](), **more).learn(100)
-    if kind is PPO:  # whose first actions are all alike
-        model.policy.action_net.weight.data *= 30
+    last = model.policy.action_net if kind is PPO else model.actor.mu  # lively, and not saturated
+    last.weight.data.normal_(0, 0.03, generator=torch.Generator().manual_seed(0))
+    last.bias.data[:] = float(model.action_space.low + model.action_space.high) / 2 if kind is PPO else 0.0
     env = model.get_env()
     freeze(env)
     save_policy(model, tmp_path / "mine.safetensors")
@@ -245,7 +250,7 @@ def test_a_model_that_was_loaded_takes_the_environment_of_its_training(tmp_path)
         save_policy(loaded, mine, env=model.get_env())
     with pytest.raises(InputError, match="NormalizeObservation has no statistics"):
         save_policy(loaded, mine, env=single.NormalizeObservation(bare()))
-    with pytest.raises(InputError, match="The network has 9 inputs and 1 actions, the task's pantograph 18"):
+    with pytest.raises(InputError, match="The network has 10 inputs and 1 actions, the task's pantograph 20"):
         save_policy(loaded, mine, env=single.FrameStackObservation(bare(), 2))
     assert not mine.exists()
     save_policy(loaded, mine, env=lanes)
