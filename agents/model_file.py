@@ -21,6 +21,7 @@ from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
+from .inputs import Step, width_after
 from .learner import Arrays, learn_again, learnt
 from .recurrent_actor import Cell, RecurrentActor
 
@@ -100,6 +101,7 @@ class Facts(Settings):
     environment: dict[str, Any]  # environment that it was trained in: id and arguments
     variants: tuple[dict[str, Any], ...] = ()  # changes of its arguments, each with a share of the training
     needs: Needs
+    inputs: tuple[Step, ...] = ()  # steps from the observation to the network
     residual_of: str | None = None  # policy that its action is added to
     residual_share: float = 1.0  # factor on its action when added
     washout: WashoutSettings | None = None  # the slow average that is subtracted from its action
@@ -189,7 +191,7 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     if parts and set(parts) != set(Cell._fields):
         raise ValueError("its network has only a part of a cell")
     cell = Cell(**parts) if parts else None
-    count, width = len(own) // 2, len(facts.needs.entries)
+    count, width = len(own) // 2, width_after(facts.inputs, len(facts.needs.entries))
     if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
     weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))

@@ -15,6 +15,7 @@ from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.policies import Policy, check_named, find_policy
 
 from .actor import Actor
+from .inputs import Prepared
 from .model_file import Facts, Needs, read_model
 from .residual_policy import Residual
 from .washout_policy import WashedOut
@@ -52,8 +53,10 @@ class TrainedPolicy:
 
 
 def policy_of(actor: Actor, facts: Facts) -> Policy:
-    """Policy from a network and its facts: with its washout, and added to a base policy, if it has these."""
+    """Policy from a network and its facts: with inputs, washout and a base policy, if it has these."""
     policy: Policy = actor if facts.washout is None else WashedOut(actor, facts.washout)
+    if facts.inputs:
+        policy = Prepared(facts.inputs, policy)
     if facts.residual_of is None:
         return policy
     return Residual(find_policy(facts.residual_of), policy, facts.residual_share)

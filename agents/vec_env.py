@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -13,14 +15,15 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from panto_env.base.errors import InputError
 from panto_env.envs import IDS, PantographVectorEnv
+from panto_env.envs.settings import FixedArguments
 
 
-class PantographVecEnv(VecEnv):  # type: ignore[misc]
+class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
     """A ``VecEnv`` around a vector environment of Gymnasium, ``PantographVectorEnv`` or a wrapper of one.
 
     Any autoreset mode works. Observations and rewards are the environment's own arrays, not copies.
-    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the
-    episode's "figures".
+    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated", the episode's
+    "figures", and its return, length and time (s) as "episode", as those of ``Monitor`` do.
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
@@ -32,12 +35,26 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
             )
         self.env: Any = env
         self.seconds = 0.0  # spent in the environment so far
+        self._actions: dict[int, NDArray[np.float32]] = {}  # of the steps begun, by thread
+        self._returns, self._lengths = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=np.int64)
+        self._begun = time.time()
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.metadata["render_fps"] = env.metadata["render_fps"]
+
+    def __copy__(self) -> PantographVecEnv:
+        return deepcopy(self)  # two that share one environment would be of no use
 
     def reset(self) -> NDArray[np.float32]:
-        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i."""
+        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i.
+
+        Raises InputError for options, given by ``set_options``, that are not valid or not those of all lanes.
+        """
         seeded = any(seed is not None for seed in self._seeds)
-        observation, info = self.env.reset(seed=list(self._seeds) if seeded else None)
+        options = self._options[0]
+        if any(each != options for each in self._options):
+            raise InputError("The lanes share one environment; give set_options the same options for all.")
+        observation, info = self.env.reset(seed=list(self._seeds) if seeded else None, options=options)
+        self._returns[:], self._lengths[:] = 0.0, 0
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [{"speed_kmh": float(speed)} for speed in info["speed_kmh"]]
@@ -46,12 +63,16 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions, (lanes, actions), for ``step_wait``."""
-        self._actions = actions
+        self._actions[threading.get_ident()] = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Step all lanes: observations, rewards, dones and one info per lane."""
         start = time.perf_counter()
-        observation, reward, terminated, truncated, info = self.env.step(self._actions)
+        observation, reward, terminated, truncated, info = self.env.step(
+            self._actions.pop(threading.get_ident())
+        )
+        self._returns += reward
+        self._lengths += 1
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
@@ -64,15 +85,35 @@ class PantographVecEnv(VecEnv):  # type: ignore[misc]
                 name for name in figures if not name.startswith("_")
             ]  # "_name" marks lanes that have one
             for lane in np.flatnonzero(done).tolist():
+                own = (
+                    float(self._returns[lane]),
+                    int(self._lengths[lane]),
+                    round(time.time() - self._begun, 6),
+                )
                 infos[lane] = {
+                    "episode": dict(zip("rlt", own, strict=True)),
                     "terminal_observation": last[lane],
                     "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
                     "figures": {
                         name: float(figures[name][lane]) for name in names if figures[f"_{name}"][lane]
                     },
                 }
+            self._returns[done], self._lengths[done] = 0.0, 0
         self.seconds += time.perf_counter() - start
         return observation, reward.astype(np.float32), done, infos
+
+    def get_images(self) -> Sequence[NDArray[np.uint8]]:
+        """Frames, (height, width, 3), of the drawn lanes.
+
+        Raises InputError where the environment draws none.
+        """
+        frames: Sequence[NDArray[np.uint8]] | None = self.env.render()
+        if frames is None:
+            raise InputError(
+                "The environment draws no pictures; make it with "
+                "gymnasium.make_vec(..., render_mode='rgb_array')."
+            )
+        return frames
 
     def close(self) -> None:
         """Close the native environment."""

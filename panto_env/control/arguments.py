@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from ..base.names import nearest
+from ..base.names import near_names
 from .settings import RunSettings, fields
 
 P = ParamSpec("P")
@@ -15,10 +15,12 @@ P = ParamSpec("P")
 
 def takes(
     kind: Callable[P, RunSettings],
+    hints: Mapping[str, str] | None = None,
 ) -> Callable[[Callable[[Any, dict[str, Any]], None]], Callable[Concatenate[Any, P], None]]:
     """Decorator that gives an ``__init__`` the keyword arguments of a class of settings.
 
-    The decorated function receives the given arguments by name. An unknown one raises TypeError.
+    The decorated function receives the given arguments by name. An unknown one raises TypeError, with its
+    hint if there is one, by its name.
     """
     settings: type[RunSettings] = kind  # type: ignore[assignment]
 
@@ -29,7 +31,7 @@ def takes(
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
                 raise TypeError(f"{type(self).__name__}() takes arguments by name, such as catenary='re250'")
-            check_arguments(given, settings, type(self).__name__)
+            check_arguments(given, settings, type(self).__name__, hints or {})
             initialise(self, given)
 
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
@@ -47,12 +49,15 @@ def parameters(kind: type[RunSettings] = RunSettings) -> list[inspect.Parameter]
     ]
 
 
-def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function: str) -> None:
+def check_arguments(
+    given: Mapping[str, Any], kind: type[RunSettings], function: str, hints: Mapping[str, str] | None = None
+) -> None:
     """Raise TypeError for a name that is not a setting, as Python does for an unknown argument."""
     for name in given:
         if name not in kind.model_fields:
-            near = nearest(name, list(kind.model_fields))
-            hint = f"; did you mean '{near}'?" if near else f"; known are {', '.join(fields(kind))}"
+            near = near_names(name, list(kind.model_fields))
+            hint = f"; did you mean {near}?" if near else f"; known are {', '.join(fields(kind))}"
+            hint = (hints or {}).get(name, hint)
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -12,6 +13,9 @@ from ..base.errors import InputError
 from ..control.action import checked
 from ..control.observation import BOUND
 from .infos import REWARD
+from .one_thread import CopiedAlone, InUse, one_at_a_time
+from .reset_arguments import checked_options
+from .settings import FixedArguments
 from .single import PantographEnv
 
 try:
@@ -24,7 +28,7 @@ except ModuleNotFoundError as error:
 Observation = NDArray[np.float32]
 
 
-class PantographParallelEnv(ParallelEnv):  # type: ignore[misc]
+class PantographParallelEnv(FixedArguments, CopiedAlone, ParallelEnv):  # type: ignore[misc]
     """The controlled pantographs of a train as agents, "pantograph_1" in front.
 
     ``panto_env.parallel_env(pantographs=["dsa380", "dsa380"], distances=[200], controlled=[1, 2])`` is a thin
@@ -39,6 +43,7 @@ class PantographParallelEnv(ParallelEnv):  # type: ignore[misc]
     def __init__(self, **settings: Any) -> None:
         """Arguments of ``PantographEnv``. Raises InputError for a value that is not valid."""
         self.train = PantographEnv(**settings)
+        self._in_use = InUse()
         self.metadata = self.train.metadata | PantographParallelEnv.metadata
         self.render_mode = self.train.render_mode
         numbers = [number + 1 for number in self.train.task.episode.controlled]
@@ -61,16 +66,18 @@ class PantographParallelEnv(ParallelEnv):  # type: ignore[misc]
         """Space of an agent's action, always the same object."""
         return self.action_spaces[agent]
 
+    @one_at_a_time
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Start an episode of the train; as ``PantographEnv.reset``."""
         # PettingZoo's own test gives an option of this name, only to see that options are taken.
-        known = {name: value for name, value in (options or {}).items() if name != "options"}
+        known = {name: value for name, value in checked_options(options).items() if name != "options"}
         observation, info = self.train.reset(seed=seed, options=known)
         self.agents = list(self.possible_agents)
         return self._of_agents(observation), self._infos(info)
 
+    @one_at_a_time
     def step(
         self, actions: dict[str, Observation]
     ) -> tuple[
@@ -86,7 +93,7 @@ class PantographParallelEnv(ParallelEnv):  # type: ignore[misc]
         """
         if not self.agents:
             raise InputError("The episode has not begun or has ended; call reset before step.")
-        if set(actions) != set(self.agents):
+        if not isinstance(actions, Mapping) or set(actions) != set(self.agents):
             raise InputError(f"There must be an action for each of {', '.join(self.agents)}.")
         force = np.concatenate([checked(actions[name], self._shape) for name in self.agents])
         observation, _, terminated, truncated, info = self.train.step(force)

@@ -33,6 +33,21 @@ def checked_seeds(seed: Any, lanes: int) -> list[int | None]:
     return [None if first is None else first + lane for lane in range(lanes)]
 
 
+def check_whole_trains(mask: Any, agents: int) -> None:
+    """Raise InputError where a mask of lanes, (lanes,), marks some lanes of a train and not the others.
+
+    agents: lanes of a train.
+    """
+    trains = mask.reshape(-1, agents)
+    parts = (trains != trains[:, :1]).any(1).tolist()
+    if any(parts):
+        first = parts.index(True) * agents
+        raise InputError(
+            f"reset_mask marks a part of a train: lanes {first} to {first + agents - 1} are the pantographs "
+            "of one train, whose episodes begin together; mark all of them or none."
+        )
+
+
 def checked_options(options: Any) -> dict[str, Any]:
     """Options by name; none for None. Raises InputError for anything else than a dictionary by names."""
     if options is None:

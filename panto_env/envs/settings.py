@@ -25,6 +25,19 @@ SlowMotion = Field(
 )
 
 
+class FixedArguments:
+    """Base of an environment: what looks like setting an argument by an attribute is refused."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raise InputError for the name of an argument: setting it would change nothing."""
+        if name in RunSettings.model_fields:
+            raise InputError(
+                f"{name} is not an attribute that can be set; give it where the environment is made, or for "
+                f"one episode to reset(options={{'{name}': ...}})."
+            )
+        super().__setattr__(name, value)
+
+
 class EnvironmentSettings(RunSettings):
     """Arguments of ``PantographEnv``."""
 
@@ -153,6 +166,18 @@ class TensorSettings(VectorSettings):
         if self.render_mode is not None:
             raise InputError("On a device there are no pictures; leave out render_mode, or device.")
         return self
+
+
+OF_VECTORS = dict.fromkeys(
+    TensorSettings.model_fields.keys() - EnvironmentSettings.model_fields.keys(),
+    "; it is an argument of gymnasium.make_vec",
+)
+"""Hints for arguments that a single environment does not have, by name."""
+OF_DEVICES = dict.fromkeys(
+    TensorSettings.model_fields.keys() - VectorSettings.model_fields.keys(),
+    "; it is an argument of lanes on a device, such as device='cuda'",
+)
+"""Hints for arguments that a vector environment on the processor does not have, by name."""
 
 
 def frames_per_second(control_interval: float, slow_motion: float) -> float:

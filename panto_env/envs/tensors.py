@@ -24,11 +24,36 @@ from ..control.settings import read_settings
 from .episodes import with_longest_episode
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
-from .reset_arguments import checked_options, checked_seed
+from .one_thread import CopiedAlone, InUse, one_at_a_time
+from .reset_arguments import check_whole_trains, checked_options, checked_seed
 from .settings import TensorSettings, render_metadata
+from .vector import SharedByLanes
+
+FLOATS = (torch.float16, torch.bfloat16, torch.float32, torch.float64)
+"""Kinds of numbers of actions."""
 
 
-class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
+class CopiedLanes(TensorLanes):
+    """Lanes whose copies have tensors of their own, and a kernel that is bound to these."""
+
+    def __init__(self, *arguments: Any) -> None:
+        """Arguments of ``TensorLanes``."""
+        super().__init__(*arguments)
+        self._arguments = arguments
+
+    def __getstate__(self) -> dict[str, Any]:
+        blocks = [columns.blocks for columns in (self._bank, self._columns)]
+        return {"arguments": self._arguments, "task": self.task, "blocks": blocks}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        CopiedLanes.__init__(self, *state["arguments"])
+        self.task = state["task"]
+        for columns, blocks in zip((self._bank, self._columns), state["blocks"], strict=True):
+            for block, numbers in blocks.items():
+                columns.blocks[block].copy_(numbers)
+
+
+class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
     """Many pantographs stepped together on a GPU; actions, observations, rewards and flags are tensors there.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=65536, device="cuda")`; other arguments as for
@@ -60,7 +85,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         self.num_envs, self.render_mode = settings.num_envs, None
         self._limit, self._with_figures = settings.max_episode_steps, settings.figures
         try:
-            self._lanes = TensorLanes(settings, settings.trains, settings.used_starts, self.device)
+            self._lanes = CopiedLanes(settings, settings.trains, settings.used_starts, self.device)
         except torch.OutOfMemoryError as error:
             raise InputError(
                 f"{self.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."
@@ -76,6 +101,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._shape = (self.num_envs, *self.single_action_space.shape)
         self._random = torch.Generator(self.device)
+        self._in_use = InUse()
         self._spec: EnvSpec | None = None
         self._running = False
         self._ended = self._none
@@ -90,6 +116,15 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
 
+    def _state(self) -> dict[str, Any]:
+        return vars(self) | {"_random": self._random.get_state()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._random = torch.Generator(self.device)
+        self._random.set_state(state["_random"])
+
+    @one_at_a_time
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[torch.Tensor, dict[str, Any]]:
@@ -116,6 +151,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         answer = self._answer(~self._none if mask is None else mask)
         return answer.results.observation, lane_infos(answer)
 
+    @one_at_a_time
     def step(
         self, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor, dict[str, Any]]:
@@ -161,6 +197,7 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
                 infos |= self._figures(ended)
         return observation, reward, terminated, truncated, infos
 
+    @one_at_a_time
     def context(self, lane: int) -> Context:
         """Information about a lane's episode that a policy may use."""
         return self._lanes.context(lane)
@@ -171,6 +208,8 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
         return torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
 
     def _draw(self, seed: int | None) -> None:
+        if seed is None and self._running:  # go on with the generator
+            seed = int(torch.randint(2**62, (1,), generator=self._random, device=self.device))
         first = int(seeding.np_random()[1]) if seed is None else seed
         self._lanes.draw_starts(lambda start: seeding.np_random(first + start * self._agents)[0])
         self._random.manual_seed(first % 2**63)
@@ -222,10 +261,16 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
             raise InputError(
                 f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}."
             )
-        if tuple(actions.shape) != self._shape or not actions.is_floating_point():
+        if not _dense(actions) or actions.shape != self._shape or actions.dtype not in FLOATS:
+            kind = tuple(actions.shape) if _dense(actions) else str(actions.layout)
             raise InputError(
-                f"Actions must be floating-point numbers of shape {self._shape}, not {actions.dtype} of "
-                f"{tuple(actions.shape)}."
+                f"Actions must be dense floating-point numbers of shape {self._shape}, not "
+                f"{actions.dtype} of {kind}."
+            )
+        if actions.requires_grad:
+            raise InputError(
+                "Actions must not require gradients, since none pass through the environment; give "
+                "actions.detach()."
             )
         wrong = ~torch.isfinite(actions).all(dim=1)
         if wrong.any():
@@ -235,16 +280,21 @@ class PantographTensorEnv(VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
             )
 
     def _checked_mask(self, mask: Any) -> torch.Tensor:
-        valid = isinstance(mask, torch.Tensor) and mask.dtype == torch.bool and mask.shape == (self.num_envs,)
-        if not (valid and mask.device == self.device and bool(mask.any())):
+        valid = isinstance(mask, torch.Tensor) and mask.dtype == torch.bool and _dense(mask)
+        if not (valid and mask.shape == (self.num_envs,) and mask.device == self.device and bool(mask.any())):
             raise InputError(
                 f"reset_mask must be {self.num_envs} booleans, a tensor on {self.device} with one true or "
                 "more."
             )
         if not self._running:
             raise InputError("The first reset must begin episodes in all lanes; leave out reset_mask.")
+        check_whole_trains(mask, self._agents)
         lanes: torch.Tensor = mask
         return lanes
+
+
+def _dense(tensor: torch.Tensor) -> bool:
+    return tensor.layout is torch.strided and not tensor.is_nested
 
 
 def usable_device(name: str) -> torch.device:

@@ -1,11 +1,24 @@
 """A model that Stable-Baselines3 trained by itself, saved as a policy: the same actions, in every command."""
 
 import gymnasium
+import gymnasium.wrappers as single
+import gymnasium.wrappers.vector as several
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import A2C, PPO, SAC
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import (
+    DummyVecEnv,
+    SubprocVecEnv,
+    VecCheckNan,
+    VecFrameStack,
+    VecMonitor,
+    VecNormalize,
+)
 
+from panto_agents.inputs import Scaled
+from panto_agents.model_file import read_model, write_policy
 from panto_agents.stable_baselines import save_policy
 from panto_agents.vec_env import PantographVecEnv
 from panto_env import InputError, simulate
@@ -56,23 +69,206 @@ def test_a_pass_of_it_has_the_washout_of_its_training(tmp_path):
     assert run.settings["washout"] == 1.0
 
 
+def with_a_layer_of_its_own():
+    model = trained(PPO, gymnasium.make(NAME, **SHORT), n_steps=64)
+    model.policy.action_net = torch.nn.Sequential(model.policy.action_net, torch.nn.Hardtanh(-1e-3, 1e-3))
+    return model
+
+
 @pytest.mark.parametrize(
     ("model", "message"),
     [
         (lambda: trained(A2C, gymnasium.make(NAME, **SHORT)), "ppo or sac"),
         (lambda: trained(PPO, gymnasium.make("Pendulum-v1")), "of this project|Pendulum"),
-        (lambda: trained(PPO, VecNormalize(environments()["dummy"])), "VecNormalize"),
+        (lambda: trained(PPO, VecNormalize(environments()["dummy"])), "VecNormalize has no statistics"),
         (
             lambda: PPO(
                 "MlpPolicy",
                 gymnasium.make(NAME, **SHORT),
-                policy_kwargs={"activation_fn": __import__("torch").nn.ELU},
+                policy_kwargs={"activation_fn": torch.nn.ELU},
             ),
             "tanh or relu",
         ),
+        (lambda: trained(SAC, gymnasium.make(NAME, **SHORT), use_sde=True), "SAC without use_sde"),
+        (lambda: with_a_layer_of_its_own(), "does more than its linear layers"),
     ],
 )
 def test_models_that_a_file_cannot_hold_are_refused(model, message, tmp_path):
     with pytest.raises(InputError, match=message):
         save_policy(model(), tmp_path / "mine.safetensors")
     assert not list(tmp_path.iterdir())
+
+
+class Doubled(gymnasium.RewardWrapper):
+    """A reward of one's own, which no policy sees."""
+
+    def reward(self, reward):
+        return 2 * reward
+
+
+class Upside(gymnasium.RewardWrapper):
+    """It looks like one of rewards only."""
+
+    def reward(self, reward):
+        return reward
+
+    def step(self, action):
+        return self.env.step(-action)
+
+
+def bare(**more):
+    return gymnasium.make(NAME, **SHORT | more)
+
+
+def native(lanes=2, **more):
+    return gymnasium.make_vec(NAME, num_envs=lanes, **SHORT | more)
+
+
+CHAINS = {
+    "normalised": lambda: single.NormalizeObservation(bare()),
+    "normalised to a range": lambda: single.RescaleObservation(bare(), -0.5, 3.0),
+    "stacked": lambda: single.FrameStackObservation(bare(), 3),
+    "stacked on zeros, flat": lambda: single.FlattenObservation(
+        single.FrameStackObservation(bare(), 3, padding_type="zero")
+    ),
+    "stacked twice, then normalised": lambda: single.NormalizeObservation(
+        single.FrameStackObservation(single.FrameStackObservation(bare(), 2), 2)
+    ),
+    "other actions": lambda: single.RescaleAction(single.RescaleAction(bare(), -3.0, 5.0), 0.0, 0.5),
+    "VecNormalize on stacks": lambda: VecNormalize(
+        VecFrameStack(DummyVecEnv([bare] * 2), 3), clip_obs=0.7, norm_reward=True
+    ),
+    "stacks on VecNormalize": lambda: VecFrameStack(VecNormalize(DummyVecEnv([bare] * 2), clip_obs=0.7), 3),
+    "VecNormalize of rewards": lambda: VecNormalize(DummyVecEnv([bare] * 2), norm_obs=False),
+    "many that change nothing": lambda: VecCheckNan(
+        VecMonitor(
+            DummyVecEnv([lambda: Monitor(Doubled(single.NormalizeReward(single.TimeLimit(bare(), 90))))])
+        )
+    ),
+    "vector": lambda: PantographVecEnv(several.RescaleAction(several.NormalizeObservation(native()), 0, 1)),
+}
+
+
+def freeze(env):
+    """Stop the statistics of all wrappers, as a saved file has them."""
+    while env is not None:
+        for name in ("training", "update_running_mean"):
+            if hasattr(type(env), name) or name in vars(env):
+                setattr(env, name, False)
+        for each in getattr(env, "envs", ()):
+            freeze(each)
+        env = vars(env).get("venv", vars(env).get("env"))
+
+
+def base_of(env):
+    """The environment without wrappers, and how to read an action of its first lane."""
+    while "venv" in vars(env):
+        env = env.venv
+    return (env.envs[0] if "envs" in vars(env) else env.env).unwrapped
+
+
+@pytest.mark.parametrize(
+    ("kind", "chain"),
+    [(PPO, chain) for chain in CHAINS]
+    # Stable-Baselines3's buffer takes no stacks of what VecNormalize has normalised.
+    + [(SAC, chain) for chain in CHAINS if chain != "stacks on VecNormalize"],
+)
+def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
+    more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}
+    model = trained(kind, CHAINS[chain](), **more).learn(100)
+    last = model.policy.action_net if kind is PPO else model.actor.mu  # lively, and not saturated
+    last.weight.data.normal_(0, 0.03, generator=torch.Generator().manual_seed(0))
+    last.bias.data[:] = float(model.action_space.low + model.action_space.high) / 2 if kind is PPO else 0.0
+    env = model.get_env()
+    freeze(env)
+    save_policy(model, tmp_path / "mine.safetensors")
+    policy = find_policy(str(tmp_path / "mine.safetensors"))
+    base, raw = base_of(env), []
+    step = base.step
+    base.step = lambda action: raw.append(action) or step(action)
+    env.seed(5)
+    observation, twin = env.reset(), bare().unwrapped
+    seen, _ = twin.reset(seed=5)
+    policy.reset(twin.context)
+    for _ in range(25):
+        action, _ = model.predict(observation, deterministic=True)
+        observation, *_ = env.step(action)
+        own = policy.act(seen)
+        np.testing.assert_allclose(own, np.clip(np.reshape(raw[-1], (-1, 1))[0], -1, 1), atol=2e-5)
+        seen, *_ = twin.step(own.astype(np.float32))
+    assert np.ptp(raw) > 5e-3
+    policy.reset(twin.context)  # and begins anew
+    np.testing.assert_allclose(policy.act(twin.reset(seed=5)[0]), np.reshape(raw[0], (-1, 1))[0], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("chain", "name"),
+    [
+        (lambda: single.TransformAction(bare(), lambda a: -a, None), "TransformAction"),
+        (lambda: Upside(bare()), "Upside"),
+        (lambda: single.ClipReward(single.DelayObservation(bare(), 2), 0), "DelayObservation"),
+        (lambda: single.TransformObservation(bare(), lambda o: -o, None), "TransformObservation"),
+        (lambda: single.TimeAwareObservation(bare()), "TimeAwareObservation"),
+        (lambda: single.StickyAction(bare(), 0.5), "StickyAction"),
+        (lambda: PantographVecEnv(several.TransformAction(native(), lambda a: -a)), "TransformAction"),
+        (lambda: DummyVecEnv([lambda: Upside(bare())] * 2), "Upside"),
+        (lambda: VecMonitor(SubprocVecEnv([lambda: Upside(bare())], "fork")), "Upside"),
+        (
+            lambda: SubprocVecEnv([lambda: single.NormalizeObservation(bare())], "fork"),
+            "NormalizeObservation",
+        ),
+        (
+            lambda: DummyVecEnv([lambda: single.NormalizeObservation(bare())] * 2),
+            "statistics of their own",
+        ),
+    ],
+)
+def test_other_wrappers_are_refused_by_name_before_anything_is_written(chain, name, tmp_path):
+    model = trained(PPO, chain(), n_steps=32, batch_size=32).learn(32)
+    with pytest.raises(InputError, match=name):
+        save_policy(model, tmp_path / "mine.safetensors")
+    assert not list(tmp_path.iterdir())
+    model.get_env().close()
+
+
+def test_lanes_in_processes_are_walked(tmp_path):
+    model = trained(PPO, SubprocVecEnv([bare] * 2, "fork"), n_steps=32, batch_size=32).learn(32)
+    save_policy(model, tmp_path / "mine.safetensors")
+    model.get_env().close()
+    assert wishes(find_policy(str(tmp_path / "mine.safetensors")))["observation"] == "centred"
+
+
+def test_a_model_that_was_loaded_takes_the_environment_of_its_training(tmp_path):
+    lanes = VecNormalize(DummyVecEnv([bare]))
+    model = trained(PPO, single.RescaleAction(bare(), 0, 1), n_steps=32, batch_size=32).learn(32)
+    trained(PPO, lanes, n_steps=32, batch_size=32).learn(32).save(tmp_path / "x")
+    loaded = PPO.load(tmp_path / "x")
+    mine = tmp_path / "mine.safetensors"
+    with pytest.raises(InputError, match=r"loaded without one; .* save_policy\(model, path, env=...\)"):
+        save_policy(loaded, mine)
+    with pytest.raises(InputError, match=r"actions lie in Box\(-1.0, 1.0.*those of env in Box\(0.0, 1.0"):
+        save_policy(loaded, mine, env=model.get_env())
+    with pytest.raises(InputError, match="NormalizeObservation has no statistics"):
+        save_policy(loaded, mine, env=single.NormalizeObservation(bare()))
+    with pytest.raises(InputError, match="The network has 10 inputs and 1 actions, the task's pantograph 20"):
+        save_policy(loaded, mine, env=single.FrameStackObservation(bare(), 2))
+    assert not mine.exists()
+    save_policy(loaded, mine, env=lanes)
+    save_policy(loaded, tmp_path / "raw.safetensors", env=native())
+
+
+def test_a_network_for_several_pantographs_is_refused(tmp_path):
+    train = {"pantographs": ["dsa380", "dsa380"], "distances": [200.0], "controlled": [1, 2]}
+    model = trained(PPO, bare(**train), n_steps=32, batch_size=32)
+    with pytest.raises(InputError, match="train in the vector environment, in which each is a lane"):
+        save_policy(model, tmp_path / "mine.safetensors")
+
+
+def test_a_stack_that_does_not_fit_is_not_a_whole_model_file(tmp_path):
+    mine = tmp_path / "mine.safetensors"
+    save_policy(trained(PPO, single.FrameStackObservation(bare(), 2), n_steps=32), mine)
+    facts, actor = read_model(mine)
+    wrong = facts.model_copy(update={"inputs": (*facts.inputs, Scaled(centre=(0.0,), scale=(1.0,)))})
+    write_policy(tmp_path / "wrong.safetensors", wrong, actor)
+    with pytest.raises(InputError, match="do not fit each other"):
+        find_policy(str(tmp_path / "wrong.safetensors"))

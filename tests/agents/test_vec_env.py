@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("stable_baselines3")
 from gymnasium.wrappers.vector import NormalizeObservation
 from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env import VecMonitor, VecVideoRecorder
 
 from panto_agents.vec_env import PantographVecEnv
 from panto_env import InputError
@@ -96,3 +96,57 @@ def test_ppo_learns_on_it_and_sees_whole_episodes():
     model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, seed=0, device="cpu")
     model.learn(400)
     assert {episode["l"] for episode in model.ep_info_buffer} == {36}
+
+
+def test_the_end_of_an_episode_has_its_return_as_a_monitor_s():
+    """Without it a training showed no reward."""
+    for mode in ("SameStep", "NextStep", "Disabled"):
+        plain, watched = make(mode=mode, distance=10.0), VecMonitor(make(mode=mode, distance=10.0))
+        for env in (plain, watched):
+            env.seed(4)
+            env.reset()
+        ends = 0
+        for action in np.random.default_rng(0).uniform(-1, 1, (60, 3, 1)):
+            *_, done, infos = plain.step(action)
+            *_, others = watched.step(action)
+            for lane in np.flatnonzero(done):
+                ours, theirs = infos[lane]["episode"], others[lane]["episode"]
+                assert set(ours) == {"r", "l", "t"}
+                assert ours["l"] == theirs["l"]
+                assert ours["r"] == pytest.approx(theirs["r"], rel=1e-5)
+                ends += 1
+        assert ends > 6
+    model = PPO("MlpPolicy", make(distance=10.0), n_steps=64, batch_size=64, seed=0, device="cpu").learn(192)
+    assert np.mean([episode["r"] for episode in model.ep_info_buffer]) < 0
+
+
+def test_options_go_to_the_lanes():
+    env = make()
+    env.set_options({"speed_kmh": 200})
+    env.reset()
+    assert [info["speed_kmh"] for info in env.reset_infos] == pytest.approx([200] * 3)
+    env.set_options([{"speed_kmh": 200}, {}, {}])
+    with pytest.raises(InputError, match="the same options for all"):
+        env.reset()
+
+
+def test_pictures_are_those_of_the_lanes(tmp_path):
+    pytest.importorskip("PIL")
+    env = make(render_mode="rgb_array", render_size=(128, 96), distance=30.0)
+    env.reset()
+    frames = env.get_images()
+    assert [frame.shape for frame in frames] == [(96, 128, 3)] * 3
+    assert env.render().shape[2] == 3
+    pytest.importorskip("moviepy")
+    recorder = VecVideoRecorder(env, str(tmp_path), lambda step: step == 0, video_length=5)
+    assert recorder.frames_per_sec == env.env.metadata["render_fps"]
+    recorder.reset()
+    for _ in range(7):
+        recorder.step(np.zeros((3, 1), np.float32))
+    recorder.close()
+    assert len(list(tmp_path.glob("*.mp4"))) == 1
+
+
+def test_without_pictures_a_sentence_says_what_to_do():
+    with pytest.raises(InputError, match=r"draws no pictures; make it with .*render_mode='rgb_array'"):
+        make().get_images()
