@@ -30,7 +30,7 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
         return NONE
     try:
         mean = means if len(means) > 1 else means[0]
-        passive = simulate(**arguments, mean_force=mean, evaluated=spans)
+        passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
     except InputError:  # no static force gives this mean
         return NONE
     if passive.terminated:

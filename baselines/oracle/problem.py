@@ -47,7 +47,7 @@ class Problem:
             numbers = " and ".join(map(str, settings.controlled))
             raise InputError(f"An oracle controls one pantograph of a train, not {numbers}; name one.")
         self.given, self.seed, self.settings = dict(given), seed, settings
-        run = simulate(**self.given, seed=seed, record_droppers=False, evaluated=spans)
+        run = simulate(**self.given, seed=seed, record_droppers=False)
         self.passive = passive = run.controlled
         if passive.terminated:
             raise InputError(f"There is no oracle, because the passive run has no figures. {passive.ending}")
@@ -74,7 +74,7 @@ class Problem:
         settled = settled_at(passive.contact_force[0], passive.time_step)
         self._filter_state = low_pass_from(settled, before, passive.time_step)[1] if len(before) else settled
         """State of EN 50317's filter, (sections, 2), at the first knot."""
-        trim = trim_of_pass(settings, seed, spans, passive_mean)
+        trim = trim_of_pass(settings, seed, None, passive_mean)
         self.knots = Knots(settings.actuator, passive.time_step, self.steps)
         self._true = Stretch(settings, trim, seed, self.begin, self.count)
         free = settings.model_copy(update={"actuator": without_limits(settings.actuator)})
@@ -124,7 +124,6 @@ class Problem:
             policy=Tape(actions),
             seed=self.seed,
             record_droppers=False,
-            evaluated=self.chosen,
         )
         return run.controlled
 

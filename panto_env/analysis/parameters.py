@@ -14,9 +14,9 @@ from ..base.names import hint
 from ..base.ranges import ranges_of
 from ..base.settings import Settings
 from ..plant.catenary import CatenaryData, check_line
-from ..plant.catenary.flexible.parts import Span
+from ..plant.catenary.flexible.parts import Droppers, Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.spans import spans_of
+from ..plant.catenary.flexible.spans import Spacing, droppers_of, spans_of
 
 S = TypeVar("S", bound=Settings)
 
@@ -28,6 +28,8 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
         value = getattr(entry, key)
         if isinstance(value, Settings) and key != "published":  # on which nothing depends
             names += parameter_names(value, f"{family}.{key}")
+            if isinstance(value, Droppers):  # also by the rule that lays them out
+                names += [f"{family}.{key}.{rule}" for rule in Spacing.model_fields]
         elif isinstance(value, tuple):
             names += _places(value, f"{family}.{key}")
         elif _is_number(value) or any(ranges_of(field.rebuild_annotation())):  # "rigid" or None now
@@ -51,14 +53,15 @@ def check_name(name: str, entry: Settings) -> None:
     )
 
 
-def parameter_label(name: str, entry: Settings) -> str:
+def parameter_label(name: str, entry: Any) -> str:
     """Label of a parameter with its unit, for example "pantograph: masses, head first, 1st (kg)"."""
     family, *path = name.split(".")
     words = [family.replace("_", " ")]
     while path:
         key = path.pop(0)
-        text = type(entry).model_fields[key].description or key
-        entry = getattr(entry, key)
+        rules = Spacing.model_fields if isinstance(entry, Droppers) else {}
+        text = (type(entry).model_fields | rules)[key].description or key
+        entry = getattr(entry, key, None)
         if isinstance(entry, Settings):
             words.append(key.replace("_", " "))
         else:
@@ -76,7 +79,7 @@ def change(entry: S, name: str, value: float) -> S:
     check_name(name, entry)
     path = name.split(".")[1:]
     try:
-        return _checked(entry, _put(entry.model_dump(), path, value), {path[0]})
+        return _checked(entry, _table(entry, path, value), {path[0]})
     except ValidationError as error:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found if c)
@@ -100,6 +103,16 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
         raise InputError(f"These values do not go together: {explain(error, type(entry))}.") from error
     except InputError as error:
         raise InputError(f"These values do not go together: {error}") from error
+
+
+def _table(entry: Settings, path: list[str], value: float) -> Any:
+    """Values of an entry with another at a path; a line's droppers keep their spacing in another span."""
+    table: Any = entry.model_dump(exclude_none=True)
+    rule = {path[1]: value} if path[0] == "droppers" and path[1] in Spacing.model_fields else {}
+    if not isinstance(entry, FlexibleCatenaryData) or not (rule or path == ["span_length"]):
+        return _put(entry.model_dump(), path, value)
+    length = entry.span_length if rule else value
+    return table | {"span_length": length, "droppers": droppers_of(table, rule, length)}
 
 
 def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:

@@ -39,7 +39,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     watch: Callable[[Task], None] | None = None,
     record_droppers: bool = True,
-    evaluated: SpanChoice = None,
+    trimmed_over: SpanChoice = None,
     **settings: Any,
 ) -> Trajectory:
     """Simulate one pass of a pantograph along a line.
@@ -50,9 +50,10 @@ def simulate(
     its own; or a list gives one for each. seed: of all random values and the sensors' noise.
     progress: called with the finished share. watch: called with the running task, lane 0 of which is this
     pass, after each control step, or after several without a policy; it must change nothing.
-    record_droppers: keep the tension of every dropper. evaluated: spans over which a required mean force is
-    met, as in ``Trajectory.summary``. catenary, pantograph, speed_kmh and settings: those of ``RunSettings``;
-    the full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
+    record_droppers: keep the tension of every dropper. trimmed_over: spans over which a required mean force
+    is met, as in ``Trajectory.summary``, whichever spans are evaluated later; by default those after the
+    start, or the whole run where it has none. catenary, pantograph, speed_kmh and settings: those of
+    ``RunSettings``; the full list is in the signature and in ``help(panto_env.envs.PantographEnv)``.
 
     A run that leaves the plant's valid range ends there, with or without a policy: it is ``terminated``, and
     its ``ending`` says where and why.
@@ -67,7 +68,7 @@ def simulate(
     drivers = [] if policy is None else _drivers(policy)
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(drivers[0] if drivers else None) | settings
-    task = _ready(given, seed, evaluated, record_droppers)
+    task = _ready(given, seed, trimmed_over, record_droppers)
     line = task.settings.line
     CATENARIES[line.kind].warn_if_short(line, task.settings.numerics, task.settings.runs)
     if not drivers:
@@ -88,11 +89,11 @@ def _drivers(policy: Any) -> list[Policy]:
     return [find_policy(each) for each in several]
 
 
-def _ready(given: dict[str, Any], seed: int, evaluated: SpanChoice, record_droppers: bool) -> Task:
+def _ready(given: dict[str, Any], seed: int, trimmed_over: SpanChoice, record_droppers: bool) -> Task:
     """A task with these settings, its lane reset under the seed."""
     random = np.random.default_rng(seed)
     checked = far_enough(on_drawn_line(run_settings(given), lambda: random))
-    trim = trim_of_pass(checked, seed, evaluated, passive_mean)
+    trim = trim_of_pass(checked, seed, trimmed_over, passive_mean)
     task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, random)
     return task

@@ -1,4 +1,4 @@
-"""One or two parameters of the plant, its actuators or its policy over ranges, on all cores."""
+"""One to three parameters of the plant, its actuators or its policy over ranges, on all cores."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ from ..base.table_file import write_rows
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
+from ..metrics.droppers import evaluated, near_train
 from ..metrics.figures import Figures
-from ..metrics.labels import HEADINGS, NUMBER
+from ..metrics.labels import HEADINGS, LABELS, NUMBER
 from ..metrics.spans import SpanChoice, in_words
+from ..metrics.trajectory import Trajectory
 from ..policies import find_policy, with_parameters
 from .parameters import change, check_name, parameter_label, parameter_names
 from .pool import Progress, check_passes, in_threads, workers_for
@@ -40,7 +42,9 @@ from .swept_train import (
 SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a parameter of all policies, for example ``policy.gain``."""
-MOST_PARAMETERS = 2
+MOST_PARAMETERS = 3
+FIRST = ("catenary.span_length", "catenary.droppers.spacing", "catenary.droppers.first")
+"""Parameters that lay out droppers anew, in the order in which they are changed, before all others."""
 
 Row = dict[str, Any]
 DISCRETISATION = ("time_step", "spacing", "window")
@@ -71,10 +75,10 @@ def sweep(
     progress: Progress | None = None,
     **settings: Any,
 ) -> list[Row]:
-    """Run every policy at every value of one parameter, or at every pair of values of two.
+    """Run every policy at every value of one parameter, or at all combinations of values of two or three.
 
     parameters: values by dotted name as in the TOML (``pantograph.masses.1``,
-    ``catenary.contact_wire.tension``, ``actuator.lag``), ``speed_kmh``, ``policy.gain`` for a keyword of
+    ``catenary.droppers.spacing``, ``actuator.lag``), ``speed_kmh``, ``policy.gain`` for a keyword of
     every policy, or ``distances``, that of the second of two ``pantographs`` (m), ``distances.1``,
     ``distances.2`` where there are more; ``pantograph.`` changes all pantographs of a train. policies: names,
     model files, or None for the passive pantograph. spans: spans of the figures, first and last from 1, or
@@ -84,10 +88,13 @@ def sweep(
     speed_kmh, distance (m), ...).
 
     Returns one row per pass, in the order of values, then policies: the swept values, the run's settings,
-    and every figure of ``Trajectory.summary``; where a run ended early they are nan, and "ending" says where
-    and why. A train has a row for each pantograph, with its "pantograph_number", 1 for the first; all have
-    figures over the spans that the last one covers. Raises InputError for an unknown parameter, a value that
-    its schema refuses, and as ``simulate`` does; all values are checked before the first pass.
+    every figure of ``Trajectory.summary``, the maximum force of a dropper (N), the number of droppers that go
+    slack while the train is in their span, the share of that time (%), and which requirements are broken;
+    where a run ended early figures are nan, and "ending" says where and why. A line keeps the spacing of its
+    droppers, about, in spans of another length. A train has a row for each pantograph, with its
+    "pantograph_number", 1 for the first; all have figures over the spans that the last one covers. Raises
+    InputError for an unknown parameter, a value that its schema refuses, and as ``simulate`` does; all values
+    are checked before the first pass.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
@@ -153,7 +160,7 @@ def _check(
     policies: Sequence[str | Path | None],
 ) -> None:
     if not 1 <= len(parameters) <= MOST_PARAMETERS:
-        raise InputError(f"One or two parameters can be swept, not {len(parameters)}.")
+        raise InputError(f"One to three parameters can be swept, not {len(parameters)}.")
     if not policies:
         raise InputError("There is no policy to run; name at least one, or leave policies at its default.")
     for policy in policies:
@@ -180,7 +187,7 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
     longest = max(passes, key=_seconds)
     given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
     with _named(longest):
-        cost = Task(run_settings(given)).cost
+        cost = Task(run_settings(given), record_droppers=True).cost
     at_once = workers_for(len(passes), workers)
     cost._replace(memory=at_once * cost.memory).check(f"{at_once} passes at once", ", or fewer workers")
 
@@ -227,8 +234,8 @@ def _prepare(
     changed: dict[str, Any] = dict(entries)
     speed_kmh = settings.get(SPEED, default(SPEED))
     of_policy: list[str] = []
-    for name, value in values.items():
-        family, _, rest = name.partition(".")
+    for name in sorted(values, key=lambda each: FIRST.index(each) if each in FIRST else len(FIRST)):
+        value, (family, _, rest) = values[name], name.partition(".")
         if name == SPEED:
             speed_kmh = value
         elif is_distance(name):
@@ -255,10 +262,11 @@ def _prepare(
 def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
     """Rows of a pass, one for each pantograph."""
     with _named(one_pass):
-        run = simulate(**{"record_droppers": False, "evaluated": spans} | one_pass.arguments)
+        run = simulate(**one_pass.arguments)
         train = run.train
         covered = spans if run.terminated else run.common_spans(spans) or spans
         figures = [Figures.none() if run.terminated else own.summary(covered) for own in train]
+        judged = [NOT_JUDGED if run.terminated else _judged(own, covered) for own in train]
     return [
         {
             **one_pass.values,
@@ -275,6 +283,23 @@ def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
             "ending": own.ending,
             "spans": "" if own.terminated else in_words(own.spans(covered)),
             **each.as_dict(),
+            **verdict,
         }
-        for number, (own, each) in enumerate(zip(train, figures, strict=True), start=1)
+        for number, (own, each, verdict) in enumerate(zip(train, figures, judged, strict=True), start=1)
     ]
+
+
+NOT_JUDGED: Row = dict.fromkeys(("dropper_force", "slack_droppers", "slack"), math.nan) | {"requirements": ""}
+"""What a row has of droppers and requirements where the run ended early."""
+
+
+def _judged(run: Trajectory, spans: SpanChoice) -> Row:
+    """Droppers and requirements of a pass, with the keys of ``NOT_JUDGED``."""
+    criteria = {each.key: each for each in run.compliance(spans)}
+    broken = [LABELS[k].short if k in LABELS else k for k, each in criteria.items() if each.kept is False]
+    row: Row = {"requirements": f"broken: {', '.join(broken)}" if broken else "kept"}
+    if "slack" in criteria:
+        slack = ((evaluated(run, spans)[0] <= 0) & near_train(run, spans)).any(axis=0)
+        row |= {"slack_droppers": int(slack.sum()), "slack": criteria["slack"].value}
+        row["dropper_force"] = criteria["dropper force"].value
+    return NOT_JUDGED | row

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import marks
 from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..base.errors import InputError
 from ..base.units import from_kmh
 from ..metrics import en50367
 from ..metrics.labels import LABELS, NUMBER
@@ -43,6 +44,8 @@ def plot_sweep(
     """
     named = dict(zip(parameters, parameters, strict=True)) | dict(labels or {})
     varied = [name for name in parameters if len({row[name] for row in rows}) > 1] or parameters[:1]
+    if len(varied) > 2:
+        raise InputError("A plot shows one or two parameters with several values; leave it out.")
     figure = _maps(rows, varied, named) if len(varied) == 2 else _lines(rows, varied[0], named)
     first = rows[0]
     fixed = [f"{named[name]} = {first[name]:g}" for name in parameters if name not in varied]

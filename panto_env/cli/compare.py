@@ -21,7 +21,7 @@ from ..terminal import (
     written_last,
 )
 from .identify import pairs
-from .record import Mass, Page, Unit
+from .record import Filtered, Mass, Page, Unit
 
 if TYPE_CHECKING:
     from ..records.compare import Comparison
@@ -41,6 +41,7 @@ def compare(
         ),
     ] = None,
     mass: Mass = None,
+    filtered: Filtered = None,
     unit: Unit = None,
     plot: Plot = None,
     html: Page = None,
@@ -57,7 +58,8 @@ def compare(
 
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
-        found = hold(read_record(file, pairs(unit or []), mass_correction=mass), simulated, shift=shift)
+        measured = read_record(file, pairs(unit or []), mass_correction=mass, filtered=filtered)
+        found = hold(measured, simulated, shift=shift)
     title = f"{file.name} and {run.name}: {simulated.pantograph} on {simulated.catenary}"
     title += f" at {simulated.speed_kmh:g} km/h"
     with written_last() as later:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,7 +21,7 @@ from ..terminal import (
     written_last,
 )
 from .identify import pairs
-from .record import Mass, Unit
+from .record import Filtered, Mass, Unit
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
@@ -50,6 +50,7 @@ def fit(
         ),
     ] = None,
     mass: Mass = None,
+    filtered: Filtered = None,
     unit: Unit = None,
     output: Annotated[
         str | None,
@@ -92,13 +93,14 @@ def fit(
 
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
     tolerances = by_kind(tolerance or [])
-    records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
+    given = {"mass_correction": mass, "filtered": filtered}
+    records = [read_record(file, pairs(unit or []), **given) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
     if output is not None:
         check_design(design, line, names)
     target = output or values or keep
     place = None if target is None else Path(f"{target}{SUFFIX}")
-    settings = {"free": list(names), "tolerances": tolerances}
+    settings: dict[str, Any] = {"free": list(names), "tolerances": tolerances, "filtered": filtered}
     settings |= {"line": design.model_dump_json(), "pantograph": riding.model_dump_json()}
     identity = identity_of(records, settings)
     begin = None if place is None else kept(place, identity)

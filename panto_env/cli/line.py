@@ -11,11 +11,14 @@ import typer
 from ..analysis.requirements import print_criteria
 from ..base.errors import InputError
 from ..base.files import write_whole
+from ..base.settings import parse
 from ..catalog import load_catenary, load_drawn
 from ..catalog.loader import drawn_kind, parse_catenary
 from ..control.lines import line_of_seed
+from ..plant.catenary.flexible.as_run import as_run, as_run_tables
 from ..plant.catenary.flexible.dropper_table import dropper_table
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
 
 FORCE = 100.0
@@ -41,6 +44,10 @@ def line(
         float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
     ] = None,
     force: Annotated[float, typer.Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
+    line_condition: Annotated[
+        str,
+        typer.Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run."),
+    ] = "new",
     output: Annotated[
         str | None,
         typer.Option(
@@ -62,6 +69,9 @@ def line(
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
+    given = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
+    condition = together(chosen.as_found or NEW, given)
+    run = as_run(chosen, condition, force)
     criteria = found.criteria(speed)
     broken = [each for each in criteria if each.kept is False]
     with written_last() as later:
@@ -79,10 +89,12 @@ def line(
                     "spans": [each._asdict() for each in found.spans],
                     "droppers": [each._asdict() for each in found.droppers],
                     "criteria": [each.as_dict() for each in criteria],
+                    "as_run": run.rows | {"droppers": [each._asdict() for each in run.droppers]},
                 }
             )
         else:
-            for table in (*span_tables(found.spans), dropper_table(found.droppers)):
+            other = as_run_tables(chosen, run)
+            for table in (*span_tables(found.spans), dropper_table(found.droppers), *other):
                 print_table(table)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:
@@ -91,6 +103,8 @@ def line(
                 )
             else:
                 print_table(elasticity_table([found]))
+            if condition != NEW and not other:
+                console.print("This condition changes no tension along the line: it is run as designed.")
             for each in broken:
                 alert(f"{each.name} is not kept.")
     if broken:

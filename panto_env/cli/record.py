@@ -37,6 +37,14 @@ Mass = Annotated[
         "were recorded."
     ),
 ]
+Filtered = Annotated[
+    float | None,
+    typer.Option(
+        min=20,
+        help="Cut-off (Hz) of a low-pass that is in the force already: it hides losses of contact.",
+        show_default="whether the force looks low-passed at 20 Hz",
+    ),
+]
 Page = Annotated[
     str | None,
     typer.Option(help="Write a page with tables and charts to this file (.html).", callback=writable(PAGES)),
@@ -70,6 +78,7 @@ def record(
         ),
     ] = None,
     mass: Mass = None,
+    filtered: Filtered = None,
     unit: Unit = None,
     output: Annotated[
         str | None,
@@ -95,7 +104,7 @@ def record(
 
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
-        measured = read_record(file, pairs(unit or []), mass_correction=mass)
+        measured = read_record(file, pairs(unit or []), mass_correction=mass, filtered=filtered)
         found = judge(measured, known, span=span, section=section)
     title = f"{file.name}: {found.whole.figures.distance:,.0f} m"
     with written_last() as later:

@@ -64,9 +64,7 @@ def simulate(
     if plot is not None:
         from ..analysis.plots import plot_run, save
     with _shown(live, policy or "passive") as (progress, watch):
-        trajectory = run(
-            policy=policy, seed=seed, evaluated=chosen, progress=progress, watch=watch, **settings
-        )
+        trajectory = run(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
     with written_last() as later:
         if output is not None:
             later(trajectory.save, output, None if trajectory.terminated else chosen)

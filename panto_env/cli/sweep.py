@@ -1,4 +1,4 @@
-"""``panto sweep``: figures over ranges of one or two parameters."""
+"""``panto sweep``: figures over ranges of one to three parameters."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ from ..terminal import Json, Plot, console, counting, number, print_json, writab
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
+DROPPERS = ("dropper\nmax (N)", "slack\n(of time)")
+"""Headings of the columns of droppers."""
 
 
 @with_settings(left_out=("observation",))
@@ -37,10 +39,10 @@ def sweep(
         list[str],
         typer.Argument(
             metavar="NAME=VALUES...",
-            help="One or two parameters by dotted name, e.g. pantograph.masses.1, "
-            "catenary.contact_wire.tension, actuator.lag, policy.gain, speed_kmh or distances (of a train's "
-            "second pantograph; distances.1, ... of several behind the first); values as start:stop:count "
-            "or 1,2,3. `panto list NAME` shows the names of an entry.",
+            help="One to three parameters by dotted name, e.g. pantograph.masses.1, "
+            "catenary.contact_wire.tension, catenary.droppers.spacing, actuator.lag, policy.gain, speed_kmh "
+            "or distances (of a train's second pantograph; distances.1, ... of several behind the first); "
+            "values as start:stop:count or 1,2,3. `panto list NAME` shows the names of an entry.",
         ),
     ],
     policy: Annotated[
@@ -57,11 +59,14 @@ def sweep(
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Run every value of one parameter, or every pair of two, and print the figures."""
+    """Run all combinations of values of one to three parameters, and print figures and verdicts."""
     values = _parse(parameters)
     if plot is not None:
         from ..analysis.plots import save
         from ..analysis.sweep_plots import plot_sweep
+
+        if sum(len({*each}) > 1 for each in values.values()) > 2:  # before hours of passes
+            raise InputError("A plot shows one or two parameters with several values; leave out --plot.")
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
     line_spans = settings.pop("spans", None)
@@ -134,9 +139,16 @@ def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
     shown = [key for key in COLUMNS if any(isfinite(row[key]) for row in rows)]
     for key in shown:
         table.add_column(LABELS[key].column, justify="right")
+    droppers = any(isfinite(row["dropper_force"]) for row in rows)
+    for heading in DROPPERS if droppers else ():
+        table.add_column(heading, justify="right")
+    table.add_column("requirements")
     for row in rows:
         cells = [number(LABELS[key].scale * row[key], 2) for key in shown]
+        if droppers:
+            share = "–" if row["terminated"] else f"{row['slack_droppers']} ({number(row['slack'], 1)} %)"
+            cells += [number(row["dropper_force"], 0), share]
         policy = f"{row['policy']}, ended early" if row["terminated"] else row["policy"]
         whose = [f"{row[NUMBER]}"] if NUMBER in row else []
-        table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *whose, *cells)
+        table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *whose, *cells, row["requirements"])
     console.print(table)

@@ -92,8 +92,10 @@ def trim_of_pass(
 ) -> Trim | None:
     """Trim of one pass on its own line: without a policy its means over the spans are the required ones.
 
-    It is trimmed in still air, as a pantograph is set: wind is not trimmed away. None where no mean is
-    required, or the speed is yet to be drawn. Raises InputError if it cannot be met.
+    spans: by default those after the start, or the whole run where it is too short to have any: which spans
+    are evaluated later does not change the run. It is trimmed in still air, as a pantograph is set: wind is
+    not trimmed away. None where no mean is required, or the speed is yet to be drawn. Raises InputError if it
+    cannot be met.
     """
     still = tuple(condition.in_still_air for condition in settings.line_condition)
     settings = settings.model_copy(update={"line_condition": still})

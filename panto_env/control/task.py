@@ -11,7 +11,7 @@ from ..base.arrays import Array, Lanes
 from ..base.errors import InputError
 from ..base.shown import shown
 from ..metrics.figures import Figures
-from ..metrics.spans import SpanChoice
+from ..metrics.spans import SpanChoice, settled_spans
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
@@ -245,8 +245,8 @@ def passive_pass(settings: RunSettings) -> Trajectory:
 def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
     """Mean forces of a pass without a policy, over the spans, as a function of the static forces.
 
-    Where the speed drifts, what the required mean is higher over these spans than at the mean speed is taken
-    off: the required mean follows the speed, and the static force has no part in that.
+    spans: as ``trim_of_pass`` takes them. Where the speed drifts, what the required mean is higher over these
+    spans than at the mean speed is taken off: it follows the speed, and the static force has no part in that.
     """
     task = Task(settings)
 
@@ -262,9 +262,13 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
                 f"'{run.catenary}' at {run.speed_kmh:g} km/h. With "
                 f"{' and '.join(f'{force:.1f}' for force in forces)} N of static force: {run.ending}"
             )
+        chosen = [
+            spans or settled_spans(each.distance, each.alignment, each.line_ends) or "all"
+            for each in run.train
+        ]
         return tuple(
-            each.summary(spans).mean - _required_more(settings, each, spans, number)
-            for number, each in enumerate(run.train)
+            each.summary(own).mean - _required_more(settings, each, own, number)
+            for number, (each, own) in enumerate(zip(run.train, chosen, strict=True))
         )
 
     return means

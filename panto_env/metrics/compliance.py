@@ -58,15 +58,17 @@ def compliance(
     mean_span: float,
     tension: Array,
     tension_near: Array,
+    static: float | None = None,
 ) -> list[Criterion]:
     """All criteria of a run, then additional values without limits.
 
     arcing: NQ (%). speed: of the train (m/s). mean_span: mean length of a span (m). tension, tension_near:
     all samples of the droppers of the evaluated spans, and those while the train is in their span (N), empty
-    where not recorded.
+    where not recorded. static: as ``en50367.of_static`` takes it.
     """
     return [
         *en50367.criteria(figures, arcing, speed, line.system, line.system_source),
+        *en50367.of_static(static, line.system),
         _minimum(figures),
         *_uplift(figures, line),
         *_waves(line, speed, speed / mean_span),

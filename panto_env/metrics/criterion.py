@@ -24,6 +24,7 @@ class Criterion:
     source: str = ""  # of the limits: the standard, and whether it was seen or is recalled
     note: str = ""  # meaning of value and limits
     strict: bool = False  # whether a value equal to a limit breaks it
+    tolerance: float = 0.0  # how far beyond a limit a value keeps it
 
     @property
     def margin(self) -> float:
@@ -37,10 +38,20 @@ class Criterion:
 
     @property
     def kept(self) -> bool | None:
-        """Whether the limits are kept; None without a limit."""
+        """Whether the limits are kept; None without a limit, or for a value that cannot be judged (nan)."""
         if math.isnan(self.margin):
             return None
-        return self.margin > 0 if self.strict else self.margin >= 0
+        return self.margin > 0 if self.strict else self.margin >= -self.tolerance
+
+    @property
+    def limited(self) -> bool:
+        """Whether it has a limit."""
+        return self.lowest is not None or self.highest is not None
+
+    @property
+    def verdict(self) -> str:
+        """Verdict as a word; "" without a limit."""
+        return {True: "kept", False: "broken", None: "not judged" if self.limited else ""}[self.kept]
 
     @property
     def heading(self) -> str:
@@ -59,18 +70,17 @@ def worst(runs: Sequence[Sequence[Criterion]]) -> list[Criterion]:
 
 def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
     """Table of the criteria with limits: value, limit, margin, verdict and source."""
-    verdicts = {True: "kept", False: Alarm("broken")}
     rows = [
         (
             criterion.heading,
             value_in_words(criterion),
             limits_in_words(criterion),
             margin_in_words(criterion),
-            verdicts[criterion.kept],
+            Alarm(criterion.verdict) if criterion.kept is False else criterion.verdict,
             criterion.source,
         )
         for criterion in criteria
-        if criterion.kept is not None
+        if criterion.limited
     ]
     return Table(title, ("criterion", "value", "limit", "margin", "verdict", "source"), rows)
 
@@ -78,7 +88,7 @@ def criteria_table(criteria: Sequence[Criterion], title: str) -> Table:
 def remarks(criteria: Sequence[Criterion]) -> list[str]:
     """Lines to print below the table: notes on criteria, and the values without limits."""
     notes = [f"{criterion.name}: {criterion.note}." for criterion in criteria if criterion.note]
-    without = (criterion for criterion in criteria if criterion.kept is None)
+    without = (criterion for criterion in criteria if not criterion.limited)
     return [*notes, *(f"{criterion.heading}: {_digits(criterion.value)}" for criterion in without)]
 
 
@@ -95,7 +105,8 @@ def limits_in_words(criterion: Criterion) -> str:
         return "" if criterion.highest is None else f"{below} {_digits(criterion.highest, more)}"
     if criterion.highest is None:
         return f"{above} {_digits(criterion.lowest, more)}"
-    return f"{_digits(criterion.lowest, more)} to {_digits(criterion.highest, more)}"
+    beyond = f" ± {criterion.tolerance:g}" if criterion.tolerance else ""
+    return f"{_digits(criterion.lowest, more)} to {_digits(criterion.highest, more)}{beyond}"
 
 
 def margin_in_words(criterion: Criterion) -> str:

@@ -56,5 +56,7 @@ HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS
     "time_step": "time_step (s)",
     "spacing": "spacing (m)",
     "window": "window (spans)",
+    "dropper_force": "dropper_force (N)",
+    "slack": "slack (% of time)",
 }
 """Headings with units of figures and settings, which are in SI, in files of tables."""

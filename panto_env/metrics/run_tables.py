@@ -37,7 +37,6 @@ UNITS = {
 """Units of ``SERIES``; of others, m."""
 RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")
 """What identifies a run in a table of several."""
-VERDICTS = {True: "kept", False: "broken", None: ""}
 
 
 def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
@@ -208,8 +207,8 @@ def _each(
 
 def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dict[str, Any]:
     """A row; criterion: that of the figure, if it has one."""
-    limits = ("lowest", "highest", "margin", "kept", "source", "note")
-    lowest, highest, margin, kept, source, note = (
+    limits = ("lowest", "highest", "margin", "verdict", "source", "note")
+    lowest, highest, margin, verdict, source, note = (
         getattr(criterion, each) if criterion is not None else None for each in limits
     )
     return {
@@ -220,7 +219,7 @@ def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dic
         "lowest": lowest,
         "highest": highest,
         "margin": margin,
-        "verdict": VERDICTS[kept],
+        "verdict": verdict or "",
         "source": source or "",
         "note": note or "",
     }

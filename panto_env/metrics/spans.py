@@ -53,16 +53,15 @@ def chosen_spans(
     if choice is not None:
         check_spans(choice)
         return choice
-    last = alignment.last_whole_span(distance, tolerance=1e-9)
-    if last < FIRST_SETTLED:
+    settled = settled_spans(distance, alignment, ends)
+    if settled is None:
         raise InputError(
             f"A run of {distance:g} m ends before its start has died out, which takes "
             f"{FIRST_SETTLED - 1} spans ({alignment.support(FIRST_SETTLED - 1):g} m); run further, or give "
             'the spans to evaluate, such as (5, 6), or "all".'
         )
-    undisturbed = alignment.spans - CLEAR if ends else last
-    if undisturbed >= FIRST_SETTLED:
-        return FIRST_SETTLED, min(last, undisturbed)
+    if not ends or alignment.spans - CLEAR >= FIRST_SETTLED:
+        return settled
     warnings.warn(
         f"The line has only {alignment.spans} spans: in the last {CLEAR} its end reflects waves, which "
         "change the standard deviation by 1 to 5 %, maximum and minimum by 12 % of the mean force and more; "
@@ -70,4 +69,13 @@ def chosen_spans(
         AccuracyWarning,
         stacklevel=3,
     )
-    return FIRST_SETTLED, last
+    return settled
+
+
+def settled_spans(distance: float, alignment: Alignment, ends: bool) -> Spans | None:
+    """First and last default span of a run, as ``chosen_spans`` takes them; None where it is too short."""
+    last = alignment.last_whole_span(distance, tolerance=1e-9)
+    if last < FIRST_SETTLED:
+        return None
+    undisturbed = alignment.spans - CLEAR if ends else last
+    return FIRST_SETTLED, min(last, undisturbed) if undisturbed >= FIRST_SETTLED else last

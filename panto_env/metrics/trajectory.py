@@ -25,6 +25,7 @@ from ..plant.pantograph.schema import PantographData
 from .compliance import LineFacts, compliance
 from .criterion import Criterion
 from .droppers import evaluated, near_train
+from .en50367 import SLOW
 from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
@@ -212,7 +213,16 @@ class Trajectory:
             self.alignment.mean_length,
             tension,
             tension[near_train(self, spans)] if tension.size else tension,
+            self.static_force,
         )
+
+    @property
+    def static_force(self) -> float | None:
+        """Static force as it was set (N); nan where one force is for all speeds, None where not known."""
+        coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient")
+        if coefficient == 0 and self.speed_kmh > SLOW:
+            return math.nan
+        return None if coefficient is None else self.nominal_force - coefficient * self.speed_kmh**2
 
     def mechanical_power(self, spans: SpanChoice = None) -> float:
         """Mechanical power (W) of the actuators, mean of its magnitude over the spans.

@@ -36,6 +36,7 @@ Lost = Annotated[float, Between(-0.1, 0.5)]
 Ice = Annotated[float, Between(0, 5, "kg/m")]
 # From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
 Temperature = Annotated[float, Between(-80, 80, "K")]
+Strung = Annotated[float, Between(-40, 60, "°C")]
 # A hurricane blows with 33 m/s; trains are stopped well before.
 WindSpeed = Annotated[float, Between(-40, 40, "m/s")]
 
@@ -118,6 +119,12 @@ class LineCondition(Settings):
         description="temperature of the wires less that at which the line was built (K); it acts on wires "
         "that are fixed at both ends (axial_stiffness)",
     )
+    # Own choice; tables of tensions commonly begin at 10 to 15 degrees (recalled).
+    reference_temperature: Strung = Field(
+        15.0,
+        description="temperature of the wires at which the line was built (°C); nothing but what is printed "
+        "in °C depends on it",
+    )
 
     side_wind: Annotated[float, Between(0, 40, "m/s")] = Field(
         0.0,
@@ -183,6 +190,24 @@ class LineCondition(Settings):
         """Whether wires, droppers or supports are not as designed."""
         named = self.broken_droppers or self.miscut_droppers or self.raised_supports
         return bool(named) or self.scatters or self.of_wires != NEW.of_wires
+
+    @property
+    def along_line(self) -> LineCondition:
+        """What changes the wires' tension and mass all along the line, and nothing else."""
+        names = (
+            "lost_contact_tension",
+            "lost_messenger_tension",
+            "ice",
+            "temperature",
+            "reference_temperature",
+        )
+        return LineCondition(**{name: getattr(self, name) for name in names})
+
+    @property
+    def temperature_in_words(self) -> str:
+        """The temperature as a difference and in degrees, such as "+20 K (35 °C, built at 15 °C)"."""
+        built = self.reference_temperature
+        return f"{self.temperature:+g} K ({built + self.temperature:g} °C, built at {built:g} °C)"
 
     @property
     def of_wires(self) -> tuple[Any, ...]:

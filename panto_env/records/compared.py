@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..base.table import Table
-from ..metrics.criterion import criteria_table, limits_in_words
+from ..metrics.criterion import criteria_table
 from ..metrics.labels import LABELS
 from ..terminal import number
 from .compare import Comparison, SpanPair
@@ -27,11 +27,8 @@ def figures_table(found: Comparison) -> Table:
 def acceptance_table(found: Comparison) -> Table:
     """Deviations with limits, and what was not measured."""
     table = criteria_table(found.criteria, "Deviations, run minus record")
-    rows = [*table.rows]
-    for each in found.criteria:
-        if each.highest is not None and each.kept is None:
-            rows.append((each.heading, "not measured", limits_in_words(each), "–", "–", each.source))
-    return Table(table.title, ("deviation of", *table.headings[1:]), rows)
+    told = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
+    return Table(table.title, ("deviation of", *table.headings[1:]), told)
 
 
 def spans_table(found: Comparison) -> Table:

@@ -106,8 +106,8 @@ def judge(
         (float(np.nanmax(p.uplift)) for p in record.pieces if p.uplift is not None), default=math.nan
     )
     judged = [part for part in classes if part.samples * samples.step >= LONG_ENOUGH] or parts[:1]
-    alone = len(judged) == 1
-    requirements = tuple((part, _criteria(part, line, uplift if alone else math.nan)) for part in judged)
+    uplift, blind = uplift if len(judged) == 1 else math.nan, _blind(samples)
+    requirements = tuple((part, _criteria(part, line, uplift, blind)) for part in judged)
     notes = _notes(samples, line, span) + (_beyond(samples, reach) if alignment is not None else [])
     return Judgement(samples, tuple(parts), requirements, alignment, reach, tuple(notes))
 
@@ -136,7 +136,7 @@ def _class_name(number: float) -> str:
 def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) -> Part:
     force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
     speed = float(samples.speed[inside].mean())
-    whole = not samples.low_passed
+    whole = samples.shows_losses
     mean, std = (float(force.mean()), float(force.std())) if force.size else (math.nan, math.nan)
     figures = replace(
         Figures.none(),
@@ -195,8 +195,8 @@ def _section_edges(position: Array, line: CatenaryData | None, section: float | 
     return np.asarray(length * np.arange(math.floor(begin / length), math.floor(end / length) + 2))
 
 
-def _criteria(part: Part, line: CatenaryData | None, uplift: float) -> list[Criterion]:
-    """Requirements at the mean speed of a part; uplift: maximum at the mast that was measured (m)."""
+def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) -> list[Criterion]:
+    """Requirements at the mean speed of a part; uplift: maximum at the mast (m); blind: see ``_blind``."""
     speed = from_kmh(
         round(to_kmh(part.speed), 1)
     )  # limits change at 200 and 250 km/h: rounding decides nothing
@@ -209,24 +209,29 @@ def _criteria(part: Part, line: CatenaryData | None, uplift: float) -> list[Crit
     found = compliance(figures, part.arcing, facts, speed, mean_span, none, none)
     # Its note for a run names an option that a record cannot have.
     words = f"this and other limits are those for {facts.system}, the power supply ({facts.system_source})"
-    return [replace(each, note=words) if each.key == "mean" else each for each in found]
+    notes = {"mean": words} | ({"arcing": f"not judged, as {blind}"} if blind else {})
+    return [replace(each, note=notes.get(each.key, each.note)) for each in found]
 
 
 def _notes(samples: Samples, line: CatenaryData | None, span: float | None) -> list[str]:
     notes = list(samples.record.notes)
-    if samples.low_passed:
-        notes.append(
-            f"The force was low-passed before it was recorded (there is hardly any above {ABOVE:g} Hz): its "
-            "figures are of the force as it is, and losses of contact (CL, NQ) cannot be judged."
-        )
-    elif samples.step > ARC * (1 + 1e-6):
-        notes.append(
-            f"Samples are {1e3 * samples.step:.3g} ms apart, so losses of contact of {1e3 * ARC:g} ms are "
-            "not resolved and NQ cannot be judged; 200 samples a second are needed."
-        )
+    if blind := _blind(samples):
+        as_is = ", and figures are of the force as it is" if samples.low_passed else ""
+        what = "NQ" if samples.shows_losses else "CL and NQ"
+        notes.append(f"{what} cannot be judged, as {blind}{as_is}.")
     if line is None and span is not None:
         notes.append(f"Supports are taken to stand every {span:g} m from 0 m on.")
     return notes
+
+
+def _blind(samples: Samples) -> str:
+    """Why losses of contact, or their durations, cannot be seen, as a clause; "" where they can."""
+    given = samples.record.longest.filtered
+    if not samples.shows_losses:
+        known = f"at {given:g} Hz, as given" if given else f"there is hardly any above {ABOVE:g} Hz"
+        return f"the force was low-passed before it was recorded ({known})"
+    apart = f"samples are {1e3 * samples.step:.3g} ms apart, and arcs of {1e3 * ARC:g} ms need 200 a second"
+    return apart if samples.step > ARC * (1 + 1e-6) else ""
 
 
 def _beyond(samples: Samples, reach: tuple[float, float]) -> list[str]:

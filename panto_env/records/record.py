@@ -21,6 +21,7 @@ class Piece:
     force: Array  # (n,): contact force, with the inertia of the strips where it was measured (N)
     height: Array | None = None  # (n,): of the contact point over any zero (m)
     uplift: Array | None = None  # (n,): of the contact wire at one mast (m)
+    filtered: float | None = None  # cut-off of a low-pass known to be in the force (Hz)
 
     @property
     def time(self) -> Array:

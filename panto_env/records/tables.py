@@ -91,7 +91,7 @@ def requirements_table(found: Judgement) -> Table:
 def requirement_remarks(found: Judgement) -> list[str]:
     """Notes on requirements, each once, and values without limits where there is one class of speeds."""
     alone = len(found.requirements) == 1
-    kept = [each for _, criteria in found.requirements for each in criteria if alone or each.kept is not None]
+    kept = [each for _, criteria in found.requirements for each in criteria if alone or each.limited]
     return list(dict.fromkeys(line for each in kept for line in remarks([each])))
 
 

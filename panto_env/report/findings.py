@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.table import Table
 from ..catalog import unusual
 from ..metrics.by_span import SpanFigures, by_span
 from ..metrics.criterion import Criterion
@@ -22,8 +23,10 @@ from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
+from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables
 from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from ..plant.catenary.flexible.elasticity import non_uniformity
+from ..plant.line_condition import NEW, LineCondition
 from ..plant.pantograph.schema import PantographData
 
 FOLDS = 240
@@ -193,8 +196,20 @@ class Findings:
     @cached_property
     def elasticity(self) -> tuple[Array, Array, float] | None:
         """Places (m), uplift per newton (m/N) and its non-uniformity (%), at the mean force, if known."""
+        run = self.as_run
+        return run and (run.places, run.elasticities, non_uniformity(run.elasticities))
+
+    @cached_property
+    def as_run(self) -> AsRun | None:
+        """The line at rest as it was run, at the mean force, if known; None for lines without wires."""
         if not isinstance(self.line, FlexibleCatenaryData):
             return None
+        given = self.run.settings.get("line_condition")  # several to draw from have the same wires
+        condition = LineCondition.model_validate(given[0]) if given else NEW
         force = self.run.nominal_force if self.figures is None else self.figures.mean
-        places, lifts = elasticity(self.line, force)
-        return places, lifts, non_uniformity(lifts)
+        return as_run(self.line, condition, force)
+
+    @cached_property
+    def as_run_tables(self) -> list[Table]:
+        """The line as designed beside the line as run; none where they do not differ."""
+        return [] if self.as_run is None else as_run_tables(self.line, self.as_run)

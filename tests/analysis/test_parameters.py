@@ -1,10 +1,12 @@
 """Names, labels and changes of parameters, and spans as a command reads them."""
 
+import numpy as np
 import pytest
 import typer
 
 from panto_env import InputError
 from panto_env.analysis import parameters
+from panto_env.analysis import sweep as sweep_module
 from panto_env.analysis.options import SEVERAL, parse_spans, with_settings
 from panto_env.analysis.parameters import (
     change,
@@ -194,3 +196,48 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
     for option in typer.main.get_command(app).params:
         assert option.opts == [f"--{option.name.replace('_', '-')}"] or option.opts[0].endswith("completion")
         assert option.secondary_opts == [], "a flag has no second one that switches it off"
+
+
+def test_droppers_are_laid_out_anew_by_spacing_pre_sag_and_span():
+    """As the TOML file takes them; a span of another length had kept its droppers' places, or was refused."""
+    line = load_catenary("re250")
+    of_file = {
+        name: value
+        for name, value in line.droppers.model_dump(exclude_none=True).items()
+        if name not in ("positions", "sag")
+    }
+    first = line.droppers.positions[0]
+    closer = change(line, "catenary.droppers.spacing", 5.0)
+    given = {"spacing": 5.0, "first": first, "pre_sag": max(line.droppers.sag) - line.droppers.sag[0]}
+    assert (
+        closer.droppers
+        == type(line)
+        .model_validate(line.model_dump(exclude_none=True) | {"droppers": of_file | given})
+        .droppers
+    )
+    assert len(closer.droppers.positions) > len(line.droppers.positions)
+    sagging = change(closer, "catenary.droppers.pre_sag", 0.04)
+    assert sagging.droppers.positions == closer.droppers.positions
+    assert max(sagging.droppers.sag) == pytest.approx(0.04, abs=2e-3)
+    shorter = change(line, "catenary.span_length", 40.0)
+    x = shorter.droppers.positions
+    assert (shorter.span_length, x[0], 40.0 - x[-1]) == (40.0, first, pytest.approx(first))
+    usual = np.diff(line.droppers.positions).mean()
+    assert np.diff(x).mean() == pytest.approx(usual, rel=0.15)
+    assert change(line, "catenary.span_length", line.span_length) == line
+    assert parameter_label("catenary.droppers.spacing", line) == (
+        "catenary: droppers: approximate distance between droppers, which gives their number (m)"
+    )
+
+
+def test_span_and_spacing_are_swept_together_in_any_order(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        sweep_module, "_rows", lambda one, spans: seen.append(one.arguments["catenary"]) or []
+    )
+    both = {"catenary.span_length": [50.0, 65.0], "catenary.droppers.spacing": [5.0, 9.0]}
+    for order in (both, dict(reversed(both.items()))):
+        seen.clear()
+        sweep(order, catenary="re250", workers=1)
+        found = {(each.span_length, len(each.droppers.positions)) for each in seen}
+        assert found == {(50.0, 9), (50.0, 5), (65.0, 12), (65.0, 7)}

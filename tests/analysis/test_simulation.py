@@ -84,7 +84,7 @@ def test_the_signature_has_every_setting_once():
     assert names[:4] == ["catenary", "pantograph", "speed_kmh", "policy"]
     assert set(fields()) <= set(names)
     assert len(names) == len(set(names))
-    assert {"seed", "progress", "watch", "record_droppers", "evaluated"} <= set(names)
+    assert {"seed", "progress", "watch", "record_droppers", "trimmed_over"} <= set(names)
     assert "settings" not in names
 
 

@@ -10,6 +10,9 @@ from panto_env import InputError, simulate
 from panto_env.analysis import sweep as module
 from panto_env.analysis.sweep import labels, save, sweep
 from panto_env.analysis.sweep_plots import plot_sweep
+from panto_env.metrics.droppers import evaluated, near_train
+
+from ..command import panto
 
 SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0, "spans": "all"}
 RUN = {name: value for name, value in SHORT.items() if name != "spans"}
@@ -32,7 +35,10 @@ def test_a_row_says_what_was_run_and_what_came_of_it():
         "terminated": False,
         "ending": "",
         "spans": "3-4",
-    } | run.summary((3, 4)).as_dict()
+        **run.summary((3, 4)).as_dict(),
+        **dict.fromkeys(("dropper_force", "slack_droppers", "slack"), math.nan),
+        "requirements": "kept",
+    }
     assert list(row) == list(expected)
     assert row == pytest.approx(expected, nan_ok=True)
 
@@ -102,7 +108,9 @@ def test_memory_is_checked_of_the_longest_pass_as_often_as_passes_run_at_once(
             raise InputError("That is too much.")
 
     monkeypatch.setattr(module, "workers_for", lambda jobs, workers: jobs * 10 + (workers or 0))
-    monkeypatch.setattr(module, "Task", lambda given: built.append(given) or SimpleNamespace(cost=Cost()))
+    monkeypatch.setattr(
+        module, "Task", lambda given, record_droppers: built.append(given) or SimpleNamespace(cost=Cost())
+    )
     given = {key: each for key, each in {**RUN, **settings}.items() if each is not None}
     with pytest.raises(InputError, match=r"^That is too much\.$"):
         sweep(values, workers=2, **given)
@@ -153,3 +161,40 @@ def test_a_plot_of_one_value_and_without_figures_can_be_drawn():
     assert (mesh.norm.vmin, mesh.norm.vmax) == (51.0, 63.0)
     assert (maps.axes[2].collections[0].norm.vmin, maps.axes[2].collections[0].norm.vmax) == (0.0, 1.0)
     assert (maps.get_supxlabel(), maps.get_supylabel()) == ("a", "b")
+
+
+def test_a_row_says_which_requirements_are_broken_and_what_droppers_bear():
+    settings = {"catenary": "en50318-2002", "pantograph": "dsa250", "distance": 700.0}
+    slow, fast = sweep({"speed_kmh": [160.0, 320.0]}, **settings)
+    for row in (slow, fast):
+        run = simulate(**settings, speed_kmh=row["speed_kmh"])
+        found = {each.key: each for each in run.compliance()}
+        short = {"mean": "F_m", "std": "σ", "statistical_max": "F_m + 3σ"}
+        broken = [short.get(key, key) for key, each in found.items() if each.kept is False]
+        assert row["requirements"] == (f"broken: {', '.join(broken)}" if broken else "kept")
+        assert row["dropper_force"] == found["dropper force"].value
+        assert row["slack"] == found["slack"].value
+        force, _ = evaluated(run)
+        per_dropper = [(force[:, k][near_train(run)[:, k]] <= 0).any() for k in range(force.shape[1])]
+        assert row["slack_droppers"] == sum(per_dropper)
+    assert slow["requirements"] != fast["requirements"]
+    assert fast["slack_droppers"] > 0
+
+
+def test_the_table_shows_verdicts_and_droppers(capsys):
+    values = ("catenary.droppers.spacing=5,8", "--distance", "700", "--speed", "250")
+    done = panto("sweep", *values)
+    assert done.returncode == 0, done.stderr
+    for words in ("requirements", "dropper", "slack", "%)"):
+        assert words in done.stdout
+    assert "kept" in done.stdout or "broken" in done.stdout
+
+
+def test_a_plot_of_three_parameters_that_vary_is_refused_before_the_first_pass(tmp_path):
+    three = ("speed_kmh=250,260", "catenary.mean_stiffness=3000,4000", "pantograph.static_force=70,80")
+    light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--distance", "300")
+    done = panto("sweep", *three, *light, "--plot", tmp_path / "a.png")
+    assert done.returncode == 2
+    assert "A plot shows one or two parameters" in done.stderr
+    assert len(sweep({name: [1.0 * k for k in map(int, values.split(","))] for name, _, values in (
+        each.partition("=") for each in three)}, **SHORT)) == 8  # fmt: skip

@@ -90,8 +90,9 @@ def test_odd_digits_are_no_spans(text):
 
 
 def test_spans_beyond_any_line_are_refused():
+    spans = (1, HUGE)
     with pytest.raises(InputError, match="counted from 1 to 1000"):
-        simulate("periodic-stiffness", "three-mass", distance=100.0, evaluated=(1, HUGE)).summary((1, HUGE))
+        simulate("periodic-stiffness", "three-mass", distance=100.0, trimmed_over=spans).summary(spans)
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_figures_are_those_of_the_controlled_pantograph():
     assert own.summary(SPANS).std != run.summary(SPANS).std
     means = [each.summary(SPANS).mean for each in run.train]
     pressed = simulate(
-        **TRAIN, speed_kmh=SPEED_KMH, line_condition="smooth", mean_force=means, evaluated=SPANS
+        **TRAIN, speed_kmh=SPEED_KMH, line_condition="smooth", mean_force=means, trimmed_over=SPANS
     )
     for each, mean in zip(pressed.train, means, strict=True):
         assert each.summary(SPANS).mean == pytest.approx(mean, abs=0.06)

@@ -215,7 +215,6 @@ def test_an_oracle_is_found_where_wires_change():
         **OVERLAP,
         policy=Tape(asked.knots.commands(found.knots) / asked.knots.limit),
         seed=3,
-        evaluated=SPANS,
         watch=lambda task: forces.append([task.plant.of(0, row) for row in WIRES]),
     )
     assert run.summary(SPANS).std == pytest.approx(found.std, rel=1e-12)
@@ -225,7 +224,7 @@ def test_an_oracle_is_found_where_wires_change():
 
 def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
     asked = Problem(TRAILING, seed=3, spans=SPANS)
-    passive = simulate(**TRAILING, seed=3, evaluated=SPANS).train
+    passive = simulate(**TRAILING, seed=3).train
     assert asked.figures.std == pytest.approx(passive[1].summary(SPANS).std, rel=1e-12)
     assert abs(asked.figures.std / passive[0].summary(SPANS).std - 1) > 0.05
     found = descend(asked, "zero", np.zeros((asked.count, 1)), iterations=4)
@@ -435,7 +434,7 @@ def test_a_line_of_each_seed_is_searched_by_itself(tmp_path: Any, monkeypatch: p
     assert stored.stored_actions(given) is None
     for seed, kept in enumerate(cell["passes"]):
         assert [each["start"] for each in kept["searches"]] == ["zero"]
-        passive = simulate(**given, seed=seed, evaluated=SPANS).summary(SPANS)
+        passive = simulate(**given, seed=seed).summary(SPANS)
         assert kept["passive"]["std"] == pytest.approx(passive.std, rel=1e-12)
         assert kept["oracle"]["std"] == pytest.approx(kept["searches"][0]["std"], rel=1e-4)
         assert kept["oracle"]["std"] < 0.8 * passive.std

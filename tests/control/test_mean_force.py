@@ -55,10 +55,37 @@ def test_the_mean_is_met_over_the_evaluated_spans(line, pantograph, speed, wante
 
 def test_it_is_met_over_the_spans_that_are_named_and_on_ones_own_line():
     own = {"speed_kmh": 300.0, "mean_force": 110.0, "seed": 3, "line_condition": "worn"}
-    run = simulate(**own, evaluated=(5, 6), distance=400.0)
+    run = simulate(**own, trimmed_over=(5, 6), distance=400.0)
     assert run.summary((5, 6)).mean == pytest.approx(110.0, abs=0.1)
-    other = simulate(**own | {"seed": 4}, evaluated=(5, 6), distance=400.0)
+    other = simulate(**own | {"seed": 4}, trimmed_over=(5, 6), distance=400.0)
     assert other.nominal_force != run.nominal_force
+
+
+def test_which_spans_are_evaluated_does_not_change_the_run():
+    """It had been trimmed anew over each choice, so that every span of an uneven line had the same mean."""
+    worn = {**LIGHT, "line_condition": "worn", "seed": 2, "mean_force": 60.0}
+    whole = simulate(**worn)
+    assert whole.summary().mean == pytest.approx(60.0, abs=0.1)
+    rows = [sweep({"speed_kmh": [300.0]}, spans=spans, **worn)[0] for spans in ((10, 10), (17, 17), "all")]
+    assert {row["nominal_force"] for row in rows} == {whole.nominal_force}
+    means = [row["mean"] for row in rows]
+    assert means == [whole.summary(spans).mean for spans in ((10, 10), (17, 17), "all")]
+    assert np.ptp(means) > 0.2
+    told = [
+        json.loads(
+            panto(
+                "simulate", "--catenary", "periodic-stiffness", "--pantograph", "identified-2dof",
+                "--mean-force", "60", "--spans", spans, "--json",
+            ).stdout
+        )
+        for spans in ("5-8", "12-13")
+    ]  # fmt: skip
+    assert len({each["nominal_force"] for each in told}) == 1
+
+
+def test_a_run_too_short_for_default_spans_is_trimmed_over_the_whole():
+    run = simulate(**LIGHT, mean_force=60.0, distance=300.0)
+    assert run.summary("all").mean == pytest.approx(60.0, abs=0.1)
 
 
 def test_under_a_policy_the_passive_pantograph_meets_it():
@@ -110,7 +137,7 @@ def test_what_was_found_is_kept_and_found_again(empty_store):
         {"speed_kmh": 301.0},
         {"time_step": 2.5e-3},
         {"seed": 1},
-        {"evaluated": (11, 12)},
+        {"trimmed_over": (11, 12)},
         {"catenary": load_catenary("periodic-stiffness").model_copy(update={"mean_stiffness": 4100.0})},
         {"pantograph": load_pantograph("identified-2dof").model_copy(update={"masses": (5.1, 10.38)})},
         {"line_condition": "fair"},
@@ -201,7 +228,7 @@ def test_the_result_keeps_it(tmp_path):
 
 
 def test_a_sweep_meets_it_at_every_value():
-    rows = sweep({"speed_kmh": [250.0, 300.0]}, **LIGHT, mean_force="60", spans=(5, 8))
+    rows = sweep({"speed_kmh": [250.0, 300.0]}, **LIGHT, mean_force="60")
     assert [row["mean"] for row in rows] == pytest.approx([60.0, 60.0], abs=0.1)
     assert rows[0]["nominal_force"] != rows[1]["nominal_force"]
 
@@ -214,7 +241,7 @@ def test_the_command_takes_it_and_says_what_it_applied():
     assert "trimmed for a passive mean of 60.0 N" in text.stdout
     told = json.loads(panto(*command, "en50367", "--json").stdout)
     assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC") - mean_force.TOLERANCE)
-    assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=0.1)
+    assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=1.0)
     assert told["nominal_force"] > told["target_mean"]
     bad = panto(*command, "much")
     assert bad.returncode == 2

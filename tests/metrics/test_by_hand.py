@@ -8,7 +8,7 @@ import pytest
 from panto_env import InputError
 from panto_env.metrics import en50367
 from panto_env.metrics.criterion import Criterion
-from panto_env.metrics.run_tables import VERDICTS, _figure, _with_figures
+from panto_env.metrics.run_tables import _figure, _with_figures
 
 from .test_summary import RUN
 
@@ -31,15 +31,16 @@ def test_a_row_has_the_limits_of_its_criterion_or_none():
         "lowest": 1.0,
         "highest": 2.5,
         "margin": 0.5,
-        "verdict": VERDICTS[True],
+        "verdict": "kept",
         "source": "a standard",
         "note": "a note",
     }
     bare = {"lowest": None, "highest": None, "margin": None, "verdict": "", "source": "", "note": ""}
     assert _figure("a", "one", "N", 2.0, None) == row | bare
     broken = _figure("a", "one", "N", 2.0, replace(whole, highest=1.5, source="", note=""))
-    assert (broken["verdict"], broken["source"], broken["note"]) == (VERDICTS[False], "", "")
-    assert len({VERDICTS[each] for each in (True, False, None)}) == 3
+    assert (broken["verdict"], broken["source"], broken["note"]) == ("broken", "", "")
+    unknown = _figure("a", "one", "N", 2.0, replace(whole, value=float("nan")))
+    assert unknown["verdict"] == "not judged"
 
 
 def test_limits_are_those_of_the_mean_speed_over_the_spans():

@@ -8,14 +8,21 @@ from scipy.sparse.linalg import spsolve
 from panto_env import InputError, simulate
 from panto_env.backend import python_function
 from panto_env.catalog import load_catenary
+from panto_env.catalog.loader import FOLDERS
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.plant.catenary.flexible.as_run import as_run
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.fixed_wires import tensions_of_fixed
 from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
+from panto_env.report.findings import Findings
+from panto_env.report.page import page
 
+from ..command import panto
 from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.system import _placement, build
@@ -130,7 +137,11 @@ def test_slack_that_only_a_temperature_makes_is_refused_and_so_is_one_that_does_
     stiff = load_catenary(EN50318).contact_wire.model_copy(update={"axial_stiffness": 25e6})
     data = load_catenary(EN50318).model_copy(update={"contact_wire": stiff})
     for catenary, temperature, said in (
-        (data, 80.0, r"At \+80 K the contact wire of line 'en50318-2002', fixed at both ends, would have no"),
+        (
+            data,
+            80.0,
+            r"At \+80 K \(95 °C, built at 15 °C\) the contact wire of line 'en50318-2002', fixed at both",
+        ),
         (EN50318, 10.0, "Temperature changes nothing on line 'en50318-2002', as weights keep the tension"),
         ("periodic-stiffness", 10.0, "Only a flexible catenary"),
     ):
@@ -144,3 +155,68 @@ def test_a_long_line_of_spans_that_nearly_agree_has_the_tension_of_the_uniform_o
     np.testing.assert_allclose(
         tensions_of_fixed(nearly, condition), tensions_of_fixed(data, condition), rtol=5e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("line", "weather"),
+    [
+        (fixed(EN50318, ("contact_wire", "messenger_wire")), {"temperature": 20.0, "ice": 0.2}),
+        (load_catenary("re250"), {"lost_contact_tension": 0.1, "ice": 0.3}),
+        (load_catenary("re250-curves"), {"lost_messenger_tension": 0.05}),
+    ],
+    ids=lambda each: getattr(each, "name", ""),
+)
+def test_a_line_at_rest_as_run_is_the_one_that_a_run_has(line, weather):
+    """Nothing named these tensions and dropper forces: reports listed the design's."""
+    condition = LineCondition(**weather, miscut_droppers=((2, 1, 0.005),))
+    found = as_run(line, condition, 100.0)
+    task = Task(run_settings({"catenary": line, "line_condition": LineCondition(**weather)}))
+    assert found.wires[0].wave_speed == task.plant.model.wave_speed
+    first = 0 if line.sequence else task.plant.spans // 2 * len(found.droppers)
+    middle = slice(first, first + len(found.droppers))
+    own = task.plant.model.rest_tension(0)[middle]
+    assert [each.static_force for each in found.droppers] == pytest.approx(own.tolist(), abs=0.05)
+    designed = droppers_at_rest(line)
+    assert [each.length for each in found.droppers] == [each.length for each in designed]
+    assert (
+        max(abs(a.static_force - b.static_force) for a, b in zip(found.droppers, designed, strict=True)) > 1
+    )
+    np.testing.assert_allclose(as_run(line, LineCondition(), 100.0).droppers, designed, atol=1e-9)
+
+
+def test_its_elasticity_is_that_of_a_line_designed_for_these_tensions():
+    """Where no dropper goes slack, wires and droppers are linear, whatever the wires weigh and carry."""
+    line = load_catenary("en50318-2002")
+    condition = LineCondition(lost_contact_tension=0.2, lost_messenger_tension=0.1)
+    found = as_run(line, condition, 10.0)
+    places, lifts = elasticity(with_tension_left(line, condition), 10.0)
+    np.testing.assert_array_equal(found.places, places)
+    np.testing.assert_allclose(found.elasticities, lifts, rtol=1e-3)
+    assert lifts.max() > 1.05 * elasticity(line, 10.0)[1].max()
+
+
+def test_a_condition_says_its_temperature_in_degrees():
+    warm = LineCondition(temperature=20.0, reference_temperature=10.0)
+    assert warm.temperature_in_words == "+20 K (30 °C, built at 10 °C)"
+
+
+def test_the_report_and_the_command_show_the_line_as_it_was_run(tmp_path):
+    data = fixed(EN50318, ("contact_wire", "messenger_wire"))
+    run = simulate(data, speed_kmh=250.0, line_condition={"temperature": 20.0})
+    (found,) = Findings.of(run, "run.parquet")
+    shown = page([found])
+    table = shown[shown.index('class="as-run"') :]
+    tension = found.as_run.wires[0].tension
+    assert f"<td>20,000</td><td>{tension:,.5g}</td>" in table.replace("\n", "")
+    assert "wires at +20 K (35 °C, built at 15 °C)" in table
+    assert found.elasticity[1].max() > 1.1 * elasticity(data, found.figures.mean)[1].max()
+    text = (FOLDERS["catenary"] / f"{EN50318}.toml").read_text(encoding="utf-8")
+    for wire, stiffness in EA.items():
+        text = text.replace(f"[{wire}]\n", f"[{wire}]\naxial_stiffness = {stiffness}\n")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    warm = panto("line", "mine.toml", "--line-condition", "new:temperature=20", cwd=tmp_path)
+    assert warm.returncode == 0, warm.stderr
+    assert f"{tension:,.5g}" in warm.stdout
+    assert "as run" not in panto("line", "mine.toml", cwd=tmp_path).stdout
+    drawn = panto("line", EN50318, "--line-condition", "as-built", cwd=tmp_path).stdout
+    assert "each tension is drawn within ± 2.9 % of these" in " ".join(drawn.split())

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
@@ -13,7 +14,7 @@ from panto_env.records.judge import force_spectrum, judge
 from panto_env.records.measured import measured
 from panto_env.records.plots import draw_force
 from panto_env.records.record import Piece, Record
-from panto_env.records.record_file import read_record
+from panto_env.records.record_file import read_record, write_record
 from panto_env.records.samples import SETTLING, Samples
 from panto_env.records.tables import part_tables, requirement_remarks, requirements_table, whole_table
 
@@ -145,6 +146,31 @@ def test_a_record_that_was_low_passed_is_judged_as_it_is(run):
     assert np.isnan(found.whole.arcing)
     assert any("low-passed before it was recorded" in note for note in found.notes)
     assert ("contact loss CL (%)", "–") in whole_table(found, "").rows
+
+
+def test_arcing_is_not_judged_behind_a_filter_that_is_known(run, tmp_path):
+    """A weak filter looks like none: "arcing 0, kept" was said of a force that cannot fall to 0 any more."""
+    record, weak = measured(run), butter(1, 20, fs=1 / run.time_step, output="sos")
+    (piece,) = record.pieces
+    write_record(Record("a", (replace(piece, force=sosfilt(weak, piece.force)),)), tmp_path / "a.csv")
+    unknown, at_20, at_40 = (
+        judge(read_record(tmp_path / "a.csv", filtered=hertz)) for hertz in (None, 20.0, 40.0)
+    )
+    for found, verdict in ((unknown, "kept"), (at_20, "not judged"), (at_40, "not judged")):
+        ((_, criteria),) = found.requirements
+        (arcing,) = (each for each in criteria if each.key == "arcing")
+        assert arcing.verdict == verdict
+        assert ("not judged, as the force was low-passed" in arcing.note) == (verdict == "not judged")
+        assert [row[4] for row in requirements_table(found).cells if "arcing" in row[0]] == [verdict]
+    assert at_20.samples.low_passed  # and judged as it is, while one of 40 Hz is filtered on
+    assert not at_40.samples.low_passed
+    assert any("(at 40 Hz, as given)" in note for note in at_40.notes)
+
+
+def test_a_filter_of_fourth_order_is_seen(run):
+    (piece,) = measured(run).pieces
+    force = sosfilt(butter(4, 20, fs=1 / piece.time_step, output="sos"), piece.force)
+    assert judge(Record("a", (replace(piece, force=force),))).samples.low_passed
 
 
 def test_arcs_that_the_samples_do_not_resolve(run):

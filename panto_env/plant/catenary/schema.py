@@ -14,7 +14,7 @@ from ...base.shown import shown
 from ..alignment import Alignment
 from ..valid_range import FREE_UPLIFT
 
-PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV"]
+PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV", "DC 750 V", "DC 600 V"]
 NO_SOURCE, BY_DEFAULT = "no source is named", "default, as none is given"
 FEWEST_SPANS, MOST_SPANS = 3, 1000
 CLEAR = 8
@@ -44,7 +44,7 @@ class CatenaryData(Settings):
     system: PowerSystem = Field(
         "AC",
         description="power supply, on which limits of EN 50367 and EN 50119 depend: AC 25 kV, AC 15 kV, AC, "
-        "DC 3 kV or DC 1.5 kV",
+        "DC 3 kV, DC 1.5 kV, DC 750 V or DC 600 V",
     )
     free_uplift: Annotated[float, Between(0.01, 1.0, "m")] = Field(
         FREE_UPLIFT,

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ....base.arrays import Array
-from ...line_condition import NEW
+from ...line_condition import NEW, LineCondition
 from .defects import DefectiveLine
 from .overlaps import tension_lengths
 from .schema import FlexibleCatenaryData
@@ -22,16 +22,21 @@ PLACES = 48
 """Number of intervals between the places of the force in a span."""
 
 
-def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
+def elasticity(
+    line: FlexibleCatenaryData,
+    force: float,
+    condition: LineCondition = NEW,
+    tensions: tuple[float, float] = (1.0, 1.0),
+) -> tuple[Array, Array]:
     """Places in a span (m) and the uplift of the contact wire there per newton (m/N), (places,) each.
 
     force: at the place (N). The larger it is, the more droppers go slack. Where spans differ, places are
     along the line, in all spans but the first and the last, at whose ends anchors hold the wires; in an
-    overlap the uplift is that of the wire in use alone.
+    overlap the uplift is that of the wire in use alone. condition, tensions: as ``DefectiveLine`` takes them.
     """
     if not line.sequence:
         places = line.span_length / PLACES * np.arange(PLACES + 1)
-        whole = DefectiveLine(line, SPANS, NEW, nodes=places.tolist())
+        whole = DefectiveLine(line, SPANS, condition, tensions, places.tolist())
         return places, _lifts(whole, places + SPANS // 2 * line.span_length, force)
     found: list[tuple[Array, Array]] = []
     for begin, end in pairwise(line.alignment().supports[1:-1]):
@@ -41,7 +46,7 @@ def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
             used = (places >= part.in_use[0]) & (places <= part.in_use[1])
             if used.any():
                 own = places[used] - part.begin
-                whole = DefectiveLine(part.line, part.spans, NEW, nodes=own.tolist())
+                whole = DefectiveLine(part.line, part.spans, condition, tensions, own.tolist())
                 lifts[used] = _lifts(whole, own, force)
         found.append((places, lifts))
     return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
@@ -49,9 +54,9 @@ def elasticity(line: FlexibleCatenaryData, force: float) -> tuple[Array, Array]:
 
 def _lifts(whole: DefectiveLine, places: Array, force: float) -> Array:
     """Uplift per newton (m/N) at nodes of a line under a force there (N)."""
-    return np.array(
-        [whole.rise(whole.solve(pushed=(float(x), force))).height(np.array([x]))[0] / force for x in places]
-    )
+    rest = whole.rise(whole.solve()).height(places)  # 0 as designed
+    lifted = [whole.rise(whole.solve(pushed=(float(x), force))).height(np.array([x]))[0] for x in places]
+    return np.asarray((np.array(lifted) - rest) / force)
 
 
 def non_uniformity(elasticities: Array) -> float:

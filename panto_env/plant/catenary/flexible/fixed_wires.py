@@ -54,8 +54,7 @@ def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> t
             f"Line '{data.name}' has stitch wires or overlaps, with which wires that are fixed at both ends "
             "are not computed; leave out axial_stiffness, or ice and temperature."
         )
-    names = ("lost_contact_tension", "lost_messenger_tension", "ice", "temperature")
-    return _solve(data, LineCondition(**{name: getattr(condition, name) for name in names}))
+    return _solve(data, condition.along_line)
 
 
 @remembered
@@ -87,7 +86,7 @@ def _solve(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float,
     if low or not result.success:
         name = "contact" if low == [0] else "messenger"
         raise InputError(
-            f"At {condition.temperature:+g} K the {name} wire of line '{data.name}', fixed at both ends, "
+            f"At {condition.temperature_in_words} the {name} wire of line '{data.name}', fixed at both ends, "
             "would have no tension; take a smaller difference of temperature, or a softer axial_stiffness."
         )
     return factors(result.x)

@@ -33,7 +33,7 @@ class Spacing(Settings):
     """Droppers at a spacing, in the place of a table of positions and sags."""
 
     spacing: Annotated[float, Between(1, LONGEST_SPAN, "m")] = Field(
-        description="distance between droppers (m), approximately, which gives their number"
+        description="approximate distance between droppers, which gives their number (m)"
     )
     first: Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")] | None = Field(
         None, description="distance of the outer droppers from the supports (m), by default half the spacing"
@@ -156,13 +156,13 @@ def _changed(own: Table, changes: Any, where: str) -> Span:
         if isinstance(changes.get(key), Mapping):
             table[key] = {**own.get(key, {}), **changes[key]}
     try:
-        table["droppers"] = _droppers(own, changes.get("droppers", {}), table["span_length"])
+        table["droppers"] = droppers_of(own, changes.get("droppers", {}), table["span_length"])
         return valid(Span, table, "")
     except InputError as error:
         raise InputError(f"The {where} is not valid: {error}") from error
 
 
-def _droppers(own: Table, changes: Any, span_length: Any) -> Any:
+def droppers_of(own: Table, changes: Any, span_length: Any) -> Any:
     """A span's table of droppers, with those of ``own`` at a like spacing where that has another length."""
     if not isinstance(changes, Mapping):
         return changes
