@@ -227,8 +227,9 @@ def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dic
 
 
 def _at_rest(design: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Droppers at rest of the line of a run, which older files do not hold."""
-    if "catenary" not in design:
+    """Droppers at rest of the line of a run, which files of other versions may not hold as this one does."""
+    try:
+        line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
+        return as_rows(droppers_at_rest(line))
+    except (KeyError, TypeError, ValueError):
         return []
-    line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
-    return as_rows(droppers_at_rest(line))

@@ -27,6 +27,7 @@ from .droppers import evaluated, near_train
 from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
+from .stored_run import check_stored
 
 FORMAT = 3
 OF_FOLLOWERS = (
@@ -353,6 +354,7 @@ class Trajectory:
             facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
             if facts.pop("format") != FORMAT:
                 raise ValueError("it has another format")
+            check_stored(facts, columns)
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
             facts["line"] = LineFacts(**facts["line"])

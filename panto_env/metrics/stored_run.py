@@ -1,0 +1,92 @@
+"""What a file of a run must hold: its checksum shows that it is undamaged, not that it is a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import ConfigDict, Field, ValidationError
+
+from ..base.arrays import Array
+from ..base.explanation import explain
+from ..base.ranges import Between
+from ..base.settings import Settings
+from ..plant.catenary.schema import PowerSystem
+
+LARGEST = 1e9
+"""Maximum size of a sample, in its SI unit."""
+Places = tuple[Annotated[float, Between(-1e7, 1e7, "m")], ...]
+MORE = ConfigDict(extra="allow", allow_inf_nan=True)
+"""Of tables that hold more than figures depend on, and numbers that may be unknown: nan or infinite."""
+
+
+class _Settings(Settings):
+    model_config = MORE
+    controlled: tuple[Annotated[int, Between(1, 4)], ...] = Field((1,), min_length=1)
+    line_condition: tuple[dict[str, Any], ...] | None = None
+
+
+class _Pantograph(Settings):
+    model_config = MORE
+    aerodynamic_coefficient: Annotated[float, Between(-1, 1)] = 0.0
+
+
+class _Design(Settings):
+    model_config = MORE
+    catenary: dict[str, Any] = Field(default_factory=dict)
+    pantograph: _Pantograph = _Pantograph()
+
+
+class _Line(Settings):
+    model_config = MORE
+    system: PowerSystem
+    system_source: str
+    wave_speed: float = Field(ge=1)
+    free_uplift: float
+    free_uplift_source: str
+    dropper_reflection: float
+    support_reflection: float
+
+
+class _Collector(Settings):
+    model_config = MORE
+    pantograph: str
+    nominal_force: Annotated[float, Between(-1e6, 1e6, "N")]
+    target_mean: float
+    policy: str
+    design: _Design
+    reached: float
+
+
+class _Facts(_Collector):
+    support_position: Places
+    dropper_position: Places
+    catenary: str
+    speed: Annotated[float, Between(0.1, 500, "m/s")]
+    alignment: tuple[Places, float | None] | tuple[Places, float | None, Any]
+    time_step: Annotated[float, Between(1e-7, 1, "s")]
+    settings: _Settings
+    seed: int
+    terminated: bool
+    ending: str
+    line: _Line
+    followers: tuple[_Collector, ...] = Field(max_length=3)
+
+
+def check_stored(facts: Mapping[str, Any], columns: Mapping[str, Array]) -> None:
+    """Raise ValueError, with a clause, for facts and columns, (n,) each, of a file that is of no run."""
+    try:
+        found = _Facts.model_validate(facts)
+    except ValidationError as error:
+        raise ValueError(explain(error, _Facts)) from error
+    for name, column in columns.items():
+        usable = column.dtype.kind == "f" and len(column) > 1
+        own = column[~np.isnan(column)] if usable and "@" in name else column  # nan: not yet on the line
+        if not (usable and (np.abs(own) <= LARGEST).all()):
+            raise ValueError(f"column {name} does not hold finite numbers of two samples or more")
+    supports, pitch = np.array(found.alignment[0]), found.alignment[1]
+    if len(supports) < 2 or (np.diff(supports) <= 0).any() or pitch not in (None, supports[1]):
+        raise ValueError("its supports do not stand one behind the other")
+    if (np.diff(columns["position"]) <= 0).any() or columns["position"][0] < 0:
+        raise ValueError("its positions do not rise with time")
