@@ -17,44 +17,37 @@ from ..plant.catenary.schema import PowerSystem
 LARGEST = 1e9
 """Maximum size of a sample, in its SI unit."""
 Places = tuple[Annotated[float, Between(-1e7, 1e7, "m")], ...]
-MORE = ConfigDict(extra="allow", allow_inf_nan=True)
-"""Of tables that hold more than figures depend on, and numbers that may be unknown: nan or infinite."""
 
 
-class _Settings(Settings):
-    model_config = MORE
+class _Table(Settings):  # of more than figures depend on, and of numbers that may be unknown: nan or infinite
+    model_config = ConfigDict(extra="allow", allow_inf_nan=True)
+
+
+class _Settings(_Table):
     controlled: tuple[Annotated[int, Between(1, 4)], ...] = Field((1,), min_length=1)
     line_condition: tuple[dict[str, Any], ...] | None = None
 
 
-class _Pantograph(Settings):
-    model_config = MORE
+class _Pantograph(_Table):
     aerodynamic_coefficient: Annotated[float, Between(-1, 1)] = 0.0
 
 
-class _Design(Settings):
-    model_config = MORE
+class _Design(_Table):
     catenary: dict[str, Any] = Field(default_factory=dict)
     pantograph: _Pantograph = _Pantograph()
 
 
-class _Line(Settings):
-    model_config = MORE
+class _Line(_Table):
     system: PowerSystem
-    system_source: str
     wave_speed: float = Field(ge=1)
     free_uplift: float
-    free_uplift_source: str
     dropper_reflection: float
     support_reflection: float
 
 
-class _Collector(Settings):
-    model_config = MORE
-    pantograph: str
+class _Collector(_Table):
     nominal_force: Annotated[float, Between(-1e6, 1e6, "N")]
     target_mean: float
-    policy: str
     design: _Design
     reached: float
 
@@ -62,16 +55,12 @@ class _Collector(Settings):
 class _Facts(_Collector):
     support_position: Places
     dropper_position: Places
-    catenary: str
     speed: Annotated[float, Between(0.1, 500, "m/s")]
-    alignment: tuple[Places, float | None] | tuple[Places, float | None, Any]
+    alignment: tuple[Places, float | None] | tuple[Places, float | None, list[tuple[str, float | None]]]
     time_step: Annotated[float, Between(1e-7, 1, "s")]
     settings: _Settings
-    seed: int
-    terminated: bool
-    ending: str
     line: _Line
-    followers: tuple[_Collector, ...] = Field(max_length=3)
+    followers: tuple[_Collector, ...]
 
 
 def check_stored(facts: Mapping[str, Any], columns: Mapping[str, Array]) -> None:
