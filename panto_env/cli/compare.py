@@ -20,8 +20,8 @@ from ..terminal import (
     progress_console,
     written_last,
 )
-from .identify import pairs
-from .record import Mass, Page, Unit
+from .identify import columns_named, pairs
+from .record import Heading, Mass, Page, Unit
 
 if TYPE_CHECKING:
     from ..records.compare import Comparison
@@ -42,6 +42,7 @@ def compare(
     ] = None,
     mass: Mass = None,
     unit: Unit = None,
+    column: Heading = None,
     plot: Plot = None,
     html: Page = None,
     json: Json = False,
@@ -57,7 +58,8 @@ def compare(
 
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
-        found = hold(read_record(file, pairs(unit or []), mass_correction=mass), simulated, shift=shift)
+        measured = read_record(file, pairs(unit or []), columns_named(column), mass_correction=mass)
+        found = hold(measured, simulated, shift=shift)
     title = f"{file.name} and {run.name}: {simulated.pantograph} on {simulated.catenary}"
     title += f" at {simulated.speed_kmh:g} km/h"
     with written_last() as later:

@@ -11,8 +11,8 @@ import typer
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
-from .identify import pairs
-from .record import Mass, Unit
+from .identify import columns_named, pairs
+from .record import Heading, Mass, Unit
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -60,6 +60,7 @@ def diagnose(
     ] = None,
     mass: Mass = None,
     unit: Unit = None,
+    column: Heading = None,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
@@ -85,8 +86,10 @@ def diagnose(
             "With --fit, the pantograph is the fit's and further records are given with --again; leave out "
             "--pantograph and further arguments."
         )
-    if fit is None and (mass is not None or unit):
-        raise InputError("--mass and --unit are of records, which are diagnosed with --fit; leave them out.")
+    if fit is None and (mass is not None or unit or column):
+        raise InputError(
+            "--mass, --unit and --column are of records, which are diagnosed with --fit; leave them out."
+        )
     rate = FALSE_ALARMS if false_alarms is None else false_alarms
     if not LEAST_FALSE_ALARMS <= rate <= MOST_FALSE_ALARMS:
         raise InputError(
@@ -98,7 +101,9 @@ def diagnose(
     with progress_console.status("reading and diagnosing"):
         files = (run, *(again or []))
         if fit is not None:
-            title, found = _of_records(files, fit, pairs(unit or []), mass, rate, seed)
+            title, found = _of_records(
+                files, fit, (pairs(unit or []), columns_named(column)), mass, rate, seed
+            )
         else:
             title, found = _of_runs(files, (*(healthy or ()), *(more or ())), pantograph, rate, seed)
     with written_last() as later:
@@ -138,13 +143,18 @@ def _of_runs(
 
 
 def _of_records(
-    files: Sequence[Path], fit: Path, units: dict[str, str], mass: float | None, rate: float, seed: int
+    files: Sequence[Path],
+    fit: Path,
+    given: tuple[dict[str, str], dict[str, str]],
+    mass: float | None,
+    rate: float,
+    seed: int,
 ) -> tuple[str, Diagnosis]:
-    """Title and diagnosis of a measuring train's records."""
+    """Title and diagnosis of a measuring train's records; given: units and headings of columns."""
     from ..diagnosis import diagnose_records
     from ..fitting.stored import stored
     from ..records.record_file import read_record
 
-    records = [read_record(file, units, mass_correction=mass) for file in files]
+    records = [read_record(file, *given, mass_correction=mass) for file in files]
     found = diagnose_records(records, stored(fit), false_alarms=rate, seed=seed)
     return f"{files[0].name}, held against the line fitted in {fit.name}", found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,8 +21,8 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import pairs
-from .record import Mass, Unit
+from .identify import columns_named, pairs
+from .record import Heading, Mass, Unit
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
@@ -51,6 +52,7 @@ def fit(
     ] = None,
     mass: Mass = None,
     unit: Unit = None,
+    column: Heading = None,
     output: Annotated[
         str | None,
         typer.Option(help="Write the fitted line to this file (.toml).", callback=writable((".toml",))),
@@ -92,7 +94,8 @@ def fit(
 
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
     tolerances = by_kind(tolerance or [])
-    records = [read_record(file, pairs(unit or []), mass_correction=mass) for file in files]
+    read = partial(read_record, units=pairs(unit or []), headings=columns_named(column), mass_correction=mass)
+    records = [read(file) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
     if output is not None:
         check_design(design, line, names)

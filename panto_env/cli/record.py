@@ -21,7 +21,7 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import pairs
+from .identify import columns_named, pairs
 
 if TYPE_CHECKING:
     from ..records.judge import Judgement
@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 Unit = Annotated[
     list[str] | None,
     typer.Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+]
+Heading = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."
+    ),
 ]
 Mass = Annotated[
     float | None,
@@ -71,6 +77,7 @@ def record(
     ] = None,
     mass: Mass = None,
     unit: Unit = None,
+    column: Heading = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -95,7 +102,7 @@ def record(
 
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
-        measured = read_record(file, pairs(unit or []), mass_correction=mass)
+        measured = read_record(file, pairs(unit or []), columns_named(column), mass_correction=mass)
         found = judge(measured, known, span=span, section=section)
     title = f"{file.name}: {found.whole.figures.distance:,.0f} m"
     with written_last() as later:

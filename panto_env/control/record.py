@@ -136,9 +136,10 @@ def ending(task: TaskState, lane: int) -> str:
         return ""
     plant = task.plant
     steps, line = plant.of(lane, Row.STEP), plant.catenary
+    places = plant.alignment
     time, position = steps * plant.time_step, float(plant.position(lane, steps)[0])
     return (
-        f"The run ended early at {position:.1f} m (span {plant.alignment.span_of(position)}, "
+        f"The run ended early at {position:.1f} m (span {places.span_name(places.span_of(position))}, "
         f"{time:.2f} s): {reason(which, line.free_uplift)}."
     )
 

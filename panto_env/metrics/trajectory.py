@@ -328,7 +328,8 @@ class Trajectory:
             for name in _facts()
         }
         facts["line"] = vars(self.line)
-        facts["alignment"] = self.alignment.supports, self.alignment.pitch
+        masts = [self.alignment.masts] * bool(self.alignment.masts)
+        facts["alignment"] = self.alignment.supports, self.alignment.pitch, *masts
         facts["followers"] = [
             {name: getattr(follower, name) for name in OF_FOLLOWERS} for follower in self.followers
         ]
@@ -358,8 +359,8 @@ class Trajectory:
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
             facts["line"] = LineFacts(**facts["line"])
-            supports, pitch = facts["alignment"]
-            facts["alignment"] = Alignment(tuple(supports), pitch)
+            supports, pitch, *masts = facts["alignment"]
+            facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
             series = {name: columns[name] for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -38,6 +38,8 @@ class Alignment:
 
     supports: tuple[float, ...]  # (spans + 1,): positions (m), rising from 0
     pitch: float | None = None  # length of a span (m) where all have the same
+    # Name and chainage (m), "" and None where unknown, of the masts at the first supports
+    masts: tuple[tuple[str, float | None], ...] = field(default=(), compare=False)
 
     @classmethod
     def of_spans(cls, lengths: Sequence[float]) -> Self:
@@ -76,6 +78,21 @@ class Alignment:
         """The alignment as arrays, for kernels."""
         per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
         return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
+
+    def mast(self, support: int) -> str:
+        """Name of the mast at a support, or its chainage where it has none; "" where both are unknown."""
+        name, chainage = self.masts[support] if 0 <= support < len(self.masts) else ("", None)
+        return name or ("" if chainage is None else kilometres(chainage))
+
+    def support_name(self, support: int) -> str:
+        """Number of a support, with the name and the chainage of its mast where they are known."""
+        name, chainage = self.masts[support] if 0 <= support < len(self.masts) else ("", None)
+        known = [name] * bool(name) + ([] if chainage is None else [kilometres(chainage)])
+        return f"{support} ({', '.join(known)})" if known else f"{support}"
+
+    def span_name(self, span: int) -> str:
+        """Number of a span, with the name and the chainage of the mast where it begins."""
+        return self.support_name(span - 1).replace(f"{span - 1}", f"{span}", 1)
 
     def same_spans(self, other: Alignment) -> bool:
         """Whether the spans that both have are alike."""
@@ -136,6 +153,12 @@ class Alignment:
         tolerance: what may be missing from the span (spans), for a distance that is a rounded sum of steps.
         """
         return int(np.floor(self.in_spans(distance) + tolerance))
+
+
+def kilometres(chainage: float) -> str:
+    """A chainage (m) as surveyors write it, such as 12+345.6 for 12,345.6 m."""
+    km, metres = divmod(round(chainage, 1), 1000)
+    return f"{km:.0f}+{metres:05.1f}"
 
 
 @inlined

@@ -38,7 +38,7 @@ def spans_table(found: Comparison) -> Table:
     """Figures span by span: record, run, and for the standard deviation how much they differ."""
     rows = [
         (
-            str(each.span),
+            found.run.alignment.span_name(each.span),
             f"{each.begin:,.6g}",
             *(number(value) for key in FIGURES for value in getattr(each, key)),
             _signed(deviation(each)),

@@ -123,6 +123,20 @@ class Span(Settings):
         return self
 
 
+class Mast(Settings):
+    """What a survey says of the mast at a support; no force depends on it."""
+
+    name: str = Field("", max_length=40, description="name or number on the mast")
+    chainage: Annotated[float, Between(-1e7, 1e7, "m")] | None = Field(None, description="surveyed (m)")
+    stagger: Annotated[float, Between(-1, 1, "m")] | None = Field(
+        None, description="of the contact wire from the middle of the track, to the right (m)"
+    )
+    radius: Annotated[float, Between(-1e5, 1e5, "m")] | None = Field(
+        None, description="of the track, positive to the right (m); none where it is straight"
+    )
+    cant: Annotated[float, Between(-0.3, 0.3, "m")] | None = Field(None, description="of the track (m)")
+
+
 class EndSupport(Settings):
     """Heights at the last support of a sequence of spans, where no span begins."""
 
