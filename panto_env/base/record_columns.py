@@ -70,8 +70,9 @@ def read_columns(
     other: as in ``places_of``. Raises InputError, naming line and column, for anything missing or not a
     number, and for more cells than headings, as where decimal commas stand between commas.
     """
-    (header, *body), separator = _lines(path, columns, headings)
-    places = places_of(path, header[1], columns, units, other, headings)
+    lines, separator = _lines(path, columns, headings)
+    header, body = lines[0][1], lines[1:]
+    places = places_of(path, header, columns, units, other, headings)
     if any(not (columns[name].blank or columns[name].text) for name in places):
         body = [row for row in body if any(map(str.strip, row[1]))]
     used = {place for name, (place, _) in places.items() if not columns[name].text}
@@ -79,28 +80,26 @@ def read_columns(
     decimal = "." if separator == "," or points else ","
     # An empty cell may come from a separator at the line's end, but not where a comma may be decimal.
     empty_ends = separator != "," or points
-    values = Read({name: [] for name in places})
+    values = Read((name, [""] * len(body) if columns[name].text else np.empty(len(body))) for name in places)
     values.lines = [number for number, _ in body]
-    for number, cells in body:
-        more = cells[len(header[1]) :]
+    for row, (number, cells) in enumerate(body):
+        more = cells[len(header) :]
         if any(map(str.strip, more)) or (more and not empty_ends):
             raise InputError(
-                f"Line {number} of {path} has {len(cells)} cells under {len(header[1])} headings; where "
-                "commas are decimal marks, put semicolons between cells, and otherwise correct such lines."
+                f"Line {number} of {path} has {len(cells)} cells under {len(header)} headings; where commas "
+                "are decimal marks, put semicolons between cells, and otherwise correct such lines."
             )
         for name, (place, scale) in places.items():
-            column, text = columns[name], cells[place].strip() if place < len(cells) else ""
-            if column.text:
-                values[name].append(text)
-            elif column.blank and not text:
-                values[name].append(np.nan)
-            elif column.chainage and "+" in text and (match := _CHAINAGE.fullmatch(text)):
+            text = cells[place].strip() if place < len(cells) else ""
+            if columns[name].text:
+                values[name][row] = text
+            elif columns[name].blank and not text:
+                values[name][row] = np.nan
+            elif columns[name].chainage and "+" in text and (match := _CHAINAGE.fullmatch(text)):
                 km, metres = (float(each.replace(",", ".")) for each in match.groups())
-                values[name].append(1e3 * km + metres)
+                values[name][row] = 1e3 * km + metres
             else:
-                values[name].append(scale * _number(text, decimal, path, number, name))
-    for name in places:
-        values[name] = values[name] if columns[name].text else np.array(values[name], dtype=float)
+                values[name][row] = scale * _number(text, decimal, path, number, name)
     return values
 
 

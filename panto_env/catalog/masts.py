@@ -69,10 +69,9 @@ def line_from_masts(
         raise InputError(f"'{base}' has a sequence of spans already; remove it, as the masts give another.")
     ignored: list[str] = []
     columns = read_columns(masts, COLUMNS, units, headings, other=ignored.append)
-    if any(ignored):
-        names = ", ".join(name for name in ignored if name)
-        warnings.warn(f"Columns of {masts} are ignored: {names}.", UnusualWarning, stacklevel=2)
     items, end = _spans(columns, masts)
+    if names := ", ".join(filter(None, ignored)):
+        warnings.warn(f"Columns of {masts} that are ignored: {names}.", UnusualWarning, stacklevel=2)
     known = table.get("span_types", {})
     for number, item in enumerate(items, start=1):
         if "type" in item and item["type"] not in known:
@@ -135,7 +134,10 @@ def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, float]]:
 def _lengths(columns: Read, masts: str | Path) -> list[float]:
     """Lengths of the spans between masts (m)."""
     if ("position" in columns) == ("span" in columns):
-        raise InputError(f"{masts} needs either a column position (m) or a column span (m), of each mast.")
+        raise InputError(
+            f"{masts} needs either a column position (m) or a column span (m), of each mast; if "
+            "it has one by another name, give --column position=HEADING."
+        )
     if "position" in columns:
         falls = columns["position"][-1:] < columns["position"][:1]
         lengths = _rounded(np.diff(columns["position"]) * (-1 if falls else 1))

@@ -34,8 +34,9 @@ def line(
     masts: Annotated[
         str | None,
         typer.Option(
-            help="CSV file with a row per mast: position or span (m); contact_height, messenger_height or "
-            "encumbrance (m); type, a name in span_types; mast, stagger, radius, cant. All else is the line's."
+            help="CSV file with a row per mast: position or span (m); mast, a name; contact_height, "
+            "messenger_height or encumbrance (m); type, a name in span_types; stagger, radius, cant. All "
+            "else is the line's."
         ),
     ] = None,
     unit: Unit = None,

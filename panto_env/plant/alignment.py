@@ -79,20 +79,22 @@ class Alignment:
         per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
         return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
 
-    def mast(self, support: int) -> str:
-        """Name of the mast at a support, or its chainage where it has none; "" where both are unknown."""
+    def mast(self, support: int, whole: bool = False) -> str:
+        """Name of the mast at a support, and where it has none, or ``whole``, its chainage, as 12+345.6."""
         name, chainage = self.masts[support] if 0 <= support < len(self.masts) else ("", None)
-        return name or ("" if chainage is None else kilometres(chainage))
+        if chainage is None or (name and not whole):
+            return name
+        km, metres = divmod(round(chainage, 1), 1000)
+        return f"{name}{', ' if name else ''}{km:.0f}+{metres:05.1f}"
 
-    def support_name(self, support: int) -> str:
-        """Number of a support, with the name and the chainage of its mast where they are known."""
-        name, chainage = self.masts[support] if 0 <= support < len(self.masts) else ("", None)
-        known = [name] * bool(name) + ([] if chainage is None else [kilometres(chainage)])
-        return f"{support} ({', '.join(known)})" if known else f"{support}"
+    def support_name(self, support: int, number: int | None = None) -> str:
+        """Number of a support, or another one, and in brackets what is known of its mast."""
+        mast = self.mast(support, whole=True)
+        return f"{support if number is None else number}{f' ({mast})' if mast else ''}"
 
     def span_name(self, span: int) -> str:
-        """Number of a span, with the name and the chainage of the mast where it begins."""
-        return self.support_name(span - 1).replace(f"{span - 1}", f"{span}", 1)
+        """Number of a span, and in brackets what is known of the mast where it begins."""
+        return self.support_name(span - 1, span)
 
     def same_spans(self, other: Alignment) -> bool:
         """Whether the spans that both have are alike."""
@@ -153,12 +155,6 @@ class Alignment:
         tolerance: what may be missing from the span (spans), for a distance that is a rounded sum of steps.
         """
         return int(np.floor(self.in_spans(distance) + tolerance))
-
-
-def kilometres(chainage: float) -> str:
-    """A chainage (m) as surveyors write it, such as 12+345.6 for 12,345.6 m."""
-    km, metres = divmod(round(chainage, 1), 1000)
-    return f"{km:.0f}+{metres:05.1f}"
 
 
 @inlined
