@@ -57,7 +57,7 @@ def deviation(pair: SpanPair) -> float:
 
 def _signed(value: float) -> str:
     """A difference with its sign, and never "-0.0"."""
-    return f"{round(value, 1) + 0.0:+.1f}"
+    return f"{value:+z.1f}"
 
 
 def shift_sentence(found: Comparison) -> str:

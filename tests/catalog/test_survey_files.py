@@ -65,7 +65,8 @@ def test_the_layout_names_spans_and_supports(tmp_path):
 
 READ = {
     "kilometres and metres": (
-        "Mast;Chainage;Encumbrance (m)\nM1;km 12+300.0;1.8\nM2;12+365.5;1.8\nM3;12+420.0;1.8\nM4;12+480;1.8\n",
+        "Mast;Chainage;Encumbrance (m)\n"
+        "M1;km 12+300.0;1.8\nM2;12+365.5;1.8\nM3;12+420.0;1.8\nM4;12+480;1.8\n",
         [65.5, 54.5, 60.0], [12300, 12365.5, 12420, 12480],
     ),
     "kilometres and metres with commas": (
