@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from panto_env.base.errors import InputError
+from panto_env.base.names import listed
 
 PACKAGES = ("torch", "stable_baselines3", "tensorboard")
 
@@ -14,6 +15,6 @@ def check_packages() -> None:
     missing = [name for name in PACKAGES if find_spec(name) is None]
     if missing:
         raise InputError(
-            f"Training needs {', '.join(missing)}, which is not installed; install panto-env with its "
+            f"Training needs {listed(missing)} not installed; install panto-env with its "
             "extra: pip install 'panto-env[agents]'."
         )

@@ -209,8 +209,8 @@ def print_table(table: Table) -> None:
 
 
 def number(value: float, digits: int = 1) -> str:
-    """A number for a table; a dash where it is not finite."""
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+    """A number for a table, with no sign where it is rounded to 0; a dash where it is not finite."""
+    return f"{value:z.{digits}f}" if math.isfinite(value) else "–"
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -125,12 +125,12 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
     return LineCheck(line, found, droppers, places, elasticities, force)
 
 
-def span_tables(spans: Sequence[SpanCheck]) -> list[Table]:
-    """Two tables to print: where the spans' supports stand, and the spans at rest."""
+def span_tables(spans: Sequence[SpanCheck], name: Callable[[int], str] = str) -> list[Table]:
+    """Two tables to print: where supports stand, and the spans at rest; name: of a span's number."""
     alike = "" if len(spans) > 1 else "; all spans are alike"
     placed = [
         (
-            str(each.number),
+            name(each.number),
             f"{each.begin:g}",
             f"{each.length:g}",
             f"{each.contact_height:+.3f}",
@@ -142,7 +142,7 @@ def span_tables(spans: Sequence[SpanCheck]) -> list[Table]:
     ]
     at_rest = [
         (
-            str(each.number),
+            name(each.number),
             f"{1e3 * each.pre_sag:.0f}",
             f"{each.smallest_force:.0f} to {each.largest_force:.0f}",
             *_yields(each),

@@ -64,7 +64,7 @@ def plot_line(found: LineCheck) -> Figure:
     wires.vlines(droppers, bottoms, tops_of_droppers, color="0.3", linewidth=0.8, label="dropper")
     for k, span in enumerate(spans):
         wires.annotate(
-            f"{k + 1}\n{span.span_length:.3g} m",
+            f"{line.alignment().mast(k) or k + 1}\n{span.span_length:.3g} m",
             ((supports[k] + supports[k + 1]) / 2, tops.max()),
             ha="center",
             va="top",

@@ -15,6 +15,12 @@ def suggest(name: str, known: Sequence[str]) -> str:
     return f"{hint(name, known)}known are {', '.join(known)}"
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names as a clause that says what they are: "A, which is", or "A, B and C, which are"."""
+    *others, last = names
+    return f"{', '.join(others)} and {last}, which are" if others else f"{last}, which is"
+
+
 def hint(name: str, known: Sequence[str]) -> str:
     """A question that names the nearest known names, or nothing if none is near."""
     near = near_names(name, known)

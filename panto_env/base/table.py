@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+_NOTHING = re.compile(r"(?<![\w.])[-−](?=0(?:\.0+)?(?![\w.]))")
+"""The sign of a number that was rounded to 0."""
 
 
 class Alarm(str):
@@ -22,8 +26,8 @@ class Table:
 
     @property
     def cells(self) -> list[tuple[str, ...]]:
-        """The rows as text."""
-        return [tuple(cell if isinstance(cell, str) else f"{cell:.4g}" for cell in row) for row in self.rows]
+        """The rows as text, in which no zero has a sign."""
+        return [tuple(map(_cell, row)) for row in self.rows]
 
     @property
     def markdown(self) -> str:
@@ -31,3 +35,8 @@ class Table:
         right = len(self.headings) - self.text_columns
         rule = (*["---"] * self.text_columns, *["---:"] * right)
         return "\n".join(f"| {' | '.join(row)} |" for row in (self.headings, rule, *self.cells))
+
+
+def _cell(value: str | float) -> str:
+    text = value if isinstance(value, str) else f"{value:.4g}"
+    return type(text)(_NOTHING.sub("", text)) if _NOTHING.search(text) else text

@@ -5,21 +5,26 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, UnusualWarning
 from ..base.files import read_toml
-from ..base.record_columns import LENGTHS, Column, read_columns
+from ..base.record_columns import LENGTHS, Column, Read, read_columns
+from ..plant.catenary.flexible.parts import EndSupport, Mast
+from ..plant.catenary.flexible.spans import valid
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHORTEST_SPAN
 from .loader import file_of
 
 HEIGHTS = LENGTHS | {"cm": 0.01}
 COLUMNS = {
-    "position": Column(("position", "x", "chainage"), {"m": 1.0, "km": 1e3}, "m", required=False, usual="m"),
+    "position": Column(
+        ("position", "x", "chainage"), HEIGHTS | {"km": 1e3}, "m", required=False, usual="m", chainage=True
+    ),
     "span": Column(("span", "spanlength"), {"m": 1.0}, "m", required=False, blank=True, usual="m"),
     "contact_height": Column(
         ("contactheight", "contactwireheight", "contactwire"), HEIGHTS, "m", required=False, usual="m"
@@ -29,6 +34,10 @@ COLUMNS = {
     ),
     "encumbrance": Column(("encumbrance", "systemheight"), HEIGHTS, "m", required=False, usual="m"),
     "type": Column(("type", "spantype"), {}, "text", required=False, text=True),
+    "mast": Column(("mast", "name", "mastname", "mastnumber", "mastno"), {}, "text", False, text=True),
+    "stagger": Column(("stagger", "zigzag"), HEIGHTS, "m", required=False, blank=True, usual="m"),
+    "radius": Column(("radius", "r"), {"m": 1.0, "km": 1e3}, "m", required=False, blank=True, usual="m"),
+    "cant": Column(("cant", "superelevation"), HEIGHTS, "m", required=False, blank=True, usual="m"),
 }
 """Columns of a table of masts, in the order of travel: a row per mast, with the span that begins there."""
 DIGITS = 6
@@ -36,11 +45,19 @@ DIGITS = 6
 Items = list[dict[str, Any]]
 
 
-def line_from_masts(base: str | Path, masts: str | Path) -> str:
+def line_from_masts(
+    base: str | Path,
+    masts: str | Path,
+    units: Mapping[str, str] | None = None,
+    headings: Mapping[str, str] | None = None,
+) -> str:
     """Text of the TOML file of a line with the spans between masts and all other values of ``base``.
 
-    base: name of the catalogue, or a TOML file, which may have span_types that the masts name. Raises
-    InputError, naming the mast, for a table that gives no line.
+    base: name of the catalogue, or a TOML file, which may have span_types that the masts name. units,
+    headings: as in ``read_columns``. Positions may fall, along a line that was surveyed against the travel.
+    Names of masts, chainages that do not begin at 0, stagger, radius and cant stand in ``masts``; other
+    columns are ignored with an UnusualWarning. Raises InputError, naming the mast and its line of the table,
+    for a table that gives no line.
     """
     path = file_of(base)
     table = read_toml(path)
@@ -50,21 +67,45 @@ def line_from_masts(base: str | Path, masts: str | Path) -> str:
         )
     if "sequence" in table:
         raise InputError(f"'{base}' has a sequence of spans already; remove it, as the masts give another.")
-    items, end = _spans(masts)
+    ignored: list[str] = []
+    columns = read_columns(masts, COLUMNS, units, headings, other=ignored.append)
+    items, end = _spans(columns, masts)
+    if names := ", ".join(filter(None, ignored)):
+        warnings.warn(f"Columns of {masts} that are ignored: {names}.", UnusualWarning, stacklevel=2)
     known = table.get("span_types", {})
     for number, item in enumerate(items, start=1):
         if "type" in item and item["type"] not in known:
             names = f"has only {', '.join(known)}" if known else "has none"
             raise InputError(
-                f"Mast {number} of {masts} begins a span of type '{item['type']}', but '{base}' {names} in "
-                f"span_types; add [span_types.{item['type']}] there, or leave the type out."
+                f"{_at(masts, columns, number)} begins a span of type '{item['type']}', but '{base}' {names} "
+                f"in span_types; add [span_types.{item['type']}] there, or leave the type out."
             )
-    return _with_sequence(path, table, items, end, Path(masts).name)
+    return _with_sequence(path, table, items, end, Path(masts).name, _surveyed(columns, masts))
 
 
-def _spans(masts: str | Path) -> tuple[Items, dict[str, float]]:
+def _at(masts: str | Path, columns: Read, number: int) -> str:
+    """A mast by its number, from 1, its name and its line in the table."""
+    name = columns["mast"][number - 1] if "mast" in columns else ""
+    return f"Mast {number} of {masts} (line {columns.lines[number - 1]}{f', {name}' if name else ''})"
+
+
+def _surveyed(columns: Read, masts: str | Path) -> Items:
+    """What else the table says of each mast; nothing where it says nothing of any."""
+    named: list[dict[str, Any]] = [{} for _ in columns.lines]
+    position = columns.get("position", np.zeros(1))
+    for key in ("mast", "position", "stagger", "radius", "cant"):
+        if key in columns and (key != "position" or position[0] != 0):
+            field = {"mast": "name", "position": "chainage"}.get(key, key)
+            for own, value in zip(named, columns[key], strict=True):
+                if key == "mast" or (np.isfinite(value) and (key != "radius" or value)):
+                    own[field] = value if key == "mast" else round(float(value), DIGITS) + 0.0
+    for number, own in enumerate(named, start=1):
+        valid(Mast, own, _at(masts, columns, number))
+    return named if any(named) else []
+
+
+def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, float]]:
     """A table for each span, and one of the heights at the last mast."""
-    columns = read_columns(masts, COLUMNS)
     lengths = _lengths(columns, masts)
     heights: dict[str, Sequence[float]] = {}
     if "contact_height" in columns:
@@ -81,6 +122,8 @@ def _spans(masts: str | Path) -> tuple[Items, dict[str, float]]:
         heights["encumbrance"] = _rounded(columns["encumbrance"])
     types = columns.get("type", [""] * (len(lengths) + 1))
     at = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
+    for number, own in enumerate(at, start=1):
+        valid(EndSupport, own, f"{_at(masts, columns, number)}, whose heights may have another unit")
     items = [
         ({"type": kind} if kind else {}) | {"span_length": length} | own
         for kind, length, own in zip(types, lengths, at, strict=False)
@@ -88,16 +131,20 @@ def _spans(masts: str | Path) -> tuple[Items, dict[str, float]]:
     return items, at[-1]
 
 
-def _lengths(columns: Mapping[str, Any], masts: str | Path) -> list[float]:
+def _lengths(columns: Read, masts: str | Path) -> list[float]:
     """Lengths of the spans between masts (m)."""
     if ("position" in columns) == ("span" in columns):
-        raise InputError(f"{masts} needs either a column position (m) or a column span (m), of each mast.")
+        raise InputError(
+            f"{masts} needs either a column position (m) or a column span (m), of each mast; if "
+            "it has one by another name, give --column position=HEADING."
+        )
     if "position" in columns:
-        lengths = _rounded(np.diff(columns["position"]))
+        falls = columns["position"][-1:] < columns["position"][:1]
+        lengths = _rounded(np.diff(columns["position"]) * (-1 if falls else 1))
         for number, length in enumerate(lengths, start=2):
             if length <= 0:
                 raise InputError(
-                    f"Mast {number} of {masts} stands no farther than the one before; sort them."
+                    f"{_at(masts, columns, number)} stands no farther than the one before; sort them."
                 )
     else:
         lengths = _rounded(columns["span"][:-1])
@@ -108,7 +155,9 @@ def _lengths(columns: Mapping[str, Any], masts: str | Path) -> list[float]:
             )
         for number, length in enumerate(lengths, start=1):
             if not length > 0:
-                raise InputError(f"Mast {number} of {masts} has no span; give its length, or use positions.")
+                raise InputError(
+                    f"{_at(masts, columns, number)} has no span; give its length, or use positions."
+                )
     if not FEWEST_SPANS <= len(lengths) <= MOST_SPANS:
         raise InputError(
             f"{masts} has {len(lengths)} spans between its masts; a line has from {FEWEST_SPANS} to "
@@ -117,7 +166,7 @@ def _lengths(columns: Mapping[str, Any], masts: str | Path) -> list[float]:
     for number, length in enumerate(lengths, start=1):
         if not SHORTEST_SPAN <= length <= LONGEST_SPAN:
             raise InputError(
-                f"Mast {number} of {masts} begins a span of {length:g} m; a span has from "
+                f"{_at(masts, columns, number)} begins a span of {length:g} m; a span has from "
                 f"{SHORTEST_SPAN:g} to {LONGEST_SPAN:g} m, so check the unit in the heading."
             )
     return lengths
@@ -128,7 +177,7 @@ def _rounded(values: Any) -> list[float]:
 
 
 def _with_sequence(
-    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, float], source: str
+    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, float], source: str, named: Items
 ) -> str:
     """The text of a line's TOML file with a sequence before its tables, in the place of ``spans``."""
     text = path.read_text(encoding="utf-8-sig")
@@ -139,10 +188,13 @@ def _with_sequence(
     given = f"sequence = {{ value = [\n{spans}], source = {json.dumps(source)} }}\n"
     if end:
         given += f"end_support = {_inline(end)}\n"
+    if named:
+        given += f"masts = [\n{''.join(f'    {_inline(each)},{chr(10)}' for each in named)}]\n"
     comment = f"# Spans between the masts of {json.dumps(source)}, in the order of travel."
     made = f"{plain.rstrip()}\n\n{comment}\n{given}\n{text[place:]}"
     expected = {key: value for key, value in table.items() if key != "spans"}
     expected |= {"sequence": {"value": items, "source": source}} | ({"end_support": dict(end)} if end else {})
+    expected |= {"masts": named} if named else {}
     try:
         usable = tomllib.loads(made) == expected
     except tomllib.TOMLDecodeError:

@@ -63,7 +63,7 @@ def remarks(entry: Any, usual: Ranges) -> list[str]:
 
 def _hogging(line: FlexibleCatenaryData) -> Iterator[str]:
     """A sentence where the contact wire stands above its supports, or above the outer droppers."""
-    each = spans_of(line, 1).each
+    each, name = spans_of(line, 1).each, line.alignment().span_name
     for number, span in enumerate(each, start=1):
         sag = span.droppers.sag
         outer = min(sag[0], sag[-1])
@@ -71,7 +71,7 @@ def _hogging(line: FlexibleCatenaryData) -> Iterator[str]:
         if above > HOG:
             yield (
                 f"Line '{line.name}': the contact wire stands {1e3 * above:.3g} mm higher within "
-                f"{f'span {number}' if line.sequence else 'the span'} than {than}; droppers.sag counts "
+                f"{f'span {name(number)}' if line.sequence else 'the span'} than {than}; droppers.sag counts "
                 "downwards, so a pre-sag is positive: change its sign, unless the wire is to hog."
             )
             return
@@ -100,5 +100,6 @@ def _values(entry: Any) -> Iterator[tuple[str, str, Any, str]]:
             yield key, "", given, meaning
     if sequence:
         for number, span in enumerate(spans_of(entry).each, start=1):
+            where = f" in span {entry.alignment().span_name(number)}"
             for key, given, meaning, _ in leaves(span):
-                yield key, f" in span {number}", given, meaning
+                yield key, where, given, meaning

@@ -20,8 +20,7 @@ from ..terminal import (
     progress_console,
     written_last,
 )
-from .identify import pairs
-from .record import Filtered, Mass, Page, Unit
+from .record import Filtered, Heading, Mass, Page, Unit, reading
 
 if TYPE_CHECKING:
     from ..records.compare import Comparison
@@ -43,6 +42,7 @@ def compare(
     mass: Mass = None,
     filtered: Filtered = None,
     unit: Unit = None,
+    column: Heading = None,
     plot: Plot = None,
     html: Page = None,
     json: Json = False,
@@ -58,7 +58,7 @@ def compare(
 
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
-        measured = read_record(file, pairs(unit or []), mass_correction=mass, filtered=filtered)
+        measured = read_record(file, **reading(unit, column, mass, filtered))
         found = hold(measured, simulated, shift=shift)
     title = f"{file.name} and {run.name}: {simulated.pantograph} on {simulated.catenary}"
     title += f" at {simulated.speed_kmh:g} km/h"

@@ -11,8 +11,7 @@ import typer
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
-from .identify import pairs
-from .record import Filtered, Mass, Unit
+from .record import Filtered, Heading, Mass, Unit, reading
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -61,6 +60,7 @@ def diagnose(
     mass: Mass = None,
     filtered: Filtered = None,
     unit: Unit = None,
+    column: Heading = None,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
@@ -86,9 +86,10 @@ def diagnose(
             "With --fit, the pantograph is the fit's and further records are given with --again; leave out "
             "--pantograph and further arguments."
         )
-    if fit is None and (mass is not None or filtered is not None or unit):
+    if fit is None and (mass is not None or filtered is not None or unit or column):
         raise InputError(
-            "--mass, --filtered and --unit are of records, which are diagnosed with --fit; leave them out."
+            "--mass, --filtered, --unit and --column are of records, which are diagnosed with --fit; leave "
+            "them out."
         )
     rate = FALSE_ALARMS if false_alarms is None else false_alarms
     if not LEAST_FALSE_ALARMS <= rate <= MOST_FALSE_ALARMS:
@@ -101,8 +102,7 @@ def diagnose(
     with progress_console.status("reading and diagnosing"):
         files = (run, *(again or []))
         if fit is not None:
-            given = {"units": pairs(unit or []), "mass_correction": mass, "filtered": filtered}
-            title, found = _of_records(files, fit, given, rate, seed)
+            title, found = _of_records(files, fit, reading(unit, column, mass, filtered), rate, seed)
         else:
             title, found = _of_runs(files, (*(healthy or ()), *(more or ())), pantograph, rate, seed)
     with written_last() as later:
@@ -144,7 +144,7 @@ def _of_runs(
 def _of_records(
     files: Sequence[Path], fit: Path, given: dict[str, Any], rate: float, seed: int
 ) -> tuple[str, Diagnosis]:
-    """Title and diagnosis of a measuring train's records."""
+    """Title and diagnosis of a measuring train's records; given: arguments of ``read_record``."""
     from ..diagnosis import diagnose_records
     from ..fitting.stored import stored
     from ..records.record_file import read_record

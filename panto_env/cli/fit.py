@@ -21,7 +21,7 @@ from ..terminal import (
     written_last,
 )
 from .identify import pairs
-from .record import Filtered, Mass, Unit
+from .record import Filtered, Heading, Mass, Unit, reading
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
@@ -52,6 +52,7 @@ def fit(
     mass: Mass = None,
     filtered: Filtered = None,
     unit: Unit = None,
+    column: Heading = None,
     output: Annotated[
         str | None,
         typer.Option(help="Write the fitted line to this file (.toml).", callback=writable((".toml",))),
@@ -93,8 +94,8 @@ def fit(
 
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
     tolerances = by_kind(tolerance or [])
-    given = {"mass_correction": mass, "filtered": filtered}
-    records = [read_record(file, pairs(unit or []), **given) for file in files]
+    given = reading(unit, column, mass, filtered)
+    records = [read_record(file, **given) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
     if output is not None:
         check_design(design, line, names)

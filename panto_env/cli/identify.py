@@ -135,6 +135,14 @@ def pairs(texts: list[str]) -> dict[str, str]:
     return pairs
 
 
+def columns_named(texts: list[str] | None) -> dict[str, str]:
+    """Headings by column from "force=F [N]" each. Raises InputError for anything else."""
+    found = dict(text.partition("=")[::2] for text in texts or [])
+    if not all(name and heading for name, heading in found.items()):
+        raise InputError("--column must read NAME=HEADING, such as force_1=F_zw1.")
+    return {name.strip(): heading for name, heading in found.items()}
+
+
 def _value(name: str, text: str) -> float:
     try:
         return float(text)

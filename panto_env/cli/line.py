@@ -20,6 +20,8 @@ from ..plant.catenary.flexible.dropper_table import dropper_table
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
+from .identify import columns_named, pairs
+from .record import Heading, Unit
 
 FORCE = 100.0
 
@@ -35,10 +37,13 @@ def line(
     masts: Annotated[
         str | None,
         typer.Option(
-            help="CSV file with a row per mast: position or span (m); contact_height, messenger_height or "
-            "encumbrance (m); type, a name in span_types. Wires, droppers and supports are the line's."
+            help="CSV file with a row per mast: position or span (m); mast, a name; contact_height, "
+            "messenger_height or encumbrance (m); type, a name in span_types; stagger, radius, cant. All "
+            "else is the line's."
         ),
     ] = None,
+    unit: Unit = None,
+    column: Heading = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed with which a line is drawn.")] = 0,
     speed: Annotated[
         float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
@@ -65,7 +70,7 @@ def line(
 
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
-    chosen, text = _line(name, seed, masts, output)
+    chosen, text = _line(name, seed, masts, output, (pairs(unit or []), columns_named(column)))
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
@@ -93,8 +98,8 @@ def line(
                 }
             )
         else:
-            other = as_run_tables(chosen, run)
-            for table in (*span_tables(found.spans), dropper_table(found.droppers), *other):
+            other, named = as_run_tables(chosen, run), chosen.alignment().span_name
+            for table in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
                 print_table(table)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:
@@ -111,16 +116,22 @@ def line(
         raise typer.Exit(1)
 
 
-def _line(name: str, seed: int, masts: str | None, output: str | None) -> tuple[Any, str | None]:
-    """The line, and the text of its TOML file where it is made from masts."""
+def _line(
+    name: str, seed: int, masts: str | None, output: str | None, given: tuple[dict[str, str], dict[str, str]]
+) -> tuple[Any, str | None]:
+    """The line, and the text of its TOML file where it is made from masts.
+
+    given: units and headings of the masts' columns.
+    """
     if masts is None and drawn_kind(name):
         return line_of_seed(load_drawn(name), seed)[0], None
     if masts is None:
         return load_catenary(name), None
     from ..catalog.masts import line_from_masts
 
-    text = line_from_masts(name, masts)
-    return parse_catenary(tomllib.loads(text), Path(output or f"{Path(masts).stem}.toml")), text
+    text = line_from_masts(name, masts, *given)
+    named = {"name": Path(output or masts).stem}
+    return parse_catenary(named | tomllib.loads(text), Path(masts)), text
 
 
 def _write(text: str, path: str) -> None:

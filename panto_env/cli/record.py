@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,7 +21,7 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import pairs
+from .identify import columns_named, pairs
 
 if TYPE_CHECKING:
     from ..records.judge import Judgement
@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 Unit = Annotated[
     list[str] | None,
     typer.Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+]
+Heading = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."
+    ),
 ]
 Mass = Annotated[
     float | None,
@@ -45,10 +51,19 @@ Filtered = Annotated[
         show_default="whether the force looks low-passed at 20 Hz",
     ),
 ]
+
 Page = Annotated[
     str | None,
     typer.Option(help="Write a page with tables and charts to this file (.html).", callback=writable(PAGES)),
 ]
+
+
+def reading(
+    unit: list[str] | None, column: list[str] | None, mass: float | None, filtered: float | None
+) -> dict[str, Any]:
+    """Arguments of ``read_record`` from a command's options."""
+    given = {"units": pairs(unit or []), "headings": columns_named(column)}
+    return {**given, "mass_correction": mass, "filtered": filtered}
 
 
 def record(
@@ -80,6 +95,7 @@ def record(
     mass: Mass = None,
     filtered: Filtered = None,
     unit: Unit = None,
+    column: Heading = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -104,7 +120,7 @@ def record(
 
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
-        measured = read_record(file, pairs(unit or []), mass_correction=mass, filtered=filtered)
+        measured = read_record(file, **reading(unit, column, mass, filtered))
         found = judge(measured, known, span=span, section=section)
     title = f"{file.name}: {found.whole.figures.distance:,.0f} m"
     with written_last() as later:

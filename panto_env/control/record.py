@@ -151,10 +151,8 @@ def ending(task: TaskState, lane: int) -> str:
     steps, line = plant.of(lane, Row.STEP), plant.catenary
     why = reason(which, line.free_uplift) + (f": {_bound(task, lane)}" if which is Ending.DIVERGED else "")
     time, position = steps * plant.time_step, float(plant.position(lane, steps)[0])
-    return (
-        f"The run ended early at {position:.1f} m (span {plant.alignment.span_of(position)}, "
-        f"{time:.2f} s): {why}."
-    )
+    span = plant.alignment.span_name(plant.alignment.span_of(position))
+    return f"The run ended early at {position:.1f} m (span {span}, {time:.2f} s): {why}."
 
 
 def _ending(task: TaskState, lane: int) -> Ending:

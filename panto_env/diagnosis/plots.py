@@ -38,7 +38,7 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
         for finding in diagnosis.findings:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
-        words = f"{finding.kind}, span {finding.span}, {place(finding)}"
+        words = f"{finding.kind}, span {evidence.alignment.span_name(finding.span)}, {place(finding)}"
         above = force.get_xaxis_transform()
         force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
     score.set(ylabel="score (-)", xlabel=marks.POSITION, xlim=(diagnosis.begin, diagnosis.end))

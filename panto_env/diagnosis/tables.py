@@ -26,7 +26,7 @@ def findings_table(diagnosis: Diagnosis) -> Table:
                 f"{100 * finding.shares[finding.kind]:.0f}",
                 f"{second} ({100 * finding.shares[second]:.0f})",
                 place(finding),
-                f"{finding.span}",
+                diagnosis.evidence.alignment.span_name(finding.span),
                 f"{finding.offset:.1f}",
                 f"{finding.position:.0f}",
                 f"{finding.score:.1f}",

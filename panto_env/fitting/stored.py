@@ -5,18 +5,52 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
 
 from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
 from ..base.errors import InputError
+from ..base.explanation import explain
+from ..base.ranges import Between
+from ..base.settings import Settings
 from .doubts import doubts
 from .fit import Fit
 from .measured import BANDS
-from .values import WAVES, Value
+from .values import FREE, WAVES, Value
 
 ARRAYS = ("difference", "covariance", "noise")
+FARTHEST = 1e3
+"""Maximum difference of a value, in tolerances."""
+SUREST = 1e-14
+"""Minimum eigenvalue of the covariance in units of the tolerances; without records all are 1."""
+Place = Annotated[float, Between(-1e7, 1e7, "m")]
+
+
+class _Value(Settings):
+    """A ``Value`` in a file."""
+
+    kind: Literal[FREE]  # type: ignore[valid-type]
+    name: str
+    unit: str
+    scale: Annotated[float, Between(1e-3, 1e6)]
+    tolerance: Annotated[float, Between(1e-9, 1e3)]
+    place: Place | None
+    index: tuple[int | str, ...] = Field(min_length=1, max_length=2)
+
+
+class _Table(Settings):
+    """What a file holds beside its arrays."""
+
+    name: str
+    line: str
+    pantograph: str
+    values: tuple[_Value, ...] = Field(min_length=1)
+    compared: tuple[Place, Place]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,25 +108,42 @@ def store(known: Stored, path: str | Path) -> None:
 def stored(path: str | Path) -> Stored:
     """What a fit knew. Raises InputError for a file that `panto fit` did not write."""
     try:
-        table, arrays = read_arrays(path)
-        values = tuple(Value(**each | {"index": tuple(each["index"])}) for each in table["values"])
-        found = Stored(
-            name=table["name"],
-            line=table["line"],
-            pantograph=table["pantograph"],
-            values=values,
-            compared=_pair(table["compared"]),
-            **{name: arrays[name] for name in ARRAYS},
-            notes=tuple(table["notes"]),
-        )
+        given, arrays = read_arrays(path)
+        table = _Table.model_validate(given)
+        _check(table.values, arrays)
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} does not hold a fit; give a file that `panto fit --keep` wrote.") from error
-    shapes = found.difference.shape, found.covariance.shape, found.noise.shape
-    if shapes != ((len(values),), (len(values), len(values)), (BANDS,)):
-        raise InputError(f"{path} does not hold a whole fit; write it anew with `panto fit --keep`.")
-    return found
+    except ValueError as error:  # pydantic's among them
+        reason = explain(error, _Table) if isinstance(error, ValidationError) else error
+        raise InputError(
+            f"{path} does not hold a whole fit: {reason}; give a file that `panto fit --keep` wrote."
+        ) from error
+    values = tuple(Value(**dict(value)) for value in table.values)
+    found: dict[str, Any] = dict(table) | arrays | {"values": values}
+    return Stored(**found)
+
+
+def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
+    """Raise ValueError, with a clause, for arrays that are not those of a fit of these values."""
+    count, tolerances = len(values), np.array([value.tolerance for value in values])
+    if len({value.name for value in values}) < count:
+        raise ValueError("two values have one name")
+    if set(arrays) != set(ARRAYS):
+        raise ValueError(f"its arrays are not {', '.join(ARRAYS)}")
+    for name, shape in (("difference", (count,)), ("covariance", (count, count)), ("noise", (BANDS,))):
+        array = arrays[name]
+        if array.shape != shape or array.dtype != np.float64:
+            raise ValueError(f"its {name} is not an array of numbers of shape {shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"its {name} holds numbers that are not finite")
+    if (np.abs(arrays["difference"]) > FARTHEST * tolerances).any() or (arrays["noise"] < 0).any():
+        raise ValueError("a difference is beyond all tolerances, or a noise is negative")
+    relative = arrays["covariance"] / np.outer(tolerances, tolerances)
+    if not np.allclose(relative, relative.T, rtol=0.0, atol=1e-6) or np.abs(relative).max() > 2:
+        raise ValueError("its covariance is not symmetric, or wider than its tolerances")
+    eigenvalues = np.linalg.eigvalsh(relative)
+    if not SUREST < eigenvalues[0] <= eigenvalues[-1] < 1.001:
+        raise ValueError("its covariance is not positive, or wider than its tolerances")
 
 
 def along(value: Value, before: float) -> Value:
@@ -112,8 +163,3 @@ def turned(values: Sequence[Value], further: float) -> Array:
             cosine, sine = np.cos(angle), np.sin(angle)
             turn[k : k + 2, k : k + 2] = [[cosine, sine], [-sine, cosine]]
     return turn
-
-
-def _pair(numbers: Sequence[float]) -> tuple[float, float]:
-    begin, end = numbers
-    return float(begin), float(end)

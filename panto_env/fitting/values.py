@@ -155,10 +155,11 @@ class Values:
         return [self._value("tensions", name, "%", 100.0, None, k) for k, name in enumerate(names)]
 
     def _droppers(self, stretch: tuple[float, float]) -> list[Value]:
-        spans = self.design.catenary.alignment(self.design.spans).span_of(self.design.droppers)
+        alignment = self.design.catenary.alignment(self.design.spans)
+        spans = alignment.span_of(self.design.droppers)
         numbers = np.arange(len(spans)) - np.searchsorted(spans, spans) + 1  # in each one's span
         rows = zip(numbers.tolist(), (spans + self.design.first_span).tolist(), strict=True)
-        names = [f"dropper {number} of span {span}" for number, span in rows]
+        names = [f"dropper {number} of span {alignment.span_name(span)}" for number, span in rows]
         return [
             self._value("droppers", names[k], "mm", 1e3, float(x), k)
             for k, x in enumerate(self.design.droppers)
@@ -166,8 +167,9 @@ class Values:
         ]
 
     def _supports(self, stretch: tuple[float, float]) -> list[Value]:
+        name = self.design.catenary.alignment().support_name
         return [
-            self._value("supports", f"support {k + 1 + self.design.first_span}", "mm", 1e3, float(x), k)
+            self._value("supports", f"support {name(k + 1 + self.design.first_span)}", "mm", 1e3, float(x), k)
             for k, x in enumerate(self.design.supports)
             if stretch[0] < x < stretch[1]
         ]

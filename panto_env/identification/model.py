@@ -78,7 +78,7 @@ def check_known(known: Parameters) -> dict[str, float]:
     missing = [name for name in MEASURED if name not in known]
     if missing:
         raise InputError(
-            f"Measured parameter {' and '.join(missing)} is missing; give k1T (N/m), m2 (kg) and k2 (N/m), "
+            f"No measured value of {' and '.join(missing)} is given; give k1T (N/m), m2 (kg) and k2 (N/m), "
             "as --measured k1T=32992 m2=5 k2=14544."
         )
     if set(known) >= set(IDENTIFIED):

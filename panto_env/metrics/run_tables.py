@@ -103,9 +103,10 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
             unknown = dict.fromkeys(("number", *AT_REST))
             known = at_rest.get((moving.span, round(moving.position, 5)), unknown)
             own = moving._asdict()
+            masts = _masts(run, moving.span or 0)
             if moving.span is None:
                 del own["span"]
-            rows.append(of_run | known | own)
+            rows.append(of_run | masts | known | own)
     if not rows:
         raise InputError("No forces in droppers are recorded, so there is no table of them.")
     return Sheet.of_rows("droppers", rows, {"speed_kmh": HEADINGS["speed_kmh"], **AT_REST, **MOVING})
@@ -114,7 +115,7 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
 def of_spans(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     """Figures span by span. Raises InputError as ``Trajectory.summary`` does."""
     rows = [
-        of_run | each._asdict()
+        of_run | _masts(own, each.span) | each._asdict()
         for own, covered, of_run in _each([run], spans)
         for each in by_span(own, covered)
     ]
@@ -205,6 +206,13 @@ def _each(
             yield own, covered, cells | {"spans": in_words(own.spans(covered))}
 
 
+def _masts(run: Trajectory, span: int) -> dict[str, Any]:
+    """Name and chainage (m) of the mast where a span begins, where the line names its masts."""
+    masts = run.alignment.masts
+    name, chainage = masts[span - 1] if 0 < span <= len(masts) else ("", None)
+    return {"mast": name, "chainage": chainage} if masts else {}
+
+
 def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dict[str, Any]:
     """A row; criterion: that of the figure, if it has one."""
     limits = ("lowest", "highest", "margin", "verdict", "source", "note")
@@ -226,8 +234,9 @@ def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dic
 
 
 def _at_rest(design: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Droppers at rest of the line of a run, which older files do not hold."""
-    if "catenary" not in design:
+    """Droppers at rest of the line of a run, which files of other versions may not hold as this one does."""
+    try:
+        line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
+        return as_rows(droppers_at_rest(line))
+    except (KeyError, TypeError, ValueError):
         return []
-    line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
-    return as_rows(droppers_at_rest(line))

@@ -29,6 +29,7 @@ from .en50367 import SLOW
 from .figures import Figures, arcing, contact_loss, cost_function
 from .low_pass import low_pass
 from .spans import SpanChoice, chosen_spans
+from .stored_run import check_stored
 
 FORMAT = 3
 OF_FOLLOWERS = (
@@ -347,7 +348,8 @@ class Trajectory:
             for name in _facts()
         }
         facts["line"] = vars(self.line)
-        facts["alignment"] = self.alignment.supports, self.alignment.pitch
+        masts = [self.alignment.masts] * bool(self.alignment.masts)
+        facts["alignment"] = self.alignment.supports, self.alignment.pitch, *masts
         facts["followers"] = [
             {name: getattr(follower, name) for name in OF_FOLLOWERS} for follower in self.followers
         ]
@@ -373,11 +375,12 @@ class Trajectory:
             facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
             if facts.pop("format") != FORMAT:
                 raise ValueError("it has another format")
+            check_stored(facts, columns)
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
             facts["line"] = LineFacts(**facts["line"])
-            supports, pitch = facts["alignment"]
-            facts["alignment"] = Alignment(tuple(supports), pitch)
+            supports, pitch, *masts = facts["alignment"]
+            facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
             series = {name: columns[name] for name in SERIES}
             for name, places in (
                 ("uplift", "support_position"),

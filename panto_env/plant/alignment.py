@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -38,6 +38,8 @@ class Alignment:
 
     supports: tuple[float, ...]  # (spans + 1,): positions (m), rising from 0
     pitch: float | None = None  # length of a span (m) where all have the same
+    # Name and chainage (m), "" and None where unknown, of the masts at the first supports
+    masts: tuple[tuple[str, float | None], ...] = field(default=(), compare=False)
 
     @classmethod
     def of_spans(cls, lengths: Sequence[float]) -> Self:
@@ -76,6 +78,23 @@ class Alignment:
         """The alignment as arrays, for kernels."""
         per_metre = 0.0 if self.pitch is None else 1.0 / self.pitch
         return AlignmentArrays(np.array(self.supports), per_metre, self.mean_length)
+
+    def mast(self, support: int, whole: bool = False) -> str:
+        """Name of the mast at a support, and where it has none, or ``whole``, its chainage, as 12+345.6."""
+        name, chainage = self.masts[support] if 0 <= support < len(self.masts) else ("", None)
+        if chainage is None or (name and not whole):
+            return name
+        km, metres = divmod(round(chainage, 1), 1000)
+        return f"{name}{', ' if name else ''}{km:.0f}+{metres:05.1f}"
+
+    def support_name(self, support: int, number: int | None = None) -> str:
+        """Number of a support, or another one, and in brackets what is known of its mast."""
+        mast = self.mast(support, whole=True)
+        return f"{support if number is None else number}{f' ({mast})' if mast else ''}"
+
+    def span_name(self, span: int) -> str:
+        """Number of a span, and in brackets what is known of the mast where it begins."""
+        return self.support_name(span - 1, span)
 
     def same_spans(self, other: Alignment) -> bool:
         """Whether the spans that both have are alike."""

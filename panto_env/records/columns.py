@@ -34,7 +34,7 @@ def _optional(
 
 COLUMNS: dict[str, Column] = {
     "time": Column(TIME.spellings, TIME.units, "s", required=False),
-    "position": Column(("position", "pos", "chainage", "x"), WAYS, "m", required=False),
+    "position": Column(("position", "pos", "chainage", "x"), WAYS, "m", required=False, chainage=True),
     "speed": Column(("speed", "v"), SPEEDS, "km/h", required=False),
     "force": _optional(("force", "contactforce", "f"), FORCES, "N"),
     **{f"force_{k}": _optional((f"force{k}", f"f{k}"), FORCES, "N") for k in NUMBERS},
@@ -48,7 +48,9 @@ COLUMNS: dict[str, Column] = {
 """Columns that a record may have; those of strips are numbered from 1."""
 
 
-def read(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
+def read(
+    path: str | Path, units: Mapping[str, str] | None, headings: Mapping[str, str] | None = None
+) -> dict[str, Any]:
     """Columns of a record by name, (n,) each, in SI units; ``run`` a list of texts. Empty cells are nan.
 
     units: of columns whose heading has none. Raises InputError for a file that cannot be read, for a saved
@@ -56,9 +58,9 @@ def read(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
     number, and for units and rows as ``read_columns`` does.
     """
     found = (
-        _parquet(path, units)
+        _parquet(path, units, headings)
         if Path(path).suffix.lower() == ".parquet"
-        else read_columns(path, COLUMNS, units, other=partial(_refuse_sensor, path))
+        else read_columns(path, COLUMNS, units, headings, other=partial(_refuse_sensor, path))
     )
     if not found:
         raise InputError(
@@ -85,7 +87,9 @@ def _refuse_sensor(path: str | Path, heading: str) -> None:
     )
 
 
-def _parquet(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any]:
+def _parquet(
+    path: str | Path, units: Mapping[str, str] | None, headings: Mapping[str, str] | None
+) -> dict[str, Any]:
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 
@@ -102,7 +106,8 @@ def _parquet(path: str | Path, units: Mapping[str, str] | None) -> dict[str, Any
             "run, or write the run as .csv to judge it like a record."
         )
     values: dict[str, Any] = {}
-    places = places_of(path, table.column_names, COLUMNS, units, partial(_refuse_sensor, path))
+    refuse = partial(_refuse_sensor, path)
+    places = places_of(path, table.column_names, COLUMNS, units, refuse, headings)
     for name, (place, scale) in places.items():
         values[name] = _cells(path, name, table.column(place), scale)
     return values

@@ -35,7 +35,7 @@ def spans_table(found: Comparison) -> Table:
     """Figures span by span: record, run, and for the standard deviation how much they differ."""
     rows = [
         (
-            str(each.span),
+            found.run.alignment.span_name(each.span),
             f"{each.begin:,.6g}",
             *(number(value) for key in FIGURES for value in getattr(each, key)),
             _signed(deviation(each)),
@@ -54,7 +54,7 @@ def deviation(pair: SpanPair) -> float:
 
 def _signed(value: float) -> str:
     """A difference with its sign, and never "-0.0"."""
-    return f"{round(value, 1) + 0.0:+.1f}"
+    return f"{value:+z.1f}"
 
 
 def shift_sentence(found: Comparison) -> str:

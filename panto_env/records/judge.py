@@ -160,7 +160,7 @@ def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -
         begin, end = alignment.limits((int(number), int(number)))
         if begin < reach[0] - 1e-6 or end > reach[1] + 1e-6:
             continue
-        words = f"{number}: {begin:,.6g} to {end:,.6g} m"
+        words = f"{alignment.span_name(int(number))}: {begin:,.6g} to {end:,.6g} m"
         if samples.way(numbers == number) >= COVERED * (end - begin):
             found.append(_part(samples, "span", words, numbers == number))
     return found

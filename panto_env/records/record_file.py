@@ -31,13 +31,14 @@ LONGEST = 2.0
 def read_record(
     path: str | Path,
     units: Mapping[str, str] | None = None,
+    headings: Mapping[str, str] | None = None,
     *,
     mass_correction: float | None = None,
     filtered: float | None = None,
 ) -> Record:
     """Read a record: two of time, position and speed, and a contact force; the columns are ``COLUMNS``.
 
-    units: of columns whose heading has none, or another one; mass_correction: mass between force sensors and
+    units, headings: by column, as in ``read_columns``; mass_correction: mass between force sensors and
     contact (kg), for ``mass_correction.contact_force``. filtered: cut-off (Hz) of a low-pass that is known to
     be in the force. CSV is read as ``read_columns`` does; Parquet has the same headings. Empty forces are
     gaps. What a record is cut by, and what is left out, is in its notes.
@@ -45,7 +46,7 @@ def read_record(
     Raises InputError for what cannot be read, for a record that cannot be a measuring train's, with the
     likely mistake, and for one that is too short or too slowly sampled to be judged.
     """
-    values = columns.read(path, units)
+    values = columns.read(path, units, headings)
     try:
         found = _record(Path(path).name, values, mass_correction)
         return replace(found, pieces=tuple(replace(piece, filtered=filtered) for piece in found.pieces))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from ..base.errors import InputError
+from ..base.names import listed
 
 IN_WORDS = {"cv2": "OpenCV", "pygame": "pygame", "imageio_ffmpeg": "imageio-ffmpeg"}
 
@@ -14,6 +15,6 @@ def check_packages(*names: str) -> None:
     missing = [IN_WORDS[name] for name in names if find_spec(name) is None]
     if missing:
         raise InputError(
-            f"Pictures and films need {' and '.join(missing)}, not installed; install panto-env with its "
+            f"Pictures and films need {listed(missing)} not installed; install panto-env with its "
             "extra: pip install 'panto-env[render]'."
         )

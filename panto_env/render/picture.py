@@ -285,7 +285,7 @@ def _rows(moment: Moment) -> dict[str, str]:
     """Numbers to the right of the chart, by name."""
     place = f"{moment.position:.0f} m"
     if moment.position >= 0:
-        place += f", span {moment.alignment.span_of(moment.position)}"
+        place += f", span {moment.alignment.span_name(moment.alignment.span_of(moment.position))}"
     force = f"{moment.filtered[-1]:.0f} N" if moment.filtered.size else "–"
     return {
         "speed": f"{to_kmh(moment.speed):.0f} km/h",

@@ -66,11 +66,12 @@ class Strip:
             yield Text("  ".join(map(_rider_in_words, range(1, len(self._riders) + 1), self._riders)))
 
     def _in_words(self) -> str:
+        name = self._alignment.span_name
         where, force = f"{self._time:.2f} s  {self._position:.0f} m", self._felt.filtered
         if not force.size:
             return where
         return (
-            f"{where}, span {self._alignment.span_of(self._felt.places[-1])}  force {force[-1]:.0f} N  "
+            f"{where}, span {name(self._alignment.span_of(self._felt.places[-1]))}  force {force[-1]:.0f} N  "
             f"shown part: mean {force.mean():.0f} N, σ {force.std():.0f} N"
         )
 

@@ -146,7 +146,10 @@ def uplifts(names: Mapping[Findings, str]) -> str:
             width = 0.8 / len(names)
             at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
             axes.bar(at, heights, width, color=series_colour(k), label=names[one])
+        name, turned = next(iter(names)).run.alignment.mast, 90 if len(supports) > 8 else 0
         axes.set(xlabel="support", ylabel="maximum uplift (mm)", xticks=supports)
+        if any(map(name, supports)):
+            axes.set_xticklabels([name(each) for each in supports], rotation=turned)
         legend_above(axes, 4)
 
     return drawn(draw, 2.6)

@@ -96,12 +96,12 @@ class Findings:
     @cached_property
     def line(self) -> Any:
         """Data of the line. Raises InputError where the file does not hold them."""
-        return CATENARIES[self._design("catenary")["kind"]].schema.model_validate(self._design("catenary"))
+        return self._designed("catenary")
 
     @cached_property
     def pantograph(self) -> PantographData:
         """Data of the pantograph. Raises InputError where the file does not hold them."""
-        return PantographData.model_validate(self._design("pantograph"))
+        return self._designed("pantograph")  # type: ignore[no-any-return]
 
     @cached_property
     def remarks(self) -> list[str]:
@@ -111,13 +111,16 @@ class Findings:
         known = [own.design["pantograph"] for own in self.train[: self.number - 1]]
         return [] if self.run.design["pantograph"] in known else unusual(self.pantograph)
 
-    def _design(self, part: str) -> dict[str, Any]:
-        if part not in self.run.design:
+    def _designed(self, part: str) -> Any:
+        try:
+            table = self.run.design[part]
+            schema = PantographData if part == "pantograph" else CATENARIES[table["kind"]].schema
+            return schema.model_validate(table)
+        except (KeyError, TypeError, ValueError) as error:
             raise InputError(
-                f"{self.file} was written by an older version, without its line and pantograph; simulate it "
-                "again with `panto simulate --output`."
-            )
-        return dict(self.run.design[part])
+                f"{self.file} was written by an older version, without its line and pantograph as this one "
+                "has them; simulate it again with `panto simulate --output`."
+            ) from error
 
     @property
     def _chosen(self) -> SpanChoice:

@@ -15,6 +15,7 @@ from ..metrics.criterion import limits_in_words, margin_in_words, value_in_words
 from ..metrics.labels import LABELS
 from ..metrics.spans import in_words
 from ..metrics.trajectory import Trajectory
+from ..terminal import number
 from . import charts
 from .findings import Findings
 from .template import page_template
@@ -72,11 +73,6 @@ def save(files: Sequence[str | Path], path: str | Path) -> None:
     text = page(found)
     with write_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def number(value: float, digits: int = 1) -> str:
-    """A number with a given number of decimals, or a dash where it is not finite."""
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
 
 
 def digits(value: float) -> str:

@@ -1,5 +1,28 @@
-from panto_env.base.table import Table
-from panto_env.terminal import console, print_table
+import pytest
+
+from panto_env.base.names import listed
+from panto_env.base.table import Alarm, Table
+from panto_env.terminal import console, number, print_table
+
+
+def test_a_number_that_is_rounded_to_0_has_no_sign():
+    rows = [
+        (Alarm("-0.0"), -0.0, f"{-0.04:+.1f} to {-0.01:.0f} %", "-0.04", "M-0", "5-0", "1e-0"),
+        ("−0", 1.0, *5 * ("",)),
+    ]
+    shown = Table("", ("a",) * 7, rows).cells
+    assert shown[0] == ("0.0", "0", "0.0 to 0 %", "-0.04", "M-0", "5-0", "1e-0")
+    assert isinstance(shown[0][0], Alarm)
+    assert shown[1][0] == "0"
+    assert (number(-0.04), number(-0.4, 0), number(-0.06)) == ("0.0", "0", "-0.1")
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [(["a"], "a, which is"), (["a", "b"], "a and b, which are"), ("abc", "a, b and c, which are")],
+)
+def test_names_as_a_clause(names, text):
+    assert listed(names) == text
 
 
 def test_a_table_is_markdown_with_numbers_to_four_digits():

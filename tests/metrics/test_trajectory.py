@@ -1,8 +1,16 @@
+import json
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from panto_env import InputError, Trajectory, simulate
-from panto_env.metrics import trajectory
+from panto_env.base.checksums import with_checksum, without_checksum
+from panto_env.metrics import run_tables, trajectory
+from panto_env.report.findings import Findings
+
+from ..crafted import ODD, changed, entries
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +76,50 @@ def test_files_of_another_format_are_refused(run, tmp_path, monkeypatch, other):
         run.save(tmp_path / "run.parquet")
     with pytest.raises(InputError, match="it has another format"):
         Trajectory.load(tmp_path / "run.parquet")
+
+
+def crafted(path):
+    """Facts and columns of a run, each with one entry that is wrong."""
+    table = pq.read_table(path)
+    columns = {name: table[name].to_numpy() for name in table.column_names}
+    facts = without_checksum(json.loads(table.schema.metadata[trajectory.KEY]), columns)
+    for place in entries(facts):
+        deep = place[0] in ("settings", "design") and place[1:] not in (("controlled",), ("pantograph",))
+        if not (deep and len(place) > 1) and not (isinstance(place[-1], int) and place[-1] > 1):
+            yield from ((changed(facts, place, value), columns) for value in (*ODD, KeyError))
+    for name in ("time", "position", "contact_force", "uplift_1"):
+        column = columns[name]
+        for wrong in (-column, 0 * column, column * np.nan, 1e300 * column, column.astype(str)):
+            yield facts, columns | {name: wrong}
+    for rows in (0, 1, 2):
+        yield facts, {name: column[:rows] for name, column in columns.items()}
+
+
+def test_a_crafted_run_is_refused_in_a_sentence_or_shown(tmp_path):
+    """With a checksum that fits: no entry leads to anything but figures or one sentence."""
+    path, ends = tmp_path / "run.parquet", []
+    simulate("en50318-2002", "dsa250", 250, accuracy="fast", distance=190.0).save(path)
+    for facts, columns in list(crafted(path))[::3]:
+        stored = json.dumps(with_checksum(facts, columns))
+        try:
+            table = pa.table(columns, metadata={trajectory.KEY: stored})
+            pq.write_table(table, tmp_path / "crafted.parquet")
+            again = Trajectory.load(tmp_path / "crafted.parquet")
+            again.compliance((1, 2))
+            assert len(run_tables.figures([again], (1, 2)).columns) > 5
+            run_tables.droppers([again], (1, 2))
+            assert report(Findings.of(again, "run.parquet")[0]) is not None
+            ends.append("shown")
+        except InputError as error:
+            ends.append("refused" if str(error).endswith(".") and "\n" not in str(error) else "rude")
+    assert "rude" not in ends
+    assert ends.count("refused") > 100
+    assert ends.count("shown") > 20
+
+
+def report(found):
+    """What a report asks of a run."""
+    return found.criteria, found.remarks, found.by_span
 
 
 def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):

@@ -187,7 +187,8 @@ def test_python_of_a_page_runs(page, folder, capsys):
         exec(compile("\n" * (block.line - 1) + text, ROOT / page, "exec"), names)
         printed = capsys.readouterr().out
         if page == "README.md" and "\nprint(" in text:  # what it prints stands at the block's end
-            assert printed and text.endswith("".join(f"# {line}\n" for line in printed.splitlines()))
+            assert printed
+            assert text.endswith("".join(f"# {line}\n" for line in printed.splitlines()))
 
 
 def test_the_first_page_is_short():

@@ -44,7 +44,11 @@ SENTENCES = [
             *ahead("high-speed-as-built", "agent-high-speed", "adaptive-fb+ff"),
         ),
     ),
-    ("docs/benchmark.md", "and of all others ({:.1f} % and less)", lambda: less("high-speed-as-built", "lqg")[:1]),
+    (
+        "docs/benchmark.md",
+        "and of all others ({:.1f} % and less)",
+        lambda: less("high-speed-as-built", "lqg")[:1],
+    ),
     (
         "docs/benchmark.md",
         "`repetitive` reduces σ by {:.0f} to {:.0f} %, and `agent-any-pantograph`, one network for four "

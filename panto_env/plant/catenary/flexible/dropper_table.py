@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ....base.table import Table
@@ -33,12 +33,12 @@ class RestingDropper(NamedTuple):
     span: int = 1  # number of its span, from 1; 1 where all are alike
 
 
-def dropper_table(droppers: Sequence[RestingDropper]) -> Table:
-    """The droppers as a table to print, with sag and stretch in millimetres."""
+def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str] = str) -> Table:
+    """The droppers as a table to print, with sag and stretch in millimetres; name: of a span's number."""
     differ = any(each.span > 1 for each in droppers)
     rows = [
         (
-            *([str(each.span)] if differ else []),
+            *([name(each.span)] if differ else []),
             str(each.number),
             f"{each.position:g}" if not differ else f"{each.position:.3f}",
             f"{1e3 * each.sag:.1f}",

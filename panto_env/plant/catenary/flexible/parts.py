@@ -43,7 +43,7 @@ def places_of(own: Iterable[float], further: Iterable[float] = (), apart: float 
 
 def index_at(places: Array, x: Any) -> Index:
     """Which of some places, in their order, is the one at x (m), of the shape of x: the nearest."""
-    return np.searchsorted((places[1:] + places[:-1]) / 2, x)
+    return np.asarray(np.searchsorted((places[1:] + places[:-1]) / 2, x))
 
 
 class Conductor(Wire):
@@ -161,6 +161,20 @@ class Span(Settings):
     def _droppers_in_span(self) -> Self:
         check_inside(self.droppers.positions, self.span_length)
         return self
+
+
+class Mast(Settings):
+    """What a survey says of the mast at a support; no force depends on it."""
+
+    name: str = Field("", max_length=40, description="name or number on the mast")
+    chainage: Annotated[float, Between(-1e7, 1e7, "m")] | None = Field(None, description="surveyed (m)")
+    stagger: Annotated[float, Between(-1, 1, "m")] | None = Field(
+        None, description="of the contact wire from the middle of the track, to the right (m)"
+    )
+    radius: Annotated[float, Between(-1e5, 1e5, "m")] | None = Field(
+        None, description="of the track, positive to the right (m); none where it is straight"
+    )
+    cant: Annotated[float, Between(-0.3, 0.3, "m")] | None = Field(None, description="of the track (m)")
 
 
 class EndSupport(Settings):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -20,6 +21,7 @@ from .parts import (
     Droppers,
     Encumbrance,
     EndSupport,
+    Mast,
     Overlap,
     Published,
     Span,
@@ -90,6 +92,9 @@ class FlexibleCatenaryData(CatenaryData):
         (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
     published: Published | None = Field(None, description="elasticity as others give it, for `panto line`")
+    masts: tuple[Mast, ...] = Field(
+        (), max_length=MOST_SPANS + 1, description="what a survey says of the mast at each support, in order"
+    )
     as_found: LineCondition | None = Field(
         None,
         description="how the line was found to differ from its design, such as by `panto fit`: a line "
@@ -149,11 +154,13 @@ class FlexibleCatenaryData(CatenaryData):
 
         Beyond a sequence, spans are as long as its last one.
         """
+        named = tuple((mast.name, mast.chainage) for mast in self.masts)
         if not self.sequence:
-            return super().alignment(spans)
+            return replace(super().alignment(spans), masts=named)
         lengths = [span.span_length for span in spans_of(self).each]
         count = len(lengths) if spans is None else spans
-        return Alignment.of_spans((lengths + lengths[-1:] * (count - len(lengths)))[:count])
+        every = (lengths + lengths[-1:] * (count - len(lengths)))[:count]
+        return replace(Alignment.of_spans(every), masts=named)
 
     @property
     def dropper_tables(self) -> tuple[Droppers, ...]:

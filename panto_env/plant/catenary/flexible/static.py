@@ -91,10 +91,10 @@ def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
         yield _Placed(line, name, 0.0, 0.0, 0)
         return
     spans, heights, _ = spans_of(line)
-    supports, first = line.alignment().supports, 0
+    alignment, first = line.alignment(), 0
     for k, span in enumerate(spans):
-        where = f"span {k + 1} of {name}"
-        yield _Placed(span, where, supports[k], heights[k + 1] - heights[k], first)
+        where = f"span {alignment.span_name(k + 1)} of {name}"
+        yield _Placed(span, where, alignment.supports[k], heights[k + 1] - heights[k], first)
         first += len(span.droppers.positions)
 
 
