@@ -10,6 +10,8 @@ torch = pytest.importorskip("torch")
 
 from panto_env import InputError  # noqa: E402
 
+from ..plant.test_frame_spring import line_over, with_table  # noqa: E402
+
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
 EXACT = {"actuator": "realistic", "sensors": "ideal"}
 """No noise of sensors, which the two draw from different generators."""
@@ -18,6 +20,12 @@ CASES = {
     "overlap": (
         "Pantograph-v0",
         EXACT | {"catenary": "examples/overlap.toml", "distance": 500.0, "settle": 1.0, "accuracy": "fast"},
+    ),
+    "ramp": (
+        "Pantograph-v0",
+        EXACT
+        | {"catenary": line_over((0.0, 0.1, 0.2) + (0.3,) * 12), "distance": 500.0, "settle": 1.0}
+        | {"pantograph": with_table(), "accuracy": "fast"},
     ),
     "stiffness": ("PantographStiffness-v0", {"distance": 300.0}),
     "three-span": ("PantographThreeSpan-v0", {"distance": 150.0}),

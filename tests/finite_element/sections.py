@@ -139,10 +139,11 @@ def stitched(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
 
 
 def sections() -> dict[str, Section]:
-    """Sections by name. Pantographs lift with the force that their data state, as it is applied."""
+    """Sections by name. Pantographs lift with the force that their data state, as it is applied, and their
+    spring to the ground acts about the nominal height, as the judge has it."""
 
     def pantograph(name: str) -> PantographData:
-        return load_pantograph(name).model_copy(update={"force": "applied"})
+        return load_pantograph(name).model_copy(update={"force": "applied", "frame_spring": "nominal"})
 
     return {
         "mixed": Section(line_of("en50318-2002", MIXED), pantograph("en50318-2002"), 250.0),
