@@ -7,21 +7,20 @@ torch. The arrays under ``learner/`` and ``replay/`` let a training resume (``le
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator
 
 from panto_baselines.policies.washout import WashoutSettings
 from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
-from panto_env.base.settings import Settings
+from panto_env.base.settings import Positive, Settings
 from panto_env.base.version import __version__
 from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 
 from .actor import Actor
-from .inputs import Step, width_after
 from .learner import Arrays, learn_again, learnt
 from .recurrent_actor import Cell, RecurrentActor
 
@@ -87,6 +86,23 @@ class Needs(Settings):
         )
 
 
+class Step(Settings):
+    """A step from an observation to the network: scaled, or stacked with earlier ones, oldest first."""
+
+    centre: tuple[float, ...] = ()  # is subtracted; (): it is stacked
+    scale: tuple[Positive, ...] = ()  # divides the difference
+    bound: Positive | None = None  # maximum magnitude, to which that is clipped
+    frames: Annotated[int, Field(ge=1)] = 1  # that are stacked
+    padding: tuple[float, ...] | None = None  # frame before the first one; None: that one, repeated
+
+    def width(self, entries: int) -> int:
+        """Number of values after it. Raises ValueError where it takes another number."""
+        own = (self.centre, self.scale) if self.centre else (self.padding,)
+        if any(each is not None and len(each) != entries for each in own):
+            raise ValueError("the steps from its observation to its network do not fit each other")
+        return entries * self.frames
+
+
 class Facts(Settings):
     """Facts that a model file holds about its policy."""
 
@@ -101,7 +117,7 @@ class Facts(Settings):
     environment: dict[str, Any]  # environment that it was trained in: id and arguments
     variants: tuple[dict[str, Any], ...] = ()  # changes of its arguments, each with a share of the training
     needs: Needs
-    inputs: tuple[Step, ...] = ()  # steps from the observation to the network
+    steps_before: tuple[Step, ...] = ()  # from the observation to the network
     residual_of: str | None = None  # policy that its action is added to
     residual_share: float = 1.0  # factor on its action when added
     washout: WashoutSettings | None = None  # the slow average that is subtracted from its action
@@ -191,7 +207,9 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     if parts and set(parts) != set(Cell._fields):
         raise ValueError("its network has only a part of a cell")
     cell = Cell(**parts) if parts else None
-    count, width = len(own) // 2, width_after(facts.inputs, len(facts.needs.entries))
+    count, width = len(own) // 2, len(facts.needs.entries)
+    for step in facts.steps_before:
+        width = step.width(width)
     if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
     weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))

@@ -15,8 +15,7 @@ from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.policies import Policy, check_named, find_policy
 
 from .actor import Actor
-from .inputs import Prepared
-from .model_file import Facts, Needs, read_model
+from .model_file import Facts, Needs, Step, read_model
 from .residual_policy import Residual
 from .washout_policy import WashedOut
 
@@ -52,11 +51,37 @@ class TrainedPolicy:
         return self._policy.act(observation)
 
 
+class Prepared:
+    """A network as a policy; each observation goes through the steps before it."""
+
+    def __init__(self, steps: tuple[Step, ...], network: Policy) -> None:
+        self._steps, self._network = steps, network
+        self._frames: dict[int, list[NDArray[np.float32]]] = {}  # by the number of their step
+
+    def reset(self, context: Context) -> None:
+        """Forget the episode before."""
+        self._frames.clear()
+        self._network.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        values = observation.copy()
+        for number, step in enumerate(self._steps):
+            if step.centre:
+                bound = step.bound or np.inf
+                values = np.clip((values - step.centre) / step.scale, -bound, bound).astype(np.float32)
+                continue
+            first = values if step.padding is None else np.array(step.padding, dtype=np.float32)
+            self._frames[number] = [*self._frames.get(number, [first] * step.frames)[1:], values]
+            values = np.concatenate(self._frames[number])
+        return self._network.act(values)
+
+
 def policy_of(actor: Actor, facts: Facts) -> Policy:
-    """Policy from a network and its facts: with inputs, washout and a base policy, if it has these."""
+    """Policy from a network and its facts: with its washout, and added to a base policy, if it has these."""
     policy: Policy = actor if facts.washout is None else WashedOut(actor, facts.washout)
-    if facts.inputs:
-        policy = Prepared(facts.inputs, policy)
+    if facts.steps_before:
+        policy = Prepared(facts.steps_before, policy)
     if facts.residual_of is None:
         return policy
     return Residual(find_policy(facts.residual_of), policy, facts.residual_share)

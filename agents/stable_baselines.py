@@ -6,7 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
+from gymnasium.vector import VectorRewardWrapper, VectorWrapper
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import check_output
@@ -16,51 +19,44 @@ from panto_env.control.lines import on_example
 from panto_env.control.settings import fields, run_settings
 
 from .actor import Actor
-from .inputs import width_after
-from .model_file import Facts, Needs, write_policy
+from .model_file import Facts, Needs, Step, write_policy
 from .settings import ALGORITHMS, arguments
-from .wrappers import ELSEWHERE, Lane, lane_of
 
-KNOWN = ("ppo", "sac")
-"""Algorithms of Stable-Baselines3 whose networks a model file knows."""
 ACTIVATIONS = {"Tanh": "tanh", "ReLU": "relu"}
 """Activations of Stable-Baselines3's networks that a model file knows."""
 SUFFIXES = (".safetensors",)
+PASSING = (
+    "TimeLimit Autoreset PassiveEnvChecker OrderEnforcing RecordEpisodeStatistics Monitor VecMonitor "
+    "RecordVideo RenderCollection HumanRendering AddWhiteNoise ObstructView NormalizeReward DictInfoToList VecCheckNan "
+    "VecVideoRecorder PantographVecEnv DrivenByPolicies FlattenObservation RescaleAction"
+)
+"""Wrappers that leave observations and actions alone; ``_on_actuator`` undoes the last one."""
+ELSE = 'or write it as a class in a file (docs/policies.md, "A policy of any library")'
 
 
 def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
     """Write the deterministic policy of a model, for `panto benchmark`, `panto evaluate` and `panto film`.
 
     model: PPO or SAC of Stable-Baselines3 with an "MlpPolicy", trained in an environment of this project.
-    env: the environment with the wrappers of the training, by default the model's own; one that was loaded
-    may have none. Frame stacks, normalised observations, with their present statistics, and rescaled actions
-    are stored. Raises InputError for another wrapper or model, and where the file can't be written.
+    env: that environment with its wrappers, by default the model's own. Frame stacks, normalisation with its
+    present statistics, and rescaled actions are stored. Raises InputError for another model or wrapper, and
+    where the file can't be written.
     """
     check_output(path, SUFFIXES)
     name = type(model).__name__.lower()
-    if name not in KNOWN:
-        raise InputError(f"A model of {' or '.join(KNOWN)} is needed, not of {type(model).__name__}.")
+    if name not in ("ppo", "sac"):
+        raise InputError(f"A model of ppo or sac is needed, not of {type(model).__name__}; {ELSE[3:]}.")
     activation = ACTIVATIONS.get(model.policy.activation_fn.__name__)
     part = model.policy.actor if name == "sac" else model.policy
-    sde = name == "sac" and model.use_sde  # its action goes through a layer of its own
-    if activation is None or sde or type(part.features_extractor).__name__ != "FlattenExtractor":
-        raise InputError(
-            "A model with an MlpPolicy of tanh or relu is needed, without layers of its own, and SAC without "
-            f"use_sde; train such a one, {ELSEWHERE}."
-        )
+    if activation is None or type(part.features_extractor).__name__ != "FlattenExtractor":
+        raise InputError("A model with an MlpPolicy of tanh or relu is needed, without layers of its own.")
     env = model.get_env() if env is None else env
-    if env is None:
+    if env is None or getattr(env, "single_action_space", env.action_space) != model.action_space:
         raise InputError(
-            "The model has no environment, since it was loaded without one; give the one that it was trained "
-            "in, with its wrappers: save_policy(model, path, env=...)."
+            "The model has no environment, or env has other actions; give as env that of its training."
         )
-    if getattr(env, "single_action_space", env.action_space) != model.action_space:
-        raise InputError(
-            f"The model's actions lie in {model.action_space}, those of env in {env.action_space}; give the "
-            "environment that the model was trained in, with its wrappers."
-        )
-    lane = lane_of(env)
-    environment = _environment(lane, env)
+    spec, steps = _walk(env)
+    environment = _environment(spec, env)
     actor = _on_actuator(ALGORITHMS[name](activation=activation).actor(model), model)
     facts = Facts(
         algorithm=name,
@@ -69,7 +65,7 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
         updates=model._n_updates,
         environment=environment,
         needs=Needs.of(Task(on_example(run_settings(arguments(environment)))).context(0)),
-        inputs=lane.steps,
+        steps_before=steps,
         activation=actor.activation,
         squashed=actor.squashed,
     )
@@ -77,44 +73,73 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
     write_policy(Path(path), facts, actor)
 
 
-def _environment(lane: Lane, env: Any) -> dict[str, Any]:
+def _environment(spec: Any, env: Any) -> dict[str, Any]:
     """Id and arguments of the environment that a model was trained in."""
-    if lane.spec is None or lane.spec.namespace is not None:
+    if spec is None or spec.namespace is not None:
         raise InputError(f"An environment from gymnasium.make or make_vec is needed, not {shown(env)}.")
     known = fields()
-    own = {name: value for name, value in lane.spec.kwargs.items() if name in known}
-    return {"id": lane.spec.id} | own
+    return {"id": spec.id} | {name: value for name, value in spec.kwargs.items() if name in known}
+
+
+def _walk(env: Any) -> tuple[Any, tuple[Step, ...]]:
+    """Spec of the environment within wrappers, and what these do to its observations."""
+    if isinstance(env, DummyVecEnv):
+        (spec, steps), *others = map(_walk, env.envs)
+        if any(each != steps for _, each in others):
+            raise InputError("Lanes have statistics or wrappers of their own; wrap the VecEnv instead.")
+        return spec, steps
+    inner = env.venv if hasattr(env, "venv") else getattr(env, "env", None)
+    if inner is None and not isinstance(env, VecEnv):
+        return getattr(env, "spec", None), ()
+    spec, steps = _walk(inner)
+    return spec, (*steps, *_steps(env, inner))
+
+
+def _steps(env: Any, inner: Any) -> tuple[Step, ...]:
+    """What a wrapper does to observations. Raises InputError, naming it, where that is not known."""
+    kind = type(env)
+    name = kind.__name__ if kind.__module__.startswith(("gymnasium.", "stable_baselines3.", "panto_")) else ""
+    rewards = (gymnasium.RewardWrapper, gymnasium.Wrapper), (VectorRewardWrapper, VectorWrapper)
+    only = any((kind.step, kind.reset) == (own.step, base.reset) for own, base in rewards)
+    if name in PASSING.split() or only or not vars(env).get("norm_obs", True):
+        return ()
+    if name in ("NormalizeObservation", "VecNormalize"):
+        if env.obs_rms.count < 1:
+            raise InputError(
+                f"{name} has no statistics yet; give as env the one of the training, or load it."
+            )
+        centre, scale = np.ravel(env.obs_rms.mean), np.ravel(np.sqrt(env.obs_rms.var + env.epsilon))
+        return (Step(centre=centre.tolist(), scale=scale.tolist(), bound=getattr(env, "clip_obs", None)),)
+    if name == "FrameStackObservation":
+        padding = None if env.padding_type == "reset" else np.ravel(env.padding_value).tolist()
+        return (Step(frames=env.stack_size, padding=padding),)
+    if name == "VecFrameStack" and len(inner.observation_space.shape) == 1:
+        return (Step(frames=env.stacked_obs.n_stack, padding=(0.0,) * inner.observation_space.shape[0]),)
+    raise InputError(f"A file can't hold what {kind.__name__} may do to a policy; train without it, {ELSE}.")
 
 
 def _on_actuator(actor: Actor, model: Any) -> Actor:
-    """The network with actions in -1..1, in place of those in the space of the model's actions."""
-    if model.policy.squash_output:  # Stable-Baselines3 maps -1..1 to that space, and wrappers map it back
+    """The network with actions in -1..1, instead of in the space of the model's actions."""
+    if model.policy.squash_output:  # what maps -1..1 to that space is undone by RescaleAction
         return actor.squash()
     low, high = model.action_space.low, model.action_space.high
-    gain, middle = 2 / (high - low), (high + low) / 2
-    *before, last = zip(actor.weights, actor.biases, strict=True)
-    layers = [*before, (last[0] * gain[:, None], (last[1] - middle) * gain)]
-    weights, biases = zip(*layers, strict=True)
-    return replace(actor, weights=weights, biases=biases)
+    gain = 2 / (high - low)
+    last = actor.weights[-1] * gain[:, None], (actor.biases[-1] - (low + high) / 2) * gain
+    return replace(actor, weights=(*actor.weights[:-1], last[0]), biases=(*actor.biases[:-1], last[1]))
 
 
 def _check(model: Any, actor: Actor, facts: Facts) -> None:
     """Raise InputError unless the network fits the task and acts as the model does."""
-    needs, inputs = facts.needs, actor.weights[0].shape[1]
-    seen, given = width_after(facts.inputs, len(needs.entries)), len(needs.channels)
-    if (inputs, len(actor.biases[-1])) != (seen, given):
+    width, actions = len(facts.needs.entries), len(facts.needs.channels)
+    for step in facts.steps_before:
+        width = step.width(width)
+    if (actor.weights[0].shape[1], len(actor.biases[-1])) != (width, actions):
         raise InputError(
-            f"The network has {inputs} inputs and {len(actor.biases[-1])} actions, the task's pantograph "
-            f"{seen} and {given}; give the environment of the training as env, or, where one network "
-            "controls several pantographs, train in the vector environment, in which each is a lane."
+            f"The network has not the {width} inputs and {actions} actions of the task; give as env that of "
+            "its training, and train several pantographs in the vector environment, in which each is a lane."
         )
-    random = np.random.default_rng(0)
-    observations = random.normal(size=(16, *model.observation_space.shape)).astype(np.float32)
+    seen = np.random.default_rng(0).normal(0, 10, (16, *model.observation_space.shape)).astype(np.float32)
     low, high = model.action_space.low, model.action_space.high
-    wanted = (2 * model.predict(observations, deterministic=True)[0] - low - high) / (high - low)
-    found = np.array([actor.act(each.ravel()) for each in observations])
-    if not np.allclose(found, wanted, atol=1e-4):
-        raise InputError(
-            "The model does more than its linear layers and tanh or relu, which a model file doesn't hold; "
-            f"train without that, {ELSEWHERE}."
-        )
+    wanted = (2 * model.predict(seen, deterministic=True)[0] - low - high) / (high - low)
+    if not np.allclose([actor.act(each.ravel()) for each in seen], wanted, atol=1e-3):
+        raise InputError(f"The model does more than linear layers and tanh or relu; omit that, {ELSE}.")

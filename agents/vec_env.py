@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Sequence
-from copy import deepcopy
+from threading import get_ident
 from typing import Any
 
 import numpy as np
@@ -15,15 +14,15 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from panto_env.base.errors import InputError
 from panto_env.envs import IDS, PantographVectorEnv
-from panto_env.envs.settings import FixedArguments
+from panto_env.envs.settings import Whole
 
 
-class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
+class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
     """A ``VecEnv`` around a vector environment of Gymnasium, ``PantographVectorEnv`` or a wrapper of one.
 
     Any autoreset mode works. Observations and rewards are the environment's own arrays, not copies.
-    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated", the episode's
-    "figures", and its return, length and time (s) as "episode", as those of ``Monitor`` do.
+    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the
+    episode's "figures", and as "episode" what ``Monitor`` gives.
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
@@ -41,14 +40,8 @@ class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.metadata["render_fps"] = env.metadata["render_fps"]
 
-    def __copy__(self) -> PantographVecEnv:
-        return deepcopy(self)  # two that share one environment would be of no use
-
     def reset(self) -> NDArray[np.float32]:
-        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i.
-
-        Raises InputError for options, given by ``set_options``, that are not valid or not those of all lanes.
-        """
+        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i."""
         seeded = any(seed is not None for seed in self._seeds)
         options = self._options[0]
         if any(each != options for each in self._options):
@@ -63,16 +56,13 @@ class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions, (lanes, actions), for ``step_wait``."""
-        self._actions[threading.get_ident()] = actions
+        self._actions[get_ident()] = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
         """Step all lanes: observations, rewards, dones and one info per lane."""
         start = time.perf_counter()
-        observation, reward, terminated, truncated, info = self.env.step(
-            self._actions.pop(threading.get_ident())
-        )
-        self._returns += reward
-        self._lengths += 1
+        observation, reward, terminated, truncated, info = self.env.step(self._actions.pop(get_ident()))
+        self._returns, self._lengths = self._returns + reward, self._lengths + 1
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
@@ -85,11 +75,7 @@ class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
                 name for name in figures if not name.startswith("_")
             ]  # "_name" marks lanes that have one
             for lane in np.flatnonzero(done).tolist():
-                own = (
-                    float(self._returns[lane]),
-                    int(self._lengths[lane]),
-                    round(time.time() - self._begun, 6),
-                )
+                own = float(self._returns[lane]), int(self._lengths[lane]), time.time() - self._begun
                 infos[lane] = {
                     "episode": dict(zip("rlt", own, strict=True)),
                     "terminal_observation": last[lane],
@@ -103,17 +89,10 @@ class PantographVecEnv(FixedArguments, VecEnv):  # type: ignore[misc]
         return observation, reward.astype(np.float32), done, infos
 
     def get_images(self) -> Sequence[NDArray[np.uint8]]:
-        """Frames, (height, width, 3), of the drawn lanes.
-
-        Raises InputError where the environment draws none.
-        """
-        frames: Sequence[NDArray[np.uint8]] | None = self.env.render()
-        if frames is None:
-            raise InputError(
-                "The environment draws no pictures; make it with "
-                "gymnasium.make_vec(..., render_mode='rgb_array')."
-            )
-        return frames
+        """Frames, (height, width, 3), of the drawn lanes. Raises InputError where none are drawn."""
+        if self.render_mode is None:
+            raise InputError("There are no pictures; add render_mode='rgb_array' to gymnasium.make_vec.")
+        return list(self.env.render())
 
     def close(self) -> None:
         """Close the native environment."""

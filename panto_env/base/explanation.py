@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from .errors import InputError
-from .names import near_names
+from .names import nearest
 from .shown import shortly
 
 WORDS = {
@@ -101,7 +101,7 @@ def _complaint(problem: ErrorDetails, kind: type[BaseModel]) -> Complaint:
             return Complaint(key, f"is missing{words}", "", False)
         case "extra_forbidden":
             known = [name for name in fields if name != "sources"]
-            near = near_names(str(place[-1]), known)
+            near = nearest(str(place[-1]), known)
             words = f"did you mean {near}" if near else f"known are {', '.join(known)}"
             return Complaint(key, f"is not known: {words}", "", False)
         case "value_error":

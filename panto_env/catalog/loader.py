@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ..base.errors import InputError, UnusualWarning
 from ..base.explanation import explain
 from ..base.files import read_toml
-from ..base.names import near_names, suggest
+from ..base.names import nearest, suggest
 from ..base.settings import Settings
 from ..base.shown import shown
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
@@ -185,7 +185,7 @@ def _find(family: str, source: str | Path) -> Path:
         if os.path.isfile(path):  # which accepts any name
             return path
         raise InputError(f"The {family} file {text} does not exist; give the path of a TOML file.")
-    near = near_names(text, available(family))
+    near = nearest(text, available(family))
     hint = f", did you mean {near}" if near else ""
     raise InputError(
         f"Unknown {family} '{text}'{hint}: known are {', '.join(available(family))}; "

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from ..base.names import near_names
+from ..base.names import nearest
 from .settings import RunSettings, fields
 
 P = ParamSpec("P")
 
 
 def takes(
-    kind: Callable[P, RunSettings],
-    hints: Mapping[str, str] | None = None,
+    kind: Callable[P, RunSettings], others: Collection[str] = (), taker: str = ""
 ) -> Callable[[Callable[[Any, dict[str, Any]], None]], Callable[Concatenate[Any, P], None]]:
     """Decorator that gives an ``__init__`` the keyword arguments of a class of settings.
 
-    The decorated function receives the given arguments by name. An unknown one raises TypeError, with its
-    hint if there is one, by its name.
+    The decorated function receives the given arguments by name. An unknown one raises TypeError.
     """
     settings: type[RunSettings] = kind  # type: ignore[assignment]
 
@@ -31,7 +29,9 @@ def takes(
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
                 raise TypeError(f"{type(self).__name__}() takes arguments by name, such as catenary='re250'")
-            check_arguments(given, settings, type(self).__name__, hints or {})
+            for name in given.keys() & others:
+                raise TypeError(f"{type(self).__name__}() has no argument '{name}', which {taker} takes")
+            check_arguments(given, settings, type(self).__name__)
             initialise(self, given)
 
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
@@ -49,15 +49,12 @@ def parameters(kind: type[RunSettings] = RunSettings) -> list[inspect.Parameter]
     ]
 
 
-def check_arguments(
-    given: Mapping[str, Any], kind: type[RunSettings], function: str, hints: Mapping[str, str] | None = None
-) -> None:
+def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function: str) -> None:
     """Raise TypeError for a name that is not a setting, as Python does for an unknown argument."""
     for name in given:
         if name not in kind.model_fields:
-            near = near_names(name, list(kind.model_fields))
+            near = nearest(name, list(kind.model_fields))
             hint = f"; did you mean {near}?" if near else f"; known are {', '.join(fields(kind))}"
-            hint = (hints or {}).get(name, hint)
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'{hint}")
 
 

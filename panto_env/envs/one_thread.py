@@ -78,6 +78,3 @@ class CopiedAlone:
         twin = memo[id(self)] = type(self).__new__(type(self))
         twin.__setstate__(deepcopy(self._state(), memo))
         return twin
-
-    def __copy__(self) -> Self:
-        return deepcopy(self)  # two environments that share their arrays would be of no use

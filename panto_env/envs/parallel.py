@@ -13,9 +13,8 @@ from ..base.errors import InputError
 from ..control.action import checked
 from ..control.observation import BOUND
 from .infos import REWARD
-from .one_thread import CopiedAlone, InUse, one_at_a_time
 from .reset_arguments import checked_options
-from .settings import FixedArguments
+from .settings import Whole
 from .single import PantographEnv
 
 try:
@@ -28,7 +27,7 @@ except ModuleNotFoundError as error:
 Observation = NDArray[np.float32]
 
 
-class PantographParallelEnv(FixedArguments, CopiedAlone, ParallelEnv):  # type: ignore[misc]
+class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
     """The controlled pantographs of a train as agents, "pantograph_1" in front.
 
     ``panto_env.parallel_env(pantographs=["dsa380", "dsa380"], distances=[200], controlled=[1, 2])`` is a thin
@@ -43,7 +42,6 @@ class PantographParallelEnv(FixedArguments, CopiedAlone, ParallelEnv):  # type: 
     def __init__(self, **settings: Any) -> None:
         """Arguments of ``PantographEnv``. Raises InputError for a value that is not valid."""
         self.train = PantographEnv(**settings)
-        self._in_use = InUse()
         self.metadata = self.train.metadata | PantographParallelEnv.metadata
         self.render_mode = self.train.render_mode
         numbers = [number + 1 for number in self.train.task.episode.controlled]
@@ -66,7 +64,6 @@ class PantographParallelEnv(FixedArguments, CopiedAlone, ParallelEnv):  # type: 
         """Space of an agent's action, always the same object."""
         return self.action_spaces[agent]
 
-    @one_at_a_time
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
@@ -77,7 +74,6 @@ class PantographParallelEnv(FixedArguments, CopiedAlone, ParallelEnv):  # type: 
         self.agents = list(self.possible_agents)
         return self._of_agents(observation), self._infos(info)
 
-    @one_at_a_time
     def step(
         self, actions: dict[str, Observation]
     ) -> tuple[

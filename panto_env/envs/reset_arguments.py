@@ -34,18 +34,13 @@ def checked_seeds(seed: Any, lanes: int) -> list[int | None]:
 
 
 def check_whole_trains(mask: Any, agents: int) -> None:
-    """Raise InputError where a mask of lanes, (lanes,), marks some lanes of a train and not the others.
-
-    agents: lanes of a train.
-    """
+    """Raise InputError where a mask, (lanes,), marks some of the lanes of a train, so many each."""
     trains = mask.reshape(-1, agents)
     parts = (trains != trains[:, :1]).any(1).tolist()
     if any(parts):
         first = parts.index(True) * agents
-        raise InputError(
-            f"reset_mask marks a part of a train: lanes {first} to {first + agents - 1} are the pantographs "
-            "of one train, whose episodes begin together; mark all of them or none."
-        )
+        several = f"lanes {first} to {first + agents - 1}"
+        raise InputError(f"reset_mask marks a part of a train: mark all of {several}, or none of them.")
 
 
 def checked_options(options: Any) -> dict[str, Any]:

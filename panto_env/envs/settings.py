@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Annotated, Any, Literal
 
 from gymnasium.vector import AutoresetMode
@@ -25,17 +26,18 @@ SlowMotion = Field(
 )
 
 
-class FixedArguments:
-    """Base of an environment: what looks like setting an argument by an attribute is refused."""
+class Whole:
+    """Base of an environment: to set an argument as an attribute raises InputError, and copies are deep."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Raise InputError for the name of an argument: setting it would change nothing."""
         if name in RunSettings.model_fields:
             raise InputError(
-                f"{name} is not an attribute that can be set; give it where the environment is made, or for "
-                f"one episode to reset(options={{'{name}': ...}})."
+                f"{name} can't be set later; give it to make, or to reset(options=...) for once."
             )
         super().__setattr__(name, value)
+
+    def __copy__(self) -> Any:
+        return deepcopy(self)  # two environments that share their arrays would be of no use
 
 
 class EnvironmentSettings(RunSettings):
@@ -168,16 +170,8 @@ class TensorSettings(VectorSettings):
         return self
 
 
-OF_VECTORS = dict.fromkeys(
-    TensorSettings.model_fields.keys() - EnvironmentSettings.model_fields.keys(),
-    "; it is an argument of gymnasium.make_vec",
-)
-"""Hints for arguments that a single environment does not have, by name."""
-OF_DEVICES = dict.fromkeys(
-    TensorSettings.model_fields.keys() - VectorSettings.model_fields.keys(),
-    "; it is an argument of lanes on a device, such as device='cuda'",
-)
-"""Hints for arguments that a vector environment on the processor does not have, by name."""
+OF_VECTORS = TensorSettings.model_fields.keys() - EnvironmentSettings.model_fields.keys()
+"""Names of arguments that only vector environments have."""
 
 
 def frames_per_second(control_interval: float, slow_motion: float) -> float:

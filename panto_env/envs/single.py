@@ -22,7 +22,7 @@ from .episodes import Episodes, with_longest_episode
 from .infos import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
 from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
 from .reset_arguments import checked_options, checked_seed
-from .settings import OF_VECTORS, EnvironmentSettings, FixedArguments, render_metadata
+from .settings import OF_VECTORS, EnvironmentSettings, Whole, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
@@ -31,7 +31,7 @@ SEEN = ("_shape", "_observation", "_values", "_flags")
 """Attributes that ``PantographEnv._watch`` sets from the task."""
 
 
-class PantographEnv(FixedArguments, CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PantographEnv(Whole, CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A pantograph under a catenary, with an actuator that reduces variations of the contact force.
 
     ## Description
@@ -130,7 +130,7 @@ class PantographEnv(FixedArguments, CopiedAlone, gymnasium.Env[NDArray[np.float3
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
 
-    @takes(EnvironmentSettings, OF_VECTORS)
+    @takes(EnvironmentSettings, OF_VECTORS, "only gymnasium.make_vec")
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, EnvironmentSettings)

@@ -29,26 +29,20 @@ from .reset_arguments import check_whole_trains, checked_options, checked_seed
 from .settings import TensorSettings, render_metadata
 from .vector import SharedByLanes
 
-FLOATS = (torch.float16, torch.bfloat16, torch.float32, torch.float64)
-"""Kinds of numbers of actions."""
-
 
 class CopiedLanes(TensorLanes):
     """Lanes whose copies have tensors of their own, and a kernel that is bound to these."""
 
     def __init__(self, *arguments: Any) -> None:
-        """Arguments of ``TensorLanes``."""
         super().__init__(*arguments)
         self._arguments = arguments
 
-    def __getstate__(self) -> dict[str, Any]:
-        blocks = [columns.blocks for columns in (self._bank, self._columns)]
-        return {"arguments": self._arguments, "task": self.task, "blocks": blocks}
+    def __reduce__(self) -> Any:
+        return CopiedLanes, self._arguments, (self.task, self._bank.blocks, self._columns.blocks)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        CopiedLanes.__init__(self, *state["arguments"])
-        self.task = state["task"]
-        for columns, blocks in zip((self._bank, self._columns), state["blocks"], strict=True):
+    def __setstate__(self, state: Any) -> None:
+        self.task, *contents = state
+        for columns, blocks in zip((self._bank, self._columns), contents, strict=True):
             for block, numbers in blocks.items():
                 columns.blocks[block].copy_(numbers)
 
@@ -115,14 +109,6 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
-
-    def _state(self) -> dict[str, Any]:
-        return vars(self) | {"_random": self._random.get_state()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
-        self._random = torch.Generator(self.device)
-        self._random.set_state(state["_random"])
 
     @one_at_a_time
     def reset(
@@ -261,17 +247,13 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
             raise InputError(
                 f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}."
             )
-        if not _dense(actions) or actions.shape != self._shape or actions.dtype not in FLOATS:
-            kind = tuple(actions.shape) if _dense(actions) else str(actions.layout)
+        dense = actions.layout is torch.strided and not actions.is_nested
+        if not dense or actions.shape != self._shape or not actions.is_floating_point():
             raise InputError(
-                f"Actions must be dense floating-point numbers of shape {self._shape}, not "
-                f"{actions.dtype} of {kind}."
+                f"Actions must be dense floating-point numbers of shape {self._shape}, not {shown(actions)}."
             )
         if actions.requires_grad:
-            raise InputError(
-                "Actions must not require gradients, since none pass through the environment; give "
-                "actions.detach()."
-            )
+            raise InputError("No gradients pass through the environment; give it actions.detach().")
         wrong = ~torch.isfinite(actions).all(dim=1)
         if wrong.any():
             lane = int(wrong.nonzero()[0])
@@ -280,8 +262,9 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
             )
 
     def _checked_mask(self, mask: Any) -> torch.Tensor:
-        valid = isinstance(mask, torch.Tensor) and mask.dtype == torch.bool and _dense(mask)
-        if not (valid and mask.shape == (self.num_envs,) and mask.device == self.device and bool(mask.any())):
+        valid = isinstance(mask, torch.Tensor) and mask.dtype == torch.bool and mask.shape == (self.num_envs,)
+        dense = valid and mask.layout is torch.strided
+        if not (dense and mask.device == self.device and bool(mask.any())):
             raise InputError(
                 f"reset_mask must be {self.num_envs} booleans, a tensor on {self.device} with one true or "
                 "more."
@@ -291,10 +274,6 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
         check_whole_trains(mask, self._agents)
         lanes: torch.Tensor = mask
         return lanes
-
-
-def _dense(tensor: torch.Tensor) -> bool:
-    return tensor.layout is torch.strided and not tensor.is_nested
 
 
 def usable_device(name: str) -> torch.device:

@@ -28,46 +28,33 @@ from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
 from .one_thread import CopiedAlone, InUse, one_at_a_time
 from .reset_arguments import check_whole_trains, checked_options, checked_seeds
-from .settings import OF_DEVICES, FixedArguments, VectorSettings, render_metadata
+from .settings import VectorSettings, Whole, render_metadata
 from .stable_baselines import NamedToStableBaselines
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
 
 
-ONE_LANE_S = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
-"""Attributes of the vector environment that are a single environment's, by their names there."""
-
-
-class SharedByLanes(FixedArguments):
+class SharedByLanes(Whole):
     """Base of a vector environment whose lanes have no environments of their own."""
 
-    num_envs: int
-
-    def call(self, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
-        """Call a method, or get an attribute; its result for each lane, as Gymnasium's environments do.
-
-        "context", "np_random" and "np_random_seed" are of each lane; what all lanes share is called once and
-        repeated. Raises InputError for what is done in all lanes together.
-        """
+    def call(self: Any, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
+        """Each lane's context, or what all share, once per lane. Raises InputError for reset and step."""
         if name in ("reset", "step", "render", "close"):
             raise InputError(f"The lanes {name} together; call {name} of the vector environment itself.")
         if name == "context":
-            return tuple(self.context(lane) for lane in range(self.num_envs))  # type: ignore[attr-defined]
-        value = getattr(self, ONE_LANE_S.get(name, name))
-        if name in ("np_random", "np_random_seed") and isinstance(value, tuple):
+            return tuple(map(self.context, range(self.num_envs)))
+        value = getattr(self, f"single_{name}" if name in ("observation_space", "action_space") else name)
+        if name.startswith("np_random") and isinstance(value, tuple):
             return value
         return (value(*arguments, **named) if callable(value) else value,) * self.num_envs
 
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute for each lane; see ``call``."""
-        return self.call(name)
+    get_attr = call
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Raise InputError: lanes share one environment, and its arguments stay."""
+        """Raise InputError: the lanes share one environment."""
         raise InputError(
-            f"The lanes share one environment, whose {name} can't be set; make it anew with other arguments, "
-            "or give them for one episode to reset(options=...)."
+            f"The lanes share one environment, whose {name} stays; give it to make_vec or reset."
         )
 
 
@@ -102,7 +89,7 @@ class PantographVectorEnv(
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
 
-    @takes(VectorSettings, OF_DEVICES)
+    @takes(VectorSettings)
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, VectorSettings)

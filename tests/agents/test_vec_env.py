@@ -148,5 +148,5 @@ def test_pictures_are_those_of_the_lanes(tmp_path):
 
 
 def test_without_pictures_a_sentence_says_what_to_do():
-    with pytest.raises(InputError, match=r"draws no pictures; make it with .*render_mode='rgb_array'"):
+    with pytest.raises(InputError, match="There are no pictures; add render_mode='rgb_array'"):
         make().get_images()

@@ -81,6 +81,10 @@ class Tensors(Vector):
 
 class Parallel(Single):
     @staticmethod
+    def lock(env):
+        return env.train._in_use
+
+    @staticmethod
     def make():
         return parallel_env(**IDS["PantographStiffness-v0"] | LIVELY)
 
@@ -256,7 +260,6 @@ def bad_actions(kind, env):
             as_tensor.numpy(),
             as_tensor.to("meta"),
             torch.nested.nested_tensor(list(as_tensor)),
-            as_tensor.to(torch.float8_e4m3fn),
         ]
     return [*bad, *wrong]
 
@@ -292,7 +295,7 @@ def test_options_that_are_none_are_refused_and_change_nothing(kind):
 def test_an_argument_is_not_set_as_an_attribute(kind, name):
     """It had been set without a word and without any effect."""
     env = kind.make()
-    with pytest.raises(InputError, match=f"{name} is not an attribute that can be set; .* reset"):
+    with pytest.raises(InputError, match=f"{name} can't be set later; give it to make, or to reset"):
         setattr(env, name, 200)
     assert not hasattr(env, name)
 
@@ -331,7 +334,7 @@ def test_a_reset_mask_names_whole_trains(device, mask):
     envs.reset(seed=3)
     twin = copy.deepcopy(envs)
     lanes = "0 to 1" if mask[1] and not mask[0] else "2 to 3"
-    with pytest.raises(InputError, match=f"a part of a train: lanes {lanes} .* mark all of them or none"):
+    with pytest.raises(InputError, match=f"a part of a train: mark all of lanes {lanes}, or none"):
         envs.reset(options={"reset_mask": convert(mask)})
     still = Tensors.action(envs, 0.1) if device else Single.action(envs, 0.1)
     for env in (envs, twin):
@@ -351,7 +354,7 @@ def test_lanes_have_the_attributes_and_calls_of_gymnasium_s():
         assert envs.get_attr("render_mode") == (None,) * 3
         with pytest.raises(InputError, match="The lanes step together"):
             envs.call("step", 0)
-        with pytest.raises(InputError, match="share one environment, whose speed_kmh can't be set"):
+        with pytest.raises(InputError, match="share one environment, whose speed_kmh stays"):
             envs.set_attr("speed_kmh", 200)
         with pytest.raises(AttributeError, match="nothing"):
             envs.get_attr("nothing")
@@ -363,14 +366,13 @@ def test_lanes_have_the_attributes_and_calls_of_gymnasium_s():
 @pytest.mark.parametrize(
     ("make", "name", "hint"),
     [
-        (gymnasium.make, "device", "it is an argument of gymnasium.make_vec"),
-        (gymnasium.make, "autoreset_mode", "it is an argument of gymnasium.make_vec"),
-        (lambda *a, **k: gymnasium.make_vec(*a, num_envs=2, **k), "starts", "of lanes on a device"),
-        (gymnasium.make, "speed_kmhh", "did you mean 'speed_kmh'"),
+        (gymnasium.make, "device", "has no argument 'device', which only gymnasium.make_vec takes"),
+        (gymnasium.make, "autoreset_mode", "has no argument 'autoreset_mode', which only gymnasium.make_vec"),
+        (gymnasium.make, "speed_kmhh", "unexpected keyword argument 'speed_kmhh'; did you mean 'speed_kmh'"),
     ],
 )
 def test_an_argument_of_another_class_is_said_to_be_that(make, name, hint):
-    with pytest.raises(TypeError, match=f"unexpected keyword argument '{name}'; {hint}"):
+    with pytest.raises(TypeError, match=hint):
         make(NAME, **{name: "cuda"})
 
 
