@@ -14,7 +14,6 @@ from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
 from ..metrics.criterion import Criterion
 from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
 from ..plant.catenary.flexible.elasticity import PLACES, elasticity, non_uniformity
-from ..plant.catenary.flexible.parts import Published
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.flexible.static import hang
@@ -162,9 +161,9 @@ def elasticity_table(checks: Sequence[LineCheck]) -> Table:
     """Elasticity of lines whose spans are all alike, with published figures in brackets."""
     rows = []
     for line, found in ((each.line, each.elasticities) for each in checks):
-        given, middle = line.published or Published(), 1e3 * found[PLACES // 2]
-        told = (1e3 * (given.mid_span or 0), 1e3 * (given.support or 0), given.non_uniformity)
-        pairs = zip((middle, 1e3 * found[0], non_uniformity(found)), told, strict=True)
+        middle, end, uneven = 1e3 * found[PLACES // 2], 1e3 * found[0], non_uniformity(found)
+        told = [getattr(line.published, key, None) or 0 for key in ("mid_span", "support", "non_uniformity")]
+        pairs = zip((middle, end, uneven), np.multiply(told, (1e3, 1e3, 1)), strict=True)
         cells = (f"{own:#.3g} ({other:g})" if other else f"{own:#.3g}" for own, other in pairs)
         stiffness = 1e3 * line.span_length / middle  # N
         rows.append((line.name, *cells, f"{stiffness / sum(wire.tension for wire in line.wires):.2f}"))
