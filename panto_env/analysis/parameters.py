@@ -16,7 +16,7 @@ from ..base.settings import Settings
 from ..plant.catenary import CatenaryData, check_line
 from ..plant.catenary.flexible.parts import Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.spans import spans_of
+from ..plant.catenary.flexible.spans import droppers_in, spans_of
 
 S = TypeVar("S", bound=Settings)
 
@@ -107,6 +107,9 @@ def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
 
     Raises InputError where it cannot exist, or where a value of a line is one that all its spans replace.
     """
+    if isinstance(entry, FlexibleCatenaryData) and "span_length" in keys and "droppers" not in keys:
+        own = entry.model_dump(exclude_none=True)
+        table = {**table, "droppers": droppers_in(own, {}, table["span_length"])}
     changed = type(entry).model_validate(table)
     if isinstance(entry, FlexibleCatenaryData) and entry.sequence and changed != entry:
         assert isinstance(changed, FlexibleCatenaryData)

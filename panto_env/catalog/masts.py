@@ -28,6 +28,9 @@ COLUMNS = {
         ("messengerheight", "messengerwireheight", "messenger"), HEIGHTS, "m", required=False, usual="m"
     ),
     "encumbrance": Column(("encumbrance", "systemheight"), HEIGHTS, "m", required=False, usual="m"),
+    "stitch_wire": Column(
+        ("stitchwire", "stitchwirelength", "stitch"), {"m": 1.0}, "m", required=False, blank=True, usual="m"
+    ),
     "type": Column(("type", "spantype"), {}, "text", required=False, text=True),
 }
 """Columns of a table of masts, in the order of travel: a row per mast, with the span that begins there."""
@@ -62,8 +65,8 @@ def line_from_masts(base: str | Path, masts: str | Path) -> str:
     return _with_sequence(path, table, items, end, Path(masts).name)
 
 
-def _spans(masts: str | Path) -> tuple[Items, dict[str, float]]:
-    """A table for each span, and one of the heights at the last mast."""
+def _spans(masts: str | Path) -> tuple[Items, dict[str, Any]]:
+    """A table for each span, and one of what is at the last mast."""
     columns = read_columns(masts, COLUMNS)
     lengths = _lengths(columns, masts)
     heights: dict[str, Sequence[float]] = {}
@@ -79,8 +82,12 @@ def _spans(masts: str | Path) -> tuple[Items, dict[str, float]]:
         heights["encumbrance"] = _rounded(columns["messenger_height"] - contact)
     elif "encumbrance" in columns:
         heights["encumbrance"] = _rounded(columns["encumbrance"])
+    at: Items = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
+    stitches = columns.get("stitch_wire", np.full(len(lengths) + 1, np.nan))
+    for table, length in zip(at, stitches, strict=True):
+        if not np.isnan(length):
+            table["stitch_wire"] = {"length": round(float(length), DIGITS)}
     types = columns.get("type", [""] * (len(lengths) + 1))
-    at = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
     items = [
         ({"type": kind} if kind else {}) | {"span_length": length} | own
         for kind, length, own in zip(types, lengths, at, strict=False)
@@ -128,7 +135,7 @@ def _rounded(values: Any) -> list[float]:
 
 
 def _with_sequence(
-    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, float], source: str
+    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, Any], source: str
 ) -> str:
     """The text of a line's TOML file with a sequence before its tables, in the place of ``spans``."""
     text = path.read_text(encoding="utf-8-sig")
@@ -155,5 +162,7 @@ def _with_sequence(
     return made
 
 
-def _inline(table: Mapping[str, Any]) -> str:
-    return f"{{ {', '.join(f'{key} = {json.dumps(value)}' for key, value in table.items())} }}"
+def _inline(value: Any) -> str:
+    if not isinstance(value, Mapping):
+        return json.dumps(value)
+    return f"{{ {', '.join(f'{key} = {_inline(each)}' for key, each in value.items())} }}"

@@ -43,7 +43,7 @@ def places_of(own: Iterable[float], further: Iterable[float] = (), apart: float 
 
 def index_at(places: Array, x: Any) -> Index:
     """Which of some places, in their order, is the one at x (m), of the shape of x: the nearest."""
-    return np.searchsorted((places[1:] + places[:-1]) / 2, x)
+    return np.asarray(np.searchsorted((places[1:] + places[:-1]) / 2, x))
 
 
 class Conductor(Wire):
@@ -153,13 +153,18 @@ class Span(Settings):
 
 
 class EndSupport(Settings):
-    """Heights at the last support of a sequence of spans, where no span begins."""
+    """What is at the last support of a sequence of spans, where no span begins."""
 
     encumbrance: Encumbrance | None = Field(
         None, description="height of messenger over contact wire (m), by default that of the last span"
     )
     contact_height: ContactHeight | None = Field(
         None, description="height of the contact wire (m), by default that of the last span"
+    )
+    stitch_wire: StitchWire | None = Field(
+        None,
+        description="what differs from the line's own stitch wire, a length of 0 for none; by default that "
+        "of the last span",
     )
 
 
