@@ -106,13 +106,15 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
 
 
 def _table(entry: Settings, path: list[str], value: float) -> Any:
-    """Values of an entry with another at a path; a line's droppers keep their spacing in another span."""
-    table: Any = entry.model_dump(exclude_none=True)
-    rule = {path[1]: value} if path[0] == "droppers" and path[1] in Spacing.model_fields else {}
-    if not isinstance(entry, FlexibleCatenaryData) or not (rule or path == ["span_length"]):
+    """Values of an entry with another at a path; a line's droppers may be placed by a rule."""
+    if not isinstance(entry, FlexibleCatenaryData) or not _is_rule(path):
         return _put(entry.model_dump(), path, value)
-    length = entry.span_length if rule else value
-    return table | {"span_length": length, "droppers": droppers_of(table, rule, length)}
+    table: Any = entry.model_dump(exclude_none=True)
+    return table | {"droppers": droppers_of(table, {path[1]: value}, entry.span_length)}
+
+
+def _is_rule(path: list[str]) -> bool:
+    return path[0] == "droppers" and path[1] in Spacing.model_fields
 
 
 def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
@@ -120,6 +122,9 @@ def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
 
     Raises InputError where it cannot exist, or where a value of a line is one that all its spans replace.
     """
+    if isinstance(entry, FlexibleCatenaryData) and "span_length" in keys and "droppers" not in keys:
+        own = entry.model_dump(exclude_none=True)
+        table = {**table, "droppers": droppers_of(own, {}, table["span_length"])}
     changed = type(entry).model_validate(table)
     if isinstance(entry, FlexibleCatenaryData) and entry.sequence and changed != entry:
         assert isinstance(changed, FlexibleCatenaryData)

@@ -33,6 +33,9 @@ COLUMNS = {
         ("messengerheight", "messengerwireheight", "messenger"), HEIGHTS, "m", required=False, usual="m"
     ),
     "encumbrance": Column(("encumbrance", "systemheight"), HEIGHTS, "m", required=False, usual="m"),
+    "stitch_wire": Column(
+        ("stitchwire", "stitchwirelength", "stitch"), {"m": 1.0}, "m", required=False, blank=True, usual="m"
+    ),
     "type": Column(("type", "spantype"), {}, "text", required=False, text=True),
     "mast": Column(("mast", "name", "mastname", "mastnumber", "mastno"), {}, "text", False, text=True),
     "stagger": Column(("stagger", "zigzag"), HEIGHTS, "m", required=False, blank=True, usual="m"),
@@ -104,8 +107,8 @@ def _surveyed(columns: Read, masts: str | Path) -> Items:
     return named if any(named) else []
 
 
-def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, float]]:
-    """A table for each span, and one of the heights at the last mast."""
+def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, Any]]:
+    """A table for each span, and one of what is at the last mast."""
     lengths = _lengths(columns, masts)
     heights: dict[str, Sequence[float]] = {}
     if "contact_height" in columns:
@@ -120,8 +123,12 @@ def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, float]]:
         heights["encumbrance"] = _rounded(columns["messenger_height"] - contact)
     elif "encumbrance" in columns:
         heights["encumbrance"] = _rounded(columns["encumbrance"])
+    at: Items = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
+    stitches = columns.get("stitch_wire", np.full(len(lengths) + 1, np.nan))
+    for table, length in zip(at, stitches, strict=True):
+        if not np.isnan(length):
+            table["stitch_wire"] = {"length": round(float(length), DIGITS)}
     types = columns.get("type", [""] * (len(lengths) + 1))
-    at = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
     for number, own in enumerate(at, start=1):
         valid(EndSupport, own, f"{_at(masts, columns, number)}, whose heights may have another unit")
     items = [
@@ -177,7 +184,7 @@ def _rounded(values: Any) -> list[float]:
 
 
 def _with_sequence(
-    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, float], source: str, named: Items
+    path: Path, table: Mapping[str, Any], items: Items, end: Mapping[str, Any], source: str, named: Items
 ) -> str:
     """The text of a line's TOML file with a sequence before its tables, in the place of ``spans``."""
     text = path.read_text(encoding="utf-8-sig")
@@ -207,5 +214,7 @@ def _with_sequence(
     return made
 
 
-def _inline(table: Mapping[str, Any]) -> str:
-    return f"{{ {', '.join(f'{key} = {json.dumps(value)}' for key, value in table.items())} }}"
+def _inline(value: Any) -> str:
+    if not isinstance(value, Mapping):
+        return json.dumps(value)
+    return f"{{ {', '.join(f'{key} = {_inline(each)}' for key, each in value.items())} }}"

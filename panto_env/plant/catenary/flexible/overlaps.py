@@ -155,13 +155,14 @@ def _own_line(
         _rise(tables[-count], each[last - count], leaving, entering_wire=False)
     for k, table in enumerate(tables):
         table["contact_height"] = heights[first + k] + float(rise[k])
+    end: dict[str, Any] = {}
+    if line.end_support is not None and last == len(each):
+        end = line.end_support.model_dump(include={"stitch_wire"}, exclude_none=True)
     changes = {
         "name": f"{line.name}, tension length {number + 1}",
         "sequence": tables,
-        "end_support": {
-            "encumbrance": encumbrances[last],
-            "contact_height": heights[last] + float(rise[-1]),
-        },
+        "end_support": end
+        | {"encumbrance": encumbrances[last], "contact_height": heights[last] + float(rise[-1])},
     }
     kept = line.model_dump(exclude={"sources", "spans", "span_types", "overlaps"}, exclude_none=True)
     return valid(FlexibleCatenaryData, kept | changes, f"An overlap of line '{line.name}'")

@@ -178,13 +178,18 @@ class Mast(Settings):
 
 
 class EndSupport(Settings):
-    """Heights at the last support of a sequence of spans, where no span begins."""
+    """What is at the last support of a sequence of spans, where no span begins."""
 
     encumbrance: Encumbrance | None = Field(
         None, description="height of messenger over contact wire (m), by default that of the last span"
     )
     contact_height: ContactHeight | None = Field(
         None, description="height of the contact wire (m), by default that of the last span"
+    )
+    stitch_wire: StitchWire | None = Field(
+        None,
+        description="what differs from the line's own stitch wire, a length of 0 for none; by default that "
+        "of the last span",
     )
 
 

@@ -218,7 +218,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
 
 
 def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data))
+    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), bool(data.sequence))
     return window and window + spans_of_train(data, runs)
 
 

@@ -30,7 +30,7 @@ from .parts import (
     Support,
     check_inside,
 )
-from .spans import laid_out, spans_of
+from .spans import laid_out, spans_of, stitch_at_end
 
 __all__ = [
     "CLOSEST",
@@ -86,7 +86,7 @@ class FlexibleCatenaryData(CatenaryData):
         "tables of a type and of what differs from it",
     )
     end_support: EndSupport | None = Field(
-        None, description="heights at the last support of a sequence, by default those of its last span"
+        None, description="heights and stitch wire at the last support, by default those of the last span"
     )
     overlaps: tuple[Overlap, ...] = Field(
         (), description="where one pair of wires ends and the next begins, in the order of travel"
@@ -124,6 +124,10 @@ class FlexibleCatenaryData(CatenaryData):
                 raise InputError(
                     f"The sequence has {len(sequence)} spans, but spans is {table['spans']}; leave spans out."
                 )
+        end, own = table.get("end_support"), table.get("stitch_wire")
+        given = end.get("stitch_wire") if isinstance(end, Mapping) else None
+        if isinstance(end, Mapping) and isinstance(given, Mapping) and isinstance(own, Mapping):
+            table["end_support"] = {**end, "stitch_wire": {**own, **given}}
         line = handler(table)
         if not line.sequence:
             if line.span_types or line.end_support is not None or line.overlaps:
@@ -133,6 +137,7 @@ class FlexibleCatenaryData(CatenaryData):
             return line
         found = spans_of(line)
         alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
+        alike &= stitch_at_end(line, found.each[-1]) == found.each[0].stitch_wire
         if not alike or len(set(found.encumbrances)) > 1 or line.overlaps:
             return line
         names = (name for name in Span.model_fields if name != "contact_height")

@@ -6,7 +6,7 @@ own, in its tables too. Droppers need no table: they stand at a spacing, and the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from ....base.ranges import Between
 from ....base.remember import remembered
 from ....base.settings import Settings
 from ..schema import LONGEST_SPAN, SHORTEST_SPAN
-from .parts import CLOSEST, Span
+from .parts import CLOSEST, Span, StitchWire
 
 if TYPE_CHECKING:
     from .schema import FlexibleCatenaryData
@@ -136,6 +136,12 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
     )
 
 
+def stitch_at_end(line: FlexibleCatenaryData, last: Span) -> StitchWire | None:
+    """Stitch wire at the last support of a line with this last span."""
+    end = line.end_support
+    return last.stitch_wire if end is None or end.stitch_wire is None else end.stitch_wire
+
+
 def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, Span]) -> Span:
     changes = {"type": item} if isinstance(item, str) else dict(item)
     name = changes.pop("type", None)
@@ -163,7 +169,11 @@ def _changed(own: Table, changes: Any, where: str) -> Span:
 
 
 def droppers_of(own: Table, changes: Any, span_length: Any) -> Any:
-    """A span's table of droppers, with those of ``own`` at a like spacing where that has another length."""
+    """A span's table of droppers, with those of ``own`` at a like spacing where that has another length.
+
+    Droppers on a stitch wire, and the next ones, keep their distance from the support. Raises InputError as
+    ``laid_out`` does.
+    """
     if not isinstance(changes, Mapping):
         return changes
     old, length = own["droppers"], own["span_length"]
@@ -185,6 +195,12 @@ def droppers_of(own: Table, changes: Any, span_length: Any) -> Any:
         }
         for key in {"positions", "sag"} - placed:
             del table[key]
+        stitch = own.get("stitch_wire")
+        if stitch and stitch["length"] > 0 and not placed & {"spacing", "first"}:
+            usual = {"pre_sag": pre_sag}
+            table["positions"] = _beside_stitches(x, length, span_length, stitch["length"] / 2)
+            if "sag" in placed:
+                usual = {}
         table = usual | table
     elif "positions" in placed and "sag" not in placed:
         del table["sag"]
@@ -192,6 +208,23 @@ def droppers_of(own: Table, changes: Any, span_length: Any) -> Any:
     elif "pre_sag" in placed:
         del table["sag"]
     return laid_out(table, span_length)
+
+
+def _beside_stitches(x: Sequence[float], length: float, span_length: float, half: float) -> list[float]:
+    """Places (m) of the droppers at x (m) in a span of another length.
+
+    Those nearer to a support than ``half`` a stitch wire stay at their distance from it, and so do the outer
+    ones of the others, which are spread between. length: of the span that x is for (m).
+    """
+    right = span_length - length
+    before, behind = [each for each in x if each < half], [each + right for each in x if length - each < half]
+    others = [each for each in x if half <= each <= length - half]
+    if not others or (room := others[-1] + right - others[0]) < 0:
+        return before + behind
+    spacing = (others[-1] - others[0]) / max(len(others) - 1, 1)
+    gaps = round(room / spacing) if spacing else 0
+    middle = np.linspace(others[0], others[0] + room, gaps + 1) if gaps else [others[0] + room / 2]
+    return [*before, *map(float, middle), *behind]
 
 
 def _is_length(value: Any) -> bool:

@@ -14,7 +14,7 @@ from ..schema import Wire
 from .overlaps import tension_lengths
 from .parts import CLOSEST, SAME, nearer
 from .schema import FlexibleCatenaryData
-from .spans import spans_of
+from .spans import spans_of, stitch_at_end
 
 NEAREST = 1.0
 """Least distance of a dropper on a stitch wire from its clamps (m)."""
@@ -72,7 +72,7 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
     """
     each = spans_of(line, spans).each
     supports = line.alignment(len(each)).supports
-    found = [span.stitch_wire for span in (*each, each[-1])]
+    found = [*(span.stitch_wire for span in each), stitch_at_end(line, each[-1])]
     there = [k for k, stitch in enumerate(found) if stitch is not None and stitch.length > 0]
     wires = [stitch for k in there if (stitch := found[k]) is not None]
     place = np.array([supports[k] for k in there])
