@@ -82,7 +82,7 @@ class Plant:
             self._set_pantograph(number, every, own.pantograph)
         self.actuators = actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
-        tables = [own.pantograph.force_over_height or () for own in train.collectors]
+        tables = [own.pantograph.force_over_height for own in train.collectors]
         knots = sorted({0.0, *(height for table in tables for height, _ in table)})
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),

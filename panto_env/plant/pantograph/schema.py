@@ -47,10 +47,9 @@ class PantographData(Settings):
         "contact force, for which the static force is trimmed: applied or mean",
     )
     static_force: StaticForce = Field(description="lifting force on the lowest mass (N)")
-    force_over_height: tuple[tuple[Annotated[float, Between(-3, 3, "m")], StaticForce], ...] | None = Field(
-        None,
-        min_length=2,
-        description="pairs of height over the nominal one, rising, and static force; linear between (m, N)",
+    force_over_height: tuple[tuple[Annotated[float, Between(-3, 3, "m")], StaticForce], ...] = Field(
+        (),
+        description="pairs of height over the nominal one (m), rising, and static force (N), linear between",
     )
     frame_spring: Literal["local", "nominal"] = Field(
         "local",
@@ -84,10 +83,10 @@ class PantographData(Settings):
                     f"stiffnesses must be at least {SOFTEST_SPRING:g} N/m, except the last, to the ground: "
                     f"nothing holds mass {number} up with {spring:g} N/m below it"
                 )
-        if self.force_over_height is not None:
+        if self.force_over_height:
             heights, forces = zip(*self.force_over_height, strict=True)
-            if not (np.diff(heights) > 0).all() or not heights[0] <= 0 <= heights[-1]:
-                raise ValueError("heights of force_over_height must rise, from 0 or below to 0 or above")
+            if not (len(heights) > 1 and (np.diff(heights) > 0).all() and heights[0] <= 0 <= heights[-1]):
+                raise ValueError("force_over_height needs two heights or more, rising from <= 0 to >= 0 m")
             if not np.isclose(np.interp(0.0, heights, forces), self.static_force, rtol=0.01):
                 raise ValueError(
                     f"force_over_height must be static_force, {self.static_force:g} N, at height 0"
@@ -123,7 +122,7 @@ class PantographData(Settings):
 
     def check_heights(self, line: str, heights: tuple[float, ...]) -> None:
         """Raise InputError unless ``force_over_height`` holds all heights (m) of a line of this name."""
-        held = [height for height, _ in self.force_over_height or ()]
+        held = [height for height, _ in self.force_over_height]
         if held and heights and not held[0] <= min(heights) <= max(heights) <= held[-1]:
             raise InputError(
                 f"The contact wire of line '{line}' hangs at {min(heights):g} to {max(heights):g} m; give "
