@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
+from stable_baselines3.common.vec_env import VecMonitor
 
 from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env.envs import PantographVectorEnv
@@ -34,7 +35,7 @@ def make_lanes(training: Training) -> Any:
 
         return DeviceLanes(training)
     parts = [_part(training, changes) for changes in training.variants or ({},)]
-    return parts[0] if len(parts) == 1 else SideBySide(parts)
+    return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
 
 
 def _part(training: Training, changes: Mapping[str, Any]) -> Any:

@@ -27,8 +27,8 @@ ACTIVATIONS = {"Tanh": "tanh", "ReLU": "relu"}
 SUFFIXES = (".safetensors",)
 PASSING = (
     "TimeLimit Autoreset PassiveEnvChecker OrderEnforcing RecordEpisodeStatistics Monitor VecMonitor "
-    "RecordVideo RenderCollection HumanRendering AddWhiteNoise ObstructView NormalizeReward DictInfoToList VecCheckNan "
-    "VecVideoRecorder PantographVecEnv DrivenByPolicies FlattenObservation RescaleAction"
+    "RecordVideo RenderCollection HumanRendering AddWhiteNoise ObstructView NormalizeReward DictInfoToList "
+    "VecCheckNan VecVideoRecorder PantographVecEnv DrivenByPolicies FlattenObservation RescaleAction"
 )
 """Wrappers that leave observations and actions alone; ``_on_actuator`` undoes the last one."""
 ELSE = 'or write it as a class in a file (docs/policies.md, "A policy of any library")'
@@ -83,7 +83,7 @@ def _environment(spec: Any, env: Any) -> dict[str, Any]:
 
 def _walk(env: Any) -> tuple[Any, tuple[Step, ...]]:
     """Spec of the environment within wrappers, and what these do to its observations."""
-    if isinstance(env, DummyVecEnv):
+    if type(env) is DummyVecEnv:
         (spec, steps), *others = map(_walk, env.envs)
         if any(each != steps for _, each in others):
             raise InputError("Lanes have statistics or wrappers of their own; wrap the VecEnv instead.")

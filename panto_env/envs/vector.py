@@ -46,7 +46,7 @@ class SharedByLanes(Whole):
             return tuple(map(self.context, range(self.num_envs)))
         value = getattr(self, f"single_{name}" if name in ("observation_space", "action_space") else name)
         if name.startswith("np_random") and isinstance(value, tuple):
-            return value
+            return tuple(value)
         return (value(*arguments, **named) if callable(value) else value,) * self.num_envs
 
     get_attr = call

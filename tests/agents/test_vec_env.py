@@ -43,6 +43,8 @@ def test_every_mode_of_autoreset_gives_the_same(mode):
     ends = 0
     for action in np.random.default_rng(0).uniform(-1, 1, (90, 3, 1)):
         mine, other = (env.step(action) for env in envs)
+        for info in (*mine[3], *other[3]):
+            info.get("episode", {"t": 0}).pop("t")  # on the clock
         np.testing.assert_equal(mine, other)
         ends += mine[2].sum()
     assert ends > 6
