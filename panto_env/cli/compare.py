@@ -20,7 +20,7 @@ from ..terminal import (
     progress_console,
     written_last,
 )
-from .identify import columns_named, pairs
+from .identify import given
 from .record import Heading, Mass, Page, Unit
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def compare(
 
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
-        measured = read_record(file, pairs(unit or []), columns_named(column), mass_correction=mass)
+        measured = read_record(file, *given(unit, column), mass_correction=mass)
         found = hold(measured, simulated, shift=shift)
     title = f"{file.name} and {run.name}: {simulated.pantograph} on {simulated.catenary}"
     title += f" at {simulated.speed_kmh:g} km/h"

@@ -11,7 +11,7 @@ import typer
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
-from .identify import columns_named, pairs
+from .identify import Given, given
 from .record import Heading, Mass, Unit
 
 if TYPE_CHECKING:
@@ -101,9 +101,7 @@ def diagnose(
     with progress_console.status("reading and diagnosing"):
         files = (run, *(again or []))
         if fit is not None:
-            title, found = _of_records(
-                files, fit, (pairs(unit or []), columns_named(column)), mass, rate, seed
-            )
+            title, found = _of_records(files, fit, given(unit, column), mass, rate, seed)
         else:
             title, found = _of_runs(files, (*(healthy or ()), *(more or ())), pantograph, rate, seed)
     with written_last() as later:
@@ -143,18 +141,13 @@ def _of_runs(
 
 
 def _of_records(
-    files: Sequence[Path],
-    fit: Path,
-    given: tuple[dict[str, str], dict[str, str]],
-    mass: float | None,
-    rate: float,
-    seed: int,
+    files: Sequence[Path], fit: Path, columns: Given, mass: float | None, rate: float, seed: int
 ) -> tuple[str, Diagnosis]:
-    """Title and diagnosis of a measuring train's records; given: units and headings of columns."""
+    """Title and diagnosis of a measuring train's records."""
     from ..diagnosis import diagnose_records
     from ..fitting.stored import stored
     from ..records.record_file import read_record
 
-    records = [read_record(file, *given, mass_correction=mass) for file in files]
+    records = [read_record(file, *columns, mass_correction=mass) for file in files]
     found = diagnose_records(records, stored(fit), false_alarms=rate, seed=seed)
     return f"{files[0].name}, held against the line fitted in {fit.name}", found

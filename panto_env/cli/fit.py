@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +20,7 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import columns_named, pairs
+from .identify import given, pairs
 from .record import Heading, Mass, Unit
 
 if TYPE_CHECKING:
@@ -94,8 +93,8 @@ def fit(
 
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
     tolerances = by_kind(tolerance or [])
-    read = partial(read_record, units=pairs(unit or []), headings=columns_named(column), mass_correction=mass)
-    records = [read(file) for file in files]
+    columns = given(unit, column)
+    records = [read_record(file, *columns, mass_correction=mass) for file in files]
     design, riding = load_catenary(line), load_pantograph(pantograph)
     if output is not None:
         check_design(design, line, names)

@@ -21,7 +21,7 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import columns_named, pairs
+from .identify import given
 
 if TYPE_CHECKING:
     from ..records.judge import Judgement
@@ -102,7 +102,7 @@ def record(
 
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
-        measured = read_record(file, pairs(unit or []), columns_named(column), mass_correction=mass)
+        measured = read_record(file, *given(unit, column), mass_correction=mass)
         found = judge(measured, known, span=span, section=section)
     title = f"{file.name}: {found.whole.figures.distance:,.0f} m"
     with written_last() as later:
