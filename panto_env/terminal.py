@@ -132,7 +132,11 @@ def _fitting(table: rich.table.Table, to: Console, options: ConsoleOptions) -> R
     sizes = [[Measurement.get(to, unlimited, each) for each in column] for column in cells]
     minimum = [min(LONGEST_WORD, max(size.minimum for size in column)) for column in sizes]
     wishes = [max(size.maximum for size in column) for column in sizes]
-    spare = options.max_width - (natural - sum(wishes)) - sum(minimum)
+    room = options.max_width - (natural - sum(wishes))
+    pairs = zip(minimum, sizes, strict=True)
+    rows = [max([least, *(size.maximum for size in column[1:])]) for least, column in pairs]
+    minimum = rows if sum(rows) <= room else minimum  # a heading breaks before a row does
+    spare = room - sum(minimum)
     if spare < 0:
         return _as_list(table, options.max_width)
     more = [wish - least for wish, least in zip(wishes, minimum, strict=True)]

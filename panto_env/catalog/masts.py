@@ -43,6 +43,8 @@ COLUMNS = {
     "cant": Column(("cant", "superelevation"), HEIGHTS, "m", required=False, blank=True, usual="m"),
 }
 """Columns of a table of masts, in the order of travel: a row per mast, with the span that begins there."""
+SURVEYED = {"mast": "name", "position": "chainage"} | {key: key for key in ("stagger", "radius", "cant")}
+"""Columns that ``Mast`` keeps, and its names for them."""
 DIGITS = 6
 """Decimals of lengths and heights (m), so that a difference of two heights is as round as they are."""
 Items = list[dict[str, Any]]
@@ -94,14 +96,15 @@ def _at(masts: str | Path, columns: Read, number: int) -> str:
 
 def _surveyed(columns: Read, masts: str | Path) -> Items:
     """What else the table says of each mast; nothing where it says nothing of any."""
-    named: list[dict[str, Any]] = [{} for _ in columns.lines]
-    position = columns.get("position", np.zeros(1))
-    for key in ("mast", "position", "stagger", "radius", "cant"):
-        if key in columns and (key != "position" or position[0] != 0):
-            field = {"mast": "name", "position": "chainage"}.get(key, key)
-            for own, value in zip(named, columns[key], strict=True):
-                if key == "mast" or (np.isfinite(value) and (key != "radius" or value)):
-                    own[field] = value if key == "mast" else round(float(value), DIGITS) + 0.0
+    keys = [key for key in SURVEYED if key in columns and (key != "position" or columns[key][0] != 0)]
+    named = [
+        {
+            SURVEYED[key]: value if key == "mast" else round(float(value), DIGITS) + 0.0
+            for key, value in zip(keys, row, strict=True)
+            if value == value and (value or key not in ("mast", "radius"))  # not empty, nor straight track
+        }
+        for row in zip(*(columns[key] for key in keys), strict=True)
+    ]
     for number, own in enumerate(named, start=1):
         valid(Mast, own, _at(masts, columns, number))
     return named if any(named) else []

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..identification import Identification, Match
 
 T = TypeVar("T")
+Given = tuple[dict[str, str], dict[str, str]]
+"""Units and headings by column."""
 
 
 class Method(StrEnum):
@@ -135,12 +137,12 @@ def pairs(texts: list[str]) -> dict[str, str]:
     return pairs
 
 
-def columns_named(texts: list[str] | None) -> dict[str, str]:
-    """Headings by column from "force=F [N]" each. Raises InputError for anything else."""
-    found = dict(text.partition("=")[::2] for text in texts or [])
-    if not all(name and heading for name, heading in found.items()):
+def given(unit: list[str] | None, column: list[str] | None) -> Given:
+    """Units, and headings from "force=F (N)" each, by column. Raises InputError for other texts."""
+    headings = dict(text.partition("=")[::2] for text in column or [])
+    if not all(name and heading for name, heading in headings.items()):
         raise InputError("--column must read NAME=HEADING, such as force_1=F_zw1.")
-    return {name.strip(): heading for name, heading in found.items()}
+    return pairs(unit or []), headings
 
 
 def _value(name: str, text: str) -> float:

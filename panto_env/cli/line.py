@@ -20,7 +20,7 @@ from ..plant.catenary.flexible.dropper_table import dropper_table
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
-from .identify import columns_named, pairs
+from .identify import Given, given
 from .record import Heading, Unit
 
 FORCE = 100.0
@@ -70,12 +70,12 @@ def line(
 
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
-    chosen, text = _line(name, seed, masts, output, (pairs(unit or []), columns_named(column)))
+    chosen, text = _line(name, seed, masts, output, given(unit, column))
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
-    given = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
-    condition = together(chosen.as_found or NEW, given)
+    own = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
+    condition = together(chosen.as_found or NEW, own)
     run = as_run(chosen, condition, force)
     criteria = found.criteria(speed)
     broken = [each for each in criteria if each.kept is False]
@@ -117,19 +117,16 @@ def line(
 
 
 def _line(
-    name: str, seed: int, masts: str | None, output: str | None, given: tuple[dict[str, str], dict[str, str]]
+    name: str, seed: int, masts: str | None, output: str | None, columns: Given
 ) -> tuple[Any, str | None]:
-    """The line, and the text of its TOML file where it is made from masts.
-
-    given: units and headings of the masts' columns.
-    """
+    """The line, and the text of its TOML file where it is made from masts."""
     if masts is None and drawn_kind(name):
         return line_of_seed(load_drawn(name), seed)[0], None
     if masts is None:
         return load_catenary(name), None
     from ..catalog.masts import line_from_masts
 
-    text = line_from_masts(name, masts, *given)
+    text = line_from_masts(name, masts, *columns)
     named = {"name": Path(output or masts).stem}
     return parse_catenary(named | tomllib.loads(text), Path(masts)), text
 

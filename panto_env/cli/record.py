@@ -21,7 +21,7 @@ from ..terminal import (
     writable,
     written_last,
 )
-from .identify import columns_named, pairs
+from .identify import given
 
 if TYPE_CHECKING:
     from ..records.judge import Judgement
@@ -62,8 +62,8 @@ def reading(
     unit: list[str] | None, column: list[str] | None, mass: float | None, filtered: float | None
 ) -> dict[str, Any]:
     """Arguments of ``read_record`` from a command's options."""
-    given = {"units": pairs(unit or []), "headings": columns_named(column)}
-    return {**given, "mass_correction": mass, "filtered": filtered}
+    units, headings = given(unit, column)
+    return {"units": units, "headings": headings, "mass_correction": mass, "filtered": filtered}
 
 
 def record(

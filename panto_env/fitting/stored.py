@@ -23,16 +23,10 @@ from .measured import BANDS
 from .values import FREE, WAVES, Value
 
 ARRAYS = ("difference", "covariance", "noise")
-FARTHEST = 1e3
-"""Maximum difference of a value, in tolerances."""
-SUREST = 1e-14
-"""Minimum eigenvalue of the covariance in units of the tolerances; without records all are 1."""
 Place = Annotated[float, Between(-1e7, 1e7, "m")]
 
 
 class _Value(Settings):
-    """A ``Value`` in a file."""
-
     kind: Literal[FREE]  # type: ignore[valid-type]
     name: str
     unit: str
@@ -43,8 +37,6 @@ class _Value(Settings):
 
 
 class _Table(Settings):
-    """What a file holds beside its arrays."""
-
     name: str
     line: str
     pantograph: str
@@ -119,7 +111,7 @@ def stored(path: str | Path) -> Stored:
             f"{path} does not hold a whole fit: {reason}; give a file that `panto fit --keep` wrote."
         ) from error
     values = tuple(Value(**dict(value)) for value in table.values)
-    found: dict[str, Any] = dict(table) | arrays | {"values": values}
+    found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS} | {"values": values}
     return Stored(**found)
 
 
@@ -128,22 +120,16 @@ def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
     count, tolerances = len(values), np.array([value.tolerance for value in values])
     if len({value.name for value in values}) < count:
         raise ValueError("two values have one name")
-    if set(arrays) != set(ARRAYS):
-        raise ValueError(f"its arrays are not {', '.join(ARRAYS)}")
-    for name, shape in (("difference", (count,)), ("covariance", (count, count)), ("noise", (BANDS,))):
-        array = arrays[name]
-        if array.shape != shape or array.dtype != np.float64:
-            raise ValueError(f"its {name} is not an array of numbers of shape {shape}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"its {name} holds numbers that are not finite")
-    if (np.abs(arrays["difference"]) > FARTHEST * tolerances).any() or (arrays["noise"] < 0).any():
+    for name, shape in zip(ARRAYS, ((count,), (count, count), (BANDS,)), strict=True):
+        array = arrays.get(name, np.empty(()))
+        if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
+            raise ValueError(f"its {name} is not an array of finite numbers of shape {shape}")
+    if (np.abs(arrays["difference"]) > 1e3 * tolerances).any() or (arrays["noise"] < 0).any():
         raise ValueError("a difference is beyond all tolerances, or a noise is negative")
-    relative = arrays["covariance"] / np.outer(tolerances, tolerances)
-    if not np.allclose(relative, relative.T, rtol=0.0, atol=1e-6) or np.abs(relative).max() > 2:
-        raise ValueError("its covariance is not symmetric, or wider than its tolerances")
-    eigenvalues = np.linalg.eigvalsh(relative)
-    if not SUREST < eigenvalues[0] <= eigenvalues[-1] < 1.001:
-        raise ValueError("its covariance is not positive, or wider than its tolerances")
+    relative = arrays["covariance"] / np.outer(tolerances, tolerances)  # without records, the unit matrix
+    usable = np.abs(relative).max() < 2 and np.allclose(relative, relative.T, rtol=0.0, atol=1e-6)
+    if not (usable and (sizes := np.linalg.eigvalsh(relative))[0] > 1e-14 and sizes[-1] < 1.001):
+        raise ValueError("its covariance is not symmetric and positive, or wider than its tolerances")
 
 
 def along(value: Value, before: float) -> Value:

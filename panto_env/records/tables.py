@@ -59,19 +59,20 @@ def part_tables(found: Judgement) -> list[Table]:
 
 
 def _parts_table(parts: list[Part], title: str) -> Table:
+    """Figures of parts; spans have their length in their names."""
+    long = [] if parts[0].kind == "span" else ["distance (m)"]
     short = [LABELS[key].short_heading for key in SHOWN]
     rows = [
         (
             part.where,
             *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
             number(part.arcing, 2),
-            number(part.figures.distance, 0),
+            *(number(part.figures.distance, 0) for _ in long),
             number(to_kmh(part.speed), 0),
-            str(part.samples),
         )
         for part in parts
     ]
-    return Table(title, ("where", *short, "NQ (%)", "distance (m)", "km/h", "samples"), rows)
+    return Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
 
 
 def requirements_table(found: Judgement) -> Table:

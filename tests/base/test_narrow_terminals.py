@@ -1,12 +1,15 @@
 """In a terminal of any width every number is whole: a table that does not fit becomes a list."""
 
+import io
 import re
 from collections import Counter
+from unittest import mock
 
 import pytest
 import rich.table
 from rich.console import Group
 
+from panto_env import terminal
 from panto_env.base.table import Alarm, Table
 from panto_env.terminal import PlainConsole, print_table
 
@@ -104,6 +107,18 @@ def test_a_narrow_terminal_shows_every_number_that_a_wide_one_shows(name, width,
     missing = shown[400] - shown[width]
     assert not missing
     assert sum(shown[400].values()) > 10
+
+
+def test_a_heading_breaks_before_a_row_does():
+    """At 120 columns, as where a span has its mast's name."""
+    headings = ("where", *(f"statistical minimum {k} of all (N)" for k in range(8)))
+    row = ("12 (17-23, 12+980.0): 680 to 745 m", *["100.0"] * 8)
+    console = PlainConsole(width=120, file=io.StringIO())
+    with mock.patch.object(terminal, "console", console):
+        terminal.print_table(Table("", headings, [row]))
+    lines = console.file.getvalue().splitlines()
+    assert any(row[0] in line for line in lines)
+    assert max(map(len, lines)) <= 120
 
 
 def test_a_pipe_without_a_terminal_takes_wide_tables(monkeypatch):

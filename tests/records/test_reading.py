@@ -42,6 +42,30 @@ def test_units_in_headings_or_given(columns, written):
     assert other.time_step == pytest.approx(0.002)
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-8-sig"])
+def test_a_measuring_trains_export_is_read(encoding, columns, tmp_path):
+    """Preamble, names and units in rows of their own, commas, umlauts, km+m, an empty row."""
+    plain = tmp_path / "plain.csv"
+    force = columns["force (N)"]
+    rows = [",".join(columns)] + [
+        ",".join(map(repr, map(float, row))) for row in zip(*columns.values(), strict=True)
+    ]
+    plain.write_text("\n".join(rows))
+    lines = ["Meßfahrt;5520;Höhe", "Datum: 12.03.2021;;", "Zeit;Ort;F_zw1;F_zw2;Bem.", "s;km;kN;kN;"]
+    for time, place, each in zip(columns["time (s)"], columns["position (m)"], force, strict=True):
+        km, metres = divmod(place, 1000)
+        half = repr(float(each) / 2000)
+        lines.append(f"{time:.3f};{km:.0f}+{metres:.1f};{half};{half};".replace(".", ","))
+    path = tmp_path / "export.csv"
+    path.write_bytes("\r\n".join([*lines, ";;;;", ""]).encode(encoding))
+    named = {"time": "Zeit", "position": "Ort", "force_1": "F_zw1", "force_2": "F_zw2"}
+    found, then = read_record(path, None, named).longest, read_record(plain).longest
+    np.testing.assert_allclose(found.force, then.force, rtol=1e-12)
+    np.testing.assert_allclose(found.position, then.position, atol=1e-6)
+    with pytest.raises(InputError, match=r"has no column force_1 .*give --column force_1=HEADING"):
+        read_record(path, None, named | {"force_1": "F_zw3"})
+
+
 def test_parquet_has_the_same_columns(columns, written, tmp_path):
     columns["run"] = ["a"] * 5000
     pq.write_table(pa.table(columns), tmp_path / "a.parquet")
