@@ -42,8 +42,8 @@ def test_csv_has_all_samples_with_units(run, tmp_path):
     run.save(tmp_path / "run.csv")
     frame = pandas.read_csv(tmp_path / "run.csv")
     check_samples(frame, run)
-    assert run.dropper_position[9] == 70.0
-    assert frame["dropper_force at 70 m (N)"].to_numpy() == pytest.approx(run.dropper_force[:, 9])
+    assert run.dropper_position[7] == 70.0
+    assert frame["dropper_force at 70 m (N)"].to_numpy() == pytest.approx(run.dropper_force[:, 7])
 
 
 def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
@@ -69,7 +69,7 @@ def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
 def test_droppers_at_rest_and_in_the_run_stand_side_by_side(run, book):
     frame = book["droppers"]
     moving, resting = moving_droppers(run), droppers_at_rest(run_line(run))
-    assert frame["number"].tolist() == list(range(1, 10))
+    assert frame["number"].tolist() == list(range(1, 8))
     assert frame["maximum force (N)"].tolist() == pytest.approx([each.largest for each in moving])
     assert frame["static force (N)"].tolist() == pytest.approx([each.static_force for each in resting])
     assert frame["length, unloaded (m)"].tolist() == pytest.approx([each.length for each in resting])
@@ -89,7 +89,7 @@ def test_tables_of_several_runs_have_a_column_for_each_fact(run, tmp_path):
     assert sorted(set(frame["speed (km/h)"])) == pytest.approx([80, 160])
     assert set(frame["spans"]) == {"10-12"}
     save_droppers([run, slower], tmp_path / "droppers.csv")
-    assert len(pandas.read_csv(tmp_path / "droppers.csv")) == 18
+    assert len(pandas.read_csv(tmp_path / "droppers.csv")) == 14
 
 
 def test_a_run_without_figures_is_saved_with_the_reason(tmp_path):

@@ -57,7 +57,7 @@ def test_each_cell_finds_the_nearest_dropper(line):
 
 
 @pytest.mark.filterwarnings("ignore:A grid of")
-@pytest.mark.parametrize("catenary", ["re330", "sweden-st15"])
+@pytest.mark.parametrize("catenary", ["en50318-2002", "sweden-st15"])
 def test_slow_trains_pass_droppers_as_on_a_fine_grid(catenary, monkeypatch):
     """Without it sigma was wrong by several times as much."""
     given = {"catenary": catenary, "pantograph": "en50318-2002", "speed_kmh": 30.0, "record_droppers": False}

@@ -67,9 +67,9 @@ def test_tension_lengths_of_a_line():
     assert first.line.contact_heights == (*[0.0] * 12, 0.1, 0.5)
     assert second.line.contact_heights == (0.5, 0.1, *[0.0] * 6, 0.3)
     # Droppers count span by span, those of the ending wires first.
-    per_span = 9
-    assert first.droppers[10 * per_span :].tolist() == [90 + k + 18 * n for n in range(3) for k in range(9)]
-    assert second.droppers[: 2 * per_span].tolist() == [99 + k + 18 * n for n in range(2) for k in range(9)]
+    per_span = 7
+    assert first.droppers[10 * per_span :].tolist() == [70 + k + 14 * n for n in range(3) for k in range(7)]
+    assert second.droppers[: 2 * per_span].tolist() == [77 + k + 14 * n for n in range(2) for k in range(7)]
     every = np.concatenate([first.droppers, second.droppers, third.droppers])
     assert sorted(every.tolist()) == list(range((SPANS + 4) * per_span))
 
@@ -97,8 +97,8 @@ def test_droppers_of_both_pairs_carry_both_wires():
     """All that hangs between two mirrored ends is carried; the table counts droppers span by span."""
     line = line_of()
     table = droppers_at_rest(line)
-    assert [each.number for each in table if each.span == FIRST] == list(range(1, 19))
-    assert len(table) == 27 * 9
+    assert [each.number for each in table if each.span == FIRST] == list(range(1, 15))
+    assert len(table) == 27 * 7
     force = np.array([each.static_force for each in table])
     for part in tension_lengths(line):
         wire, count = line.contact_wire, part.spans
@@ -111,7 +111,7 @@ def test_droppers_of_both_pairs_carry_both_wires():
 
 def test_compressed_droppers_are_refused_by_their_tension_length():
     with pytest.raises(
-        InputError, match=r"dropper 6 of span 12 of line 're330, tension length 1'.*only pull"
+        InputError, match=r"dropper 5 of span 12 of line 're330, tension length 1'.*only pull"
     ):
         hang(line_of([{"first_span": FIRST, "rises": [0.4, 0.8]}]))
 
