@@ -1,4 +1,4 @@
-"""Every output of a run in a travelling window beside that of the whole line: ``python -m tests.every_output``."""
+"""Every output of a run in a travelling window beside the whole line: ``python -m tests.every_output``."""
 
 import warnings
 
