@@ -14,6 +14,8 @@ from panto_env.catalog.loader import parse_catenary, text_of
 from panto_env.catalog.masts import line_from_masts
 from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
 from panto_env.plant.catenary.flexible.spans import spans_of
+from panto_env.plant.catenary.flexible.static import hang
+from panto_env.plant.catenary.flexible.stitches import stitches_of
 
 from ..command import panto
 
@@ -146,3 +148,13 @@ def test_the_command_shows_a_line_of_the_catalogue_and_refuses_others():
     assert "all spans are alike" in result.stdout
     assert panto("line", "ohl-three-span").returncode == 2
     assert panto("line", "re250", "--output", "x.toml").returncode == 2
+
+
+def test_masts_say_which_supports_have_a_stitch_wire(tmp_path):
+    """Empty cells are the line's own; 0 is none, at the last mast too."""
+    text = "position (m),stitch wire (m)\n0,\n65,\n125,0\n180,16\n245,\n310,0\n"
+    line = made(text, tmp_path, "re330-stitched")
+    found = stitches_of(line)
+    assert found.support.tolist() == [0, 1, 3, 4]
+    assert (found.end - found.begin).tolist() == [18.0, 18.0, 16.0, 18.0]
+    assert len(hang(line).ropes) == 4

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
+from panto_env.analysis.parameters import change
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
@@ -15,6 +16,7 @@ from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.scattered_arrays import HUNG, LINK, STITCH
 from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
 from panto_env.plant.line_condition import NEW, LineCondition
@@ -226,3 +228,72 @@ def test_stitch_wires_that_reach_each_other_are_refused():
     short = line_of(span_length=18.0, droppers=droppers, stitch_wire=STITCH_WIRE)
     with pytest.raises(InputError, match="reaches to the one before it"):
         hang(short)
+
+
+ALMOST = {
+    "positions": [2.5, 6.5, 12.5, 19.1667, 25.8333, 32.500000000000004, 39.1667, 45.8333, 52.5, 58.5, 62.5]
+}
+"""The sixth dropper 4e-15 m off the middle of the span."""
+
+
+def test_a_dropper_almost_at_mid_span_hangs_as_one_there():
+    droppers = ALMOST | {"sag": [0.0] * 11}
+    exact = droppers | {"positions": [*ALMOST["positions"][:5], 32.5, *ALMOST["positions"][6:]]}
+    almost, there = (hang(line_of(droppers=each)) for each in (droppers, exact))
+    np.testing.assert_allclose(almost.dropper_length, there.dropper_length, atol=1e-9)
+    np.testing.assert_allclose(almost.dropper_tension, there.dropper_tension, atol=1e-6)
+
+
+def test_droppers_almost_at_places_of_a_stitched_line_hang_as_droppers_there():
+    """Near mid-span, a clamp, or the least distance from it: up to 1e-5 m they were metres too long."""
+    random = np.random.default_rng(7)
+    for _ in range(40):
+        span, half = float(random.uniform(48, 70)), float(random.uniform(6, 10))
+        inner = np.linspace(half, span / 2, int(random.integers(3, 6)))  # the first at the clamp
+        left = np.array([half - 4.5, half - 1.0, *inner])
+        places = np.append(left, span - left[-2::-1])
+        sag = [0.0] * len(places)
+        stitch = STITCH_WIRE | {"length": 2 * half, "tension": float(random.uniform(2000, 4000))}
+        moved = places + random.choice([-1, 1], len(places)) * 10.0 ** random.uniform(-15, -5, len(places))
+        shapes = [
+            hang(
+                line_of(span_length=span, droppers={"positions": x.tolist(), "sag": sag}, stitch_wire=stitch)
+            )
+            for x in (places, moved)
+        ]
+        np.testing.assert_allclose(shapes[1].dropper_length, shapes[0].dropper_length, atol=1e-5)
+        np.testing.assert_allclose(shapes[1].dropper_tension, shapes[0].dropper_tension, atol=1e-2)
+        line = line_of(
+            span_length=span, droppers={"positions": moved.tolist(), "sag": sag}, stitch_wire=stitch, spans=5
+        )
+        assert abs(DefectiveLine(line, 5, NEW).solve().rise).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["re250-stitched", "re330-stitched"])
+def test_spans_of_another_length_keep_their_droppers_on_the_stitch_wire(name):
+    """In a sequence, and where all spans are changed."""
+    base = load_catenary(name)
+    for length in (40.0, 45.0, 50.0, 54.0, 55.0, 58.0, 60.0, 63.0, 64.0, 70.0, 75.0):
+        table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+        sequence = [{}, {}, {"span_length": length}, {"span_length": length}, {}, {}]
+        line = FlexibleCatenaryData.model_validate(table | {"sequence": sequence})
+        hang(line)
+        for droppers in (
+            spans_of(line).each[2].droppers,
+            change(base, "catenary.span_length", length).droppers,
+        ):
+            x = np.array(droppers.positions)
+            assert x[[0, 1, 2]].tolist() == [2.5, 6.5, 12.5]
+            np.testing.assert_allclose(length - x[[-1, -2, -3]], [2.5, 6.5, 12.5])
+            between = np.diff(x[2:-2])
+            np.testing.assert_allclose(between, between[0])
+            assert 5 < between[0] < 8.5
+
+
+def test_the_last_support_may_have_no_stitch_wire():
+    bare = line_of(sequence=[{}] * 8, end_support={"stitch_wire": {"length": 0.0}})
+    assert bare.sequence
+    assert stitches_of(bare).support.tolist() == list(range(8))
+    assert len(hang(bare).ropes) == 8
+    same = line_of(sequence=[{}] * 8, end_support={"stitch_wire": {"length": 18.0}})
+    assert same == line_of(spans=8).model_copy(update={"sources": same.sources})

@@ -218,7 +218,9 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
 
 
 def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), bool(data.sequence))
+    window = window_of(
+        data.wires, numerics, runs, bool(data.overlaps), stitched(data), data.alignment().pitch is None
+    )
     return window and window + spans_of_train(data, runs)
 
 

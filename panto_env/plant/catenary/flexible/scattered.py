@@ -127,9 +127,12 @@ def calm_from(line, start):
     """Number of the window's node from which the line is at rest when the window has just moved to ``start``.
 
     There it ended, or the first stitch wire begins of those that come in: they were not there before, and
-    what would have hung from them swung freely. A step of some millimetres would be 300 N in a dropper.
+    what would have hung from them swung freely. A step of some millimetres would be 300 N in a dropper. All
+    moves on where spans are of one length and none has stitch wires, as it does where they are alike.
     """
     nodes = line.rows * WIDTH
+    if line.alignment.per_metre > 0.0 and line.scattered.deficit.size == 0:
+        return 2 * nodes
     ended = nodes - nodes // line.window
     calm, stitches = ended - PAD, line.scattered.stitches
     for n in range(stitches.number.size):
@@ -162,8 +165,8 @@ def _ease(line, wire, lane, held, n, first, node, calm):
     """Bring link n of those whose sets begin with ``first`` to rest as the wires at a node of the window."""
     sets, slot = held.node.shape[1], n % held.number.shape[1]
     s, j = first + slot % sets, slot // sets
-    gap, share = wire.gap[lane, s, j], share_left(line, calm, node)
-    wire.extension[lane, s, j] = share * (wire.extension[lane, s, j] + gap) - gap
+    apart = wire.extension[lane, s, j] + wire.gap[lane, s, j]
+    wire.extension[lane, s, j] -= (1.0 - share_left(line, calm, node)) * apart
 
 
 @inlined
