@@ -313,7 +313,7 @@ def test_gains_tuned_with_a_washout_are_for_policies_that_have_it(tmp_path: Path
         check_gain_file(path, "tuned-pd", with_it, force=False)
     with pytest.raises(
         InputError,
-        match=r"'lqg' has no gains to tune with a washout; policies .* are tuned-pd, tuned-fb\+ff\.",
+        match=r"'lqg' has no gains to tune with a washout; policies .* are .*tuned-pd",
     ):
         tunable("lqg", washout=1.0)
 
