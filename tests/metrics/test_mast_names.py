@@ -59,7 +59,7 @@ def test_files_of_a_run(run):
 def test_the_page_of_a_run(run):
     text = page([Findings(run, "run.parquet")])
     assert text.count(f'<th scope="row">{TWELFTH}</th>') > 2  # figures and droppers
-    assert ">M011<" in text  # below its bar of uplift
+    assert "<!-- M011 -->" in text  # below its bar of uplift
 
 
 def test_a_record_judged_and_compared(line, run):
