@@ -23,7 +23,7 @@ SHOWN = {
     "agent-any-pantograph": "learned; one network for four pantographs",
     "agent-any-line": "learned; told nothing of the line",
     "repetitive": "learns the span during the run",
-    "fb+ff:washout=1": "paper 1's feedback and feed-forward",
+    "fb+ff:gain=0.3,washout=1": "paper 1's feedback and feed-forward",
     "pd:washout=1": "proportional-derivative feedback",
     "passive": "no control",
 }
