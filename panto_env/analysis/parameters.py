@@ -19,6 +19,7 @@ from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import Spacing, droppers_of, spans_of
 
 S = TypeVar("S", bound=Settings)
+RULES = ("spacing", "pre_sag")  # of droppers, in the place of their positions and sags
 
 
 def parameter_names(entry: Settings, family: str) -> list[str]:
@@ -29,7 +30,7 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
         if isinstance(value, Settings):
             names += parameter_names(value, f"{family}.{key}")
             if isinstance(value, Droppers):  # also by the rule that lays them out
-                names += [f"{family}.{key}.{rule}" for rule in Spacing.model_fields]
+                names += [f"{family}.{key}.{rule}" for rule in RULES]
         elif isinstance(value, tuple):
             names += _places(value, f"{family}.{key}")
         elif _is_number(value) or any(ranges_of(field.rebuild_annotation())):  # "rigid" or None now
@@ -108,7 +109,7 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
 def _table(entry: Settings, path: list[str], value: float) -> Any:
     """Values of an entry with another at a path; a line's droppers keep their spacing in another span."""
     table: Any = entry.model_dump(exclude_none=True)
-    rule = {path[1]: value} if path[0] == "droppers" and path[1] in Spacing.model_fields else {}
+    rule = {path[1]: value} if path[0] == "droppers" and path[1] in RULES else {}
     if not isinstance(entry, FlexibleCatenaryData) or not (rule or path == ["span_length"]):
         return _put(entry.model_dump(), path, value)
     length = entry.span_length if rule else value
