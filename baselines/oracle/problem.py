@@ -119,12 +119,7 @@ class Problem:
         """The controlled pantograph's pass as ``simulate`` runs it under commands (N), (count, places)."""
         rest = np.zeros((self.begin - self.first_action, self.places))
         actions = np.concatenate([rest, commands / self.knots.limit, np.zeros((1, self.places))])
-        run = simulate(
-            **self.given,
-            policy=Tape(actions),
-            seed=self.seed,
-            record_droppers=False,
-        )
+        run = simulate(**self.given, policy=Tape(actions), seed=self.seed, record_droppers=False)
         return run.controlled
 
     def _filtered(self, force: Array) -> Array:

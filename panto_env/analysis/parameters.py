@@ -19,6 +19,7 @@ from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import Spacing, droppers_of, spans_of
 
 S = TypeVar("S", bound=Settings)
+RULES = ("spacing", "pre_sag")  # of droppers, in the place of their positions and sags
 
 
 def parameter_names(entry: Settings, family: str) -> list[str]:
@@ -29,7 +30,7 @@ def parameter_names(entry: Settings, family: str) -> list[str]:
         if isinstance(value, Settings) and key != "published":  # on which nothing depends
             names += parameter_names(value, f"{family}.{key}")
             if isinstance(value, Droppers):  # also by the rule that lays them out
-                names += [f"{family}.{key}.{rule}" for rule in Spacing.model_fields]
+                names += [f"{family}.{key}.{rule}" for rule in RULES]
         elif isinstance(value, tuple):
             names += _places(value, f"{family}.{key}")
         elif _is_number(value) or any(ranges_of(field.rebuild_annotation())):  # "rigid" or None now
@@ -114,7 +115,7 @@ def _table(entry: Settings, path: list[str], value: float) -> Any:
 
 
 def _is_rule(path: list[str]) -> bool:
-    return path[0] == "droppers" and path[1] in Spacing.model_fields
+    return path[0] == "droppers" and path[1] in RULES
 
 
 def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:

@@ -43,7 +43,7 @@ SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a parameter of all policies, for example ``policy.gain``."""
 MOST_PARAMETERS = 3
-FIRST = ("catenary.span_length", "catenary.droppers.spacing", "catenary.droppers.first")
+FIRST = ("catenary.span_length", "catenary.droppers.spacing")
 """Parameters that lay out droppers anew, in the order in which they are changed, before all others."""
 
 Row = dict[str, Any]

@@ -76,7 +76,7 @@ def line(
     found = check(chosen, force)
     own = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
     condition = together(chosen.as_found or NEW, own)
-    run = as_run(chosen, condition, force)
+    run = None if condition == NEW else as_run(chosen, condition, force)
     criteria = found.criteria(speed)
     broken = [each for each in criteria if each.kept is False]
     with written_last() as later:
@@ -94,11 +94,11 @@ def line(
                     "spans": [each._asdict() for each in found.spans],
                     "droppers": [each._asdict() for each in found.droppers],
                     "criteria": [each.as_dict() for each in criteria],
-                    "as_run": run.rows | {"droppers": [each._asdict() for each in run.droppers]},
+                    "as_run": run and run.rows | {"droppers": [each._asdict() for each in run.droppers]},
                 }
             )
         else:
-            other, named = as_run_tables(chosen, run), chosen.alignment().span_name
+            other, named = as_run_tables(chosen, run) if run else [], chosen.alignment().span_name
             for table in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
                 print_table(table)
             print_criteria(criteria, f"Line {chosen.name} at rest")
@@ -108,7 +108,7 @@ def line(
                 )
             else:
                 print_table(elasticity_table([found]))
-            if condition != NEW and not other:
+            if run and not other:
                 console.print("This condition changes no tension along the line: it is run as designed.")
             for each in broken:
                 alert(f"{each.name} is not kept.")

@@ -28,8 +28,6 @@ from ..terminal import Json, Plot, console, counting, number, print_json, writab
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
-DROPPERS = ("dropper\nmax (N)", "slack\n(of time)")
-"""Headings of the columns of droppers."""
 
 
 @with_settings(left_out=("observation",))
@@ -140,7 +138,7 @@ def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
     for key in shown:
         table.add_column(LABELS[key].column, justify="right")
     droppers = any(isfinite(row["dropper_force"]) for row in rows)
-    for heading in DROPPERS if droppers else ():
+    for heading in ("dropper\nmax (N)", "slack\n(of time)") if droppers else ():
         table.add_column(heading, justify="right")
     table.add_column("requirements")
     for row in rows:

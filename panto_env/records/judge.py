@@ -197,9 +197,8 @@ def _section_edges(position: Array, line: CatenaryData | None, section: float | 
 
 def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) -> list[Criterion]:
     """Requirements at the mean speed of a part; uplift: maximum at the mast (m); blind: see ``_blind``."""
-    speed = from_kmh(
-        round(to_kmh(part.speed), 1)
-    )  # limits change at 200 and 250 km/h: rounding decides nothing
+    # Limits change at 200 and 250 km/h: rounding decides nothing.
+    speed = from_kmh(round(to_kmh(part.speed), 1))
     facts = LineFacts(system_source="own choice, as no line is given")
     if line is not None:
         wave = line.contact_wire.wave_speed if isinstance(line, FlexibleCatenaryData) else math.inf

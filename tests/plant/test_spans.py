@@ -204,7 +204,7 @@ def test_a_sequence_that_cannot_be_is_refused_in_one_sentence(old, new, message,
     ("droppers", "message"),
     [
         ("{spacing = 0.1, stiffness = 1e5}", "'spacing' must be a number from 1 to 200 m"),
-        ("{pre_sag = 0.05, stiffness = 1e5}", "'spacing' is missing: distance between droppers"),
+        ("{pre_sag = 0.05, stiffness = 1e5}", "'spacing' is missing: approximate distance between droppers"),
         ("{spacing = 6, first = 40.0, stiffness = 1e5}", "would cross in a span of 65 m"),
         ("{spacing = 6, sag = [0.0], stiffness = 1e5}", "sag needs their positions"),
         ("{positions = [9, 56], sag = [0, 0], pre_sag = 0.1, stiffness = 1e5}", "no pre_sag beside it"),

@@ -91,8 +91,5 @@ def as_run_tables(line: FlexibleCatenaryData, run: AsRun) -> list[Table]:
     words += [f"each tension is drawn within ± {drawn:.1f} % of these"] if drawn else []
     both = zip(as_run(line, NEW, run.force).rows.items(), run.rows.values(), strict=True)
     rows = [(heading, f"{one:,.5g}", f"{other:,.5g}") for (heading, one), other in both]
-    droppers = dropper_table(run.droppers)
-    return [
-        Table("; ".join(words), ("", "as designed", "as run"), rows),
-        replace(droppers, title=droppers.title.replace("as designed", "as run")),
-    ]
+    droppers = replace(dropper_table(run.droppers), title="Droppers at rest, as run")
+    return [Table("; ".join(words), ("", "as designed", "as run"), rows), droppers]
