@@ -16,6 +16,7 @@ EVALUATED = 26
 EAC = {
     "kind": "flexible",
     "name": "eac-350",
+    "description": "Adif's line for 350 km/h with stitch wires",
     "span_length": 64.0,
     "spans": 60,
     "system": "AC 25 kV",
@@ -85,6 +86,9 @@ def differences(line, pantograph, speed_kmh, spans, last=EVALUATED, **settings):
     ahead = [float(np.where(spans_ahead >= 2, force - at_rest, 0.0).max()) for force in of_droppers]
     evaluated = whole.alignment.within(whole.dropper_position, spans)
     uplifts = run.uplift[inside], whole.uplift[inside]
+    train = whole.alignment.in_spans(whole.position[inside]).reshape(-1, 1)
+    near = np.abs(whole.alignment.in_spans(whole.support_position) - train) < 2
+    by = np.abs(whole.alignment.in_spans(whole.dropper_position) - train) < 2
     force = low_pass(run.contact_force - whole.contact_force, whole.time_step)[inside]
     return {
         "window (spans)": run.settings["window"],
@@ -99,7 +103,9 @@ def differences(line, pantograph, speed_kmh, spans, last=EVALUATED, **settings):
         "frame (mm/s)": 1e3 * largest((run.frame_velocity - whole.frame_velocity)[inside]),
         "largest uplift (mm)": 1e3 * (ours.max_uplift - theirs.max_uplift),
         "uplift, any support, any time (mm)": 1e3 * largest((uplifts[0] - uplifts[1])[uplifts[0] != 0]),
+        "the same within two spans of the train (mm)": 1e3 * largest((uplifts[0] - uplifts[1])[near]),
         "force of any dropper, any time (N)": largest((of_droppers[0] - of_droppers[1])[computed]),
+        "the same within two spans of the train (N)": largest((of_droppers[0] - of_droppers[1])[by]),
         "largest dropper force (N)": float(
             of_droppers[0][:, evaluated].max() - of_droppers[1][:, evaluated].max()
         ),

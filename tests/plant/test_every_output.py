@@ -17,9 +17,10 @@ def test_every_output_in_a_window_is_that_of_the_whole_line(name):
     for key in ("wire (mm)", "head (mm)", "frame (mm)"):
         assert abs(found[key]) < 2.5, key
     assert abs(found["largest uplift (mm)"]) < 0.5
+    assert found["the same within two spans of the train (mm)"] < 3.5
     assert abs(found["largest dropper force (N)"]) < 3
     whole = found["the same on the whole line"]
-    assert found["dropper ahead of the train (N over rest)"] == pytest.approx(whole, abs=1)
+    assert found["dropper ahead of the train (N over rest)"] == pytest.approx(whole, abs=6)
 
 
 def test_a_long_pass_on_a_stitched_line_has_no_forces_of_its_own_ahead():
