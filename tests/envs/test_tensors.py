@@ -90,8 +90,8 @@ def check_episodes(arrays, tensors, within):
 def test_lanes_are_those_of_arrays(case):
     name, settings = CASES[case]
     # On a GPU all was equal so far, but another compiler may fuse other operations. Even the same one
-    # does for arrays that lie otherwise in memory: in an overlap, by 1e-10 N.
-    within = 0.0 if DEVICE == "cpu" and case != "overlap" else 1e-3
+    # does for arrays that lie otherwise in memory: on lines of spans one by one, by 1e-10 N.
+    within = 0.0 if DEVICE == "cpu" and case not in ("overlap", "ramp") else 1e-3
     info, ours = check_episodes(*both(name, 4, settings), within)
     assert np.isfinite(info["figures"]["std"]).all()
     check_same(info["figures"], ours["figures"], within)
