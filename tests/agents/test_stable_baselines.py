@@ -176,7 +176,9 @@ def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_p
     model = trained(kind, CHAINS[chain](), **more).learn(100)
     last = model.policy.action_net if kind is PPO else model.actor.mu  # lively, and not saturated
     last.weight.data.normal_(0, 0.03, generator=torch.Generator().manual_seed(0))
-    last.bias.data[:] = float(model.action_space.low + model.action_space.high) / 2 if kind is PPO else 0.0
+    last.bias.data[:] = (
+        float(model.action_space.low[0] + model.action_space.high[0]) / 2 if kind is PPO else 0.0
+    )
     env = model.get_env()
     freeze(env)
     save_policy(model, tmp_path / "mine.safetensors")
