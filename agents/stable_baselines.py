@@ -138,7 +138,8 @@ def _check(model: Any, actor: Actor, facts: Facts) -> None:
             f"The network has not the {width} inputs and {actions} actions of the task; give as env that of "
             "its training, and train several pantographs in the vector environment, in which each is a lane."
         )
-    seen = np.random.default_rng(0).normal(0, 10, (16, *model.observation_space.shape)).astype(np.float32)
+    shape, sizes = model.observation_space.shape, np.logspace(-1, 2, 16)
+    seen = np.random.default_rng(0).normal(0, sizes, (*shape[::-1], 16)).T.astype(np.float32)
     low, high = model.action_space.low, model.action_space.high
     wanted = (2 * model.predict(seen, deterministic=True)[0] - low - high) / (high - low)
     if not np.allclose([actor.act(each.ravel()) for each in seen], wanted, atol=1e-3):
