@@ -49,8 +49,8 @@ def of_readme() -> str:
     for policy, what in SHOWN.items():
         own = standings[policy]
         change = "not ranked" if own.rank is None else f"{own.change:.1f}"
-        if own.rank is not None and own.interval is not None:
-            change += f" ({own.interval[0]:.1f} to {own.interval[1]:.1f})"
+        if own.rank is not None and own.interval_for_lines is not None:
+            change += " ({:.1f} to {:.1f})".format(*own.interval_for_lines)
         rows.append((f"`{policy}`", what, change, f"{own.contact_loss:.2f}", f"{own.cost_change:+.0f}"))
     table = Table("", ("policy", "", "Δσ (%)", "CL (%)", "ΔCF (%)"), tuple(rows), text_columns=2)
     return f"{BEGIN}\n\n{table.markdown.rstrip()}\n\n{END}"
