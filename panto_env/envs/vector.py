@@ -47,7 +47,7 @@ class SharedByLanes(Whole):
         value = getattr(self, f"single_{name}" if name in ("observation_space", "action_space") else name)
         if name.startswith("np_random") and isinstance(value, tuple):
             return tuple(value)
-        return (value(*arguments, **named) if callable(value) else value,) * self.num_envs
+        return tuple([value(*arguments, **named) if callable(value) else value] * self.num_envs)
 
     get_attr = call
 
