@@ -27,6 +27,6 @@ def hint(name: str, known: Sequence[str]) -> str:
 def nearest(name: str, known: Sequence[str]) -> str | None:
     """The known name nearest to a misspelt one, or "'force_limit' or 'rate_limit'" for a word of several."""
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.8)
-    near = near or [each for each in known if name in re.split(r"[^a-z0-9]+", each)][:3]
+    near = near or [each for each in known if name in re.split("[_-]", each)][:3]
     near = near or difflib.get_close_matches(name, known, n=1)
     return " or ".join(f"'{each}'" for each in near) or None

@@ -124,7 +124,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
         ({"pantograph.masses": [1]}, {}, "Unknown parameter 'pantograph.masses' of en50318-2002"),
         ({"pantograph.masses.3": [1]}, {}, "Unknown parameter 'pantograph.masses.3'"),
         ({"catenary.mean_stiffness": [1]}, {}, "Unknown parameter 'catenary.mean_stiffness'"),
-        ({"speed": [300]}, {}, r"did you mean 'speed_kmh' or 'speed_drift'\?"),
+        ({"speed": [300]}, {}, r"did you mean 'speed_kmh'\?"),
         ({"policy": [300]}, {}, "Unknown parameter 'policy'"),
         (
             {"pantograph.masses.1": [7.0, -7.0]},
