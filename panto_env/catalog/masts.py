@@ -127,13 +127,13 @@ def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, Any]]:
     elif "encumbrance" in columns:
         heights["encumbrance"] = _rounded(columns["encumbrance"])
     at: Items = [{key: values[k] for key, values in heights.items()} for k in range(len(lengths) + 1)]
+    for number, own in enumerate(at, start=1):
+        valid(EndSupport, own, f"{_at(masts, columns, number)}, whose heights may have another unit")
     stitches = columns.get("stitch_wire", np.full(len(lengths) + 1, np.nan))
     for table, length in zip(at, stitches, strict=True):
         if not np.isnan(length):
             table["stitch_wire"] = {"length": round(float(length), DIGITS)}
     types = columns.get("type", [""] * (len(lengths) + 1))
-    for number, own in enumerate(at, start=1):
-        valid(EndSupport, own, f"{_at(masts, columns, number)}, whose heights may have another unit")
     items = [
         ({"type": kind} if kind else {}) | {"span_length": length} | own
         for kind, length, own in zip(types, lengths, at, strict=False)

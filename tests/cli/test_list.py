@@ -82,7 +82,12 @@ def test_a_preset_of_another_kind_says_so(panto):
 
 def test_the_same_for_machines(panto):
     everything = json.loads(panto("list", "--json"))
-    assert everything["policy"]["pd"]["parameters"] == {"gain": 1.0, "derivative": 0.005, "damping": 150.0}
+    assert everything["policy"]["pd"]["parameters"] == {
+        "gain": 1.0,
+        "derivative": 0.005,
+        "damping": 150.0,
+        "washout": None,
+    }
     assert everything["line_condition"]["worn"]["wear_depth"] == 0.5e-3
     found = json.loads(panto("list", "realistic", "--json"))
     assert found["actuator"]["rate_limit"] == 2500.0
