@@ -10,6 +10,7 @@ printed
 
     passive: sigma +0.0 %, mean force +0.00 %, rank 2
     pd: sigma -11.3 %, mean force +5.07 %, not ranked: it moves the mean force by +5.1 %, more than 1.5 %
+    (a policy's attribute washout = 1.0 keeps the mean)
     Damper: sigma -8.5 %, mean force +0.09 %, rank 1
 
 `panto benchmark examples/own_controller.py:Damper pd --speed 300 --seeds 2` takes it as well.
@@ -62,7 +63,8 @@ def main() -> None:
     """Print each policy's change of sigma."""
     for cell in judge().cells:
         name = cell.policy.rpartition(":")[2]
-        ranked = f"not ranked: {cell.disqualified}" if cell.disqualified else f"rank {cell.rank}"
+        why = cell.disqualified.replace(" (", "\n(")
+        ranked = f"not ranked: {why}" if why else f"rank {cell.rank}"
         print(f"{name}: sigma {cell.change:+.1f} %, mean force {cell.mean_change:+.2f} %, {ranked}")
 
 

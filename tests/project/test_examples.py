@@ -76,7 +76,7 @@ def test_own_controller_is_ranked_and_pd_is_not(monkeypatch, capsys):
 def test_line_from_toml_keeps_the_standards(monkeypatch, capsys, tmp_path):
     example = load("line_from_toml", monkeypatch)
     told = printed(example, monkeypatch, capsys, "--plot", tmp_path / "line.png")
-    verdicts, speeds = told.splitlines()[:7], told.splitlines(keepends=True)[7:]
+    verdicts, speeds = told.splitlines()[:9], told.splitlines(keepends=True)[9:]
     assert all(verdict.endswith(", kept") for verdict in verdicts)
     assert "".join(speeds) in docstring(example)
     sigma = [row["std"] for row in example.over_speed()]
