@@ -7,10 +7,12 @@ import json
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from panto_env.catalog import load_catenary
 from panto_env.diagnosis import diagnose
 from panto_env.diagnosis.cases import BROKEN, Defect, drive
 from panto_env.diagnosis.diagnosis import Diagnosis, Finding, judge
@@ -89,7 +91,8 @@ def test_a_place_is_a_dropper_or_a_support_or_an_interval():
 
 
 def test_a_table_has_the_most_likely_kind_and_the_next_one():
-    (first, second) = findings_table(made((FOUND, HALF), False)).rows
+    evidence = SimpleNamespace(alignment=load_catenary("en50318-2002").alignment())
+    (first, second) = findings_table(replace(made((FOUND, HALF), False), evidence=evidence)).rows
     assert first == ("broken dropper", "70", "hard spot (26)", "dropper 2", "13", "11.2", "731", "1.8")
     assert second == ("hard spot", "26", "broken dropper (70)", "interval 1", "13", "0.5", "720", "1.8")
 

@@ -141,7 +141,7 @@ def test_the_command(known, tmp_path, monkeypatch):
         (("--fit", "earlier.safetensors", "--healthy", "later.csv"), "Give either the healthy runs"),
         (("--fit", "earlier.safetensors", "--pantograph", "dsa380"), "leave out --pantograph"),
         (("--healthy", "a.parquet", "--unit", "force=kN"), "are of records, which are diagnosed with --fit"),
-        (("--fit", "later.csv"), "does not hold a fit"),
+        (("--fit", "later.csv"), "does not hold a whole fit"),
     ):
         refused = panto("diagnose", "later.csv", *words, cwd=tmp_path)
         assert refused.returncode == 2
