@@ -378,7 +378,8 @@ class Trajectory:
             check_stored(facts, columns)
             for name in ("support_position", "dropper_position"):
                 facts[name] = np.array(facts[name], dtype=float)
-            facts["line"] = LineFacts(**facts["line"])
+            heights = tuple(facts["line"].pop("contact_heights", ()))
+            facts["line"] = LineFacts(**facts["line"], contact_heights=heights)
             supports, pitch, *masts = facts["alignment"]
             facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
             series = {name: columns[name] for name in SERIES}
