@@ -126,6 +126,14 @@ class Facts(Settings):
     activation: Literal["tanh", "relu"]
     squashed: bool
 
+    @property
+    def inputs(self) -> int:
+        """Number of the network's inputs. Raises ValueError where the steps before it do not fit each other."""
+        width = len(self.needs.entries)
+        for step in self.steps_before:
+            width = step.width(width)
+        return width
+
 
 def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
     """Write a model file, whole or not at all. replay: include the replay buffer.
@@ -207,9 +215,7 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     if parts and set(parts) != set(Cell._fields):
         raise ValueError("its network has only a part of a cell")
     cell = Cell(**parts) if parts else None
-    count, width = len(own) // 2, len(facts.needs.entries)
-    for step in facts.steps_before:
-        width = step.width(width)
+    count, width = len(own) // 2, facts.inputs
     if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
     weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))

@@ -71,8 +71,11 @@ class Prepared:
                 bound = step.bound or np.inf
                 values = np.clip((values - step.centre) / step.scale, -bound, bound).astype(np.float32)
                 continue
-            first = values if step.padding is None else np.array(step.padding, dtype=np.float32)
-            self._frames[number] = [*self._frames.get(number, [first] * step.frames)[1:], values]
+            frames = self._frames.get(number)
+            if frames is None:
+                first = values if step.padding is None else np.array(step.padding, dtype=np.float32)
+                frames = [first] * step.frames
+            self._frames[number] = [*frames[1:], values]
             values = np.concatenate(self._frames[number])
         return self._network.act(values)
 

@@ -130,12 +130,10 @@ def _on_actuator(actor: Actor, model: Any) -> Actor:
 
 def _check(model: Any, actor: Actor, facts: Facts) -> None:
     """Raise InputError unless the network fits the task and acts as the model does."""
-    width, actions = len(facts.needs.entries), len(facts.needs.channels)
-    for step in facts.steps_before:
-        width = step.width(width)
-    if (actor.weights[0].shape[1], len(actor.biases[-1])) != (width, actions):
+    actions = len(facts.needs.channels)
+    if (actor.weights[0].shape[1], len(actor.biases[-1])) != (facts.inputs, actions):
         raise InputError(
-            f"The network has not the {width} inputs and {actions} actions of the task; give as env that of "
+            f"The network has not the {facts.inputs} inputs and {actions} actions of the task; give as env that of "
             "its training, and train several pantographs in the vector environment, in which each is a lane."
         )
     shape, sizes = model.observation_space.shape, np.logspace(-1, 2, 16)

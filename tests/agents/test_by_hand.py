@@ -159,9 +159,7 @@ def test_a_variant_s_share_of_worse_pairs_and_of_runs_that_qualify():
 
 LAYERS = {"actor/weight_0": np.ones((3, 2)), "actor/bias_0": np.ones(3)}
 LAYERS |= {"actor/weight_1": np.ones((1, 3)), "actor/bias_1": np.ones(1)}
-FACTS = SimpleNamespace(
-    needs=SimpleNamespace(entries=("a", "b"), channels=(0,)), activation="tanh", squashed=False
-)
+FACTS = SimpleNamespace(needs=SimpleNamespace(channels=(0,)), inputs=2, activation="tanh", squashed=False)
 
 
 @pytest.mark.parametrize(

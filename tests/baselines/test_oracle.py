@@ -59,13 +59,13 @@ LINEAR: dict[str, Any] = {
 }
 
 
-@pytest.fixture(scope="module")
 def stored_ratio(given: Any, spans: Any) -> float | None:
     """σ of the stored oracle over the passive run's, mean over its seeds; None without one."""
     changes = stored.stored_changes(given, spans)
     return 1 + float(np.mean([*changes.values()])) / 100 if changes else None
 
 
+@pytest.fixture(scope="module")
 def short() -> Problem:
     return Problem(SHORT, seed=3, spans=SPANS)
 

@@ -203,7 +203,7 @@ def test_known_values_are_checked(change, message):
 
 
 def test_missing_measured_value_is_named():
-    with pytest.raises(InputError, match="k2 is missing"):
+    with pytest.raises(InputError, match="No measured value of k2 is given"):
         fit_equation_error(clean_record(EXPERIMENTS[0], TRUTH, duration=1.0), {"k1T": 32992.0, "m2": 5.0})
 
 

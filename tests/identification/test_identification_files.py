@@ -144,7 +144,7 @@ def test_measured_values_in_three_spellings_print_one_table(measured, sweep):
     ("arguments", "message"),
     [
         (["missing.csv", *MEASURED], "missing.csv could not be read"),
-        (["SWEEP", "--measured", "k1T=32992"], "m2 and k2 is missing"),
+        (["SWEEP", "--measured", "k1T=32992"], "No measured value of m2 and k2 is given"),
         (["SWEEP", "--measured", "k1T"], "must read name=value"),
         (["SWEEP", "--measured", "k1T=stiff"], "must be a number, not 'stiff'"),
         (["SWEEP", *MEASURED, "--unit", "y_p9=mm"], "unknown column 'y_p9'"),
