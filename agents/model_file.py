@@ -128,7 +128,7 @@ class Facts(Settings):
 
     @property
     def inputs(self) -> int:
-        """Number of the network's inputs. Raises ValueError where the steps before it do not fit each other."""
+        """Number of the network's inputs. Raises ValueError where the steps do not fit each other."""
         width = len(self.needs.entries)
         for step in self.steps_before:
             width = step.width(width)
