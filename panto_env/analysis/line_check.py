@@ -13,7 +13,8 @@ from ..base.table import Table
 from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
 from ..metrics.criterion import Criterion
 from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import PLACES, elasticity, non_uniformity
+from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
+from ..plant.catenary.flexible.parts import index_at
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.flexible.static import hang
@@ -97,9 +98,9 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
     spans, heights, _ = spans_of(line)
     supports = line.alignment().supports
     slopes, changes = gradients(heights, supports)
-    per_span = elasticities.reshape(-1, PLACES + 1)
+    parts = per_span(places, elasticities)
     inner = range(len(spans)) if not line.sequence else range(1, len(spans) - 1)
-    yields = {k: per_span[n if line.sequence else 0] for n, k in enumerate(inner)}
+    yields = {k: parts[n if line.sequence else 0] for n, k in enumerate(inner)}
     found = []
     for k, span in enumerate(spans if line.sequence else spans[:1]):
         forces = [each.static_force for each in droppers if each.span == k + 1]
@@ -160,8 +161,9 @@ def span_tables(spans: Sequence[SpanCheck], name: Callable[[int], str] = str) ->
 def elasticity_table(checks: Sequence[LineCheck]) -> Table:
     """Elasticity of lines whose spans are all alike, with published figures in brackets."""
     rows = []
-    for line, found in ((each.line, each.elasticities) for each in checks):
-        middle, end, uneven = 1e3 * found[PLACES // 2], 1e3 * found[0], non_uniformity(found)
+    for line, places, found in ((each.line, each.places, each.elasticities) for each in checks):
+        middle = 1e3 * found[index_at(places, line.span_length / 2)]
+        end, uneven = 1e3 * found[0], non_uniformity(found)
         told = [getattr(line.published, key, None) or 0 for key in ("mid_span", "support", "non_uniformity")]
         pairs = zip((middle, end, uneven), np.multiply(told, (1e3, 1e3, 1)), strict=True)
         cells = (f"{own:#.3g} ({other:g})" if other else f"{own:#.3g}" for own, other in pairs)

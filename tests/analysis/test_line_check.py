@@ -12,7 +12,7 @@ from panto_env.analysis.parameters import parameter_names
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.content import content_of
 from panto_env.catalog.en50119 import gradient_limits, highest_speed
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import solve
 
@@ -112,14 +112,29 @@ def test_published_figures_stand_beside_those_of_the_line():
     found = check(line, 100.0)
     ((name, middle, support, uneven, _),) = elasticity_table([found]).rows
     yields = 1e3 * found.elasticities
-    assert (name, middle, support) == ("re330-stitched", f"{yields[24]:.3f} (0.44)", f"{yields[0]:.3f} (0.4)")
+    in_mid_span = f"{yields[found.places == line.span_length / 2].item():.3f} (0.44)"
+    assert (name, middle, support) == ("re330-stitched", in_mid_span, f"{yields[0]:.3f} (0.4)")
     assert uneven == f"{non_uniformity(yields):.1f} (8)"
     told = panto("line", "re330-stitched").stdout
-    assert f"{yields[24]:.3f} (0.44)" in told
+    assert in_mid_span in told
     assert "(" not in "".join(elasticity_table([check(load_catenary("ln2"), 100.0)]).rows[0])
     # A published figure is no value of the line: it changes no run, and cannot be varied.
     assert content_of(line) == content_of(line.model_copy(update={"published": None}))
     assert not any("published" in each for each in parameter_names(line, "catenary"))
+
+
+@pytest.mark.parametrize("sequence", [None, [{}, {"span_length": 50.0}, {}, {}]], ids=["alike", "unlike"])
+def test_the_stiffest_places_are_not_missed(sequence, monkeypatch):
+    """They are at droppers: between 49 places, re250's non-uniformity was 45.1 instead of 48.4 %."""
+    table = load_catenary("re250").model_dump(exclude={"sources"}, exclude_none=True)
+    if sequence:
+        table = {name: value for name, value in table.items() if name != "spans"} | {"sequence": sequence}
+    line = FlexibleCatenaryData.model_validate(table)
+    found = [non_uniformity(each) for each in per_span(*elasticity(line, 100.0))]
+    monkeypatch.setattr("panto_env.plant.catenary.flexible.elasticity.PLACES", 650)
+    assert [non_uniformity(each) for each in per_span(*elasticity(line, 100.0))] == pytest.approx(
+        found, abs=0.1
+    )
 
 
 def test_the_page_has_the_elasticity_of_every_line_whose_spans_are_alike():
