@@ -90,11 +90,11 @@ def test_energy_is_balanced_under_two_collectors_through_an_overlap():
     """The first has both wires above it before the second has. The error is of second order in the step."""
     line = line_of("re330", overlap(2, 0.1, 0.5) | {"sequence": [{}] * 5})
     train = [Collector(DSA), Collector(REFERENCE, 40.0)]
-    coarse, fine = (balance(line, train, 280.0, distance=260.0, step=step) for step in (5e-4, 2.5e-4))
+    coarse, fine = (balance(line, train, 280.0, distance=260.0, step=step) for step in (1e-3, 2.5e-4))
     assert fine.steps_with_slack > 0
     assert (fine.wire_forces > 0).all(axis=2).any(axis=0).all()
     assert fine.error < 3e-4 * fine.turnover
-    assert fine.error < coarse.error / 3
+    assert fine.error < coarse.error / 9  # droppers that slacken make single halvings give 2.9 to 4.9
 
 
 @pytest.mark.slow
