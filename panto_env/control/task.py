@@ -59,9 +59,9 @@ class Task(TaskState):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
         if settings.speed_drift and settings.line.kind == "rig":
             raise InputError("A rig runs its line at one speed; leave out speed_drift, or use another line.")
-        warn_of_spring(settings)
         self.settings, self.actuator, self.trim = settings, settings.actuator, trim
         plant = new_plant(settings, lanes)
+        warn_of_spring(settings)
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)

@@ -200,7 +200,7 @@ def test_each_figure_shows_the_papers_way_and_its_numbers_are_kept(outcome, tmp_
             assert np.mean(line.get_ydata()) == pytest.approx(own["may_pull"]["mean"])
     files = write(outcome, tmp_path)
     assert len(files) == 11
-    assert all(file.stat().st_size < 150e3 for file in files)
+    assert all(file.stat().st_size < (200e3 if file.suffix == ".json" else 150e3) for file in files)
     written = json.loads((tmp_path / "numbers.json").read_text())
     assert len(written["comparisons"]) == len(OURS)
 
