@@ -11,9 +11,12 @@ import pickle
 import sys
 import time
 import warnings
+from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+
+from .cache import PACKAGE, cache_folder
 
 PAUSE = 60.0
 """Time (s) within which a compilation of kernels is announced only once."""
@@ -21,8 +24,34 @@ PAUSE = 60.0
 _announced = -PAUSE
 
 
+class _InPackage(_CacheLocator):  # type: ignore[misc]
+    """Place of a kernel of the package: the folder is named by what it is made of, not by dates."""
+
+    def __init__(self, function: Any) -> None:
+        self._name = hashlib.sha256(function.__module__.encode()).hexdigest()[:8]
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _InPackage | None:
+        """The place; None for a function of another package."""
+        return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) and cache_folder() else None
+
+    def get_cache_path(self) -> str:
+        """The folder of the package's kernels."""
+        return str(cache_folder())
+
+    def get_source_stamp(self) -> str:
+        """Nothing: the folder's name says it."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """What makes names of files differ where those of modules and functions do not."""
+        return self._name
+
+
 class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
     """Compiled kernels in their form on disk."""
+
+    _locator_classes = (_InPackage, *CompileResultCacheImpl._locator_classes)
 
     def reduce(self, result: Any) -> tuple[bytes, bytes]:
         """A checksum, and its data."""

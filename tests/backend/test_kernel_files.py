@@ -168,8 +168,8 @@ def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how):
     common = tmp_path / "tmp" / f"panto_env-{cache._user()}"
     plant(wanted, how, tmp_path)
     assert folder() == common / cache.kernel_hash()
-    (common / cache.kernel_hash()).rmdir()
-    common.rmdir()
+    shutil.rmtree(common / cache.kernel_hash())
+    shutil.rmtree(common)
     plant(common, how, tmp_path)
     alone = folder()
     assert alone.parent == tmp_path / "tmp"
