@@ -1,8 +1,9 @@
 """The cache folder of compiled kernels.
 
 Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the folder is named by a hash of all sources that kernels call: after an edit a new folder is used.
-Its content is executed, so a folder is used only if it belongs to this user and no other can write to it.
+So the folder is named by a hash of what kernels are made of (``kernel_sources``): after a change of it a new
+folder is used, and after any other the same. Its content is executed, so a folder is used only if it belongs
+to this user and no other can write to it.
 """
 
 from __future__ import annotations
@@ -10,39 +11,43 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
+import re
 import shutil
 import stat
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import llvmlite
 import numba
 
+from .kernel_sources import kernel_sources
+
 PACKAGE = Path(__file__).resolve().parents[1]
-KERNEL_ROOMS = ("backend", "plant", "control", "estimation")
-"""Packages with the sources of kernels. A kernel elsewhere calls only these and its own file."""
+HASH = re.compile("[0-9a-f]{16}")
 
 
 @cache
 def source_hash() -> str:
     """Hash of all source files of the package, and of the versions of the compilers."""
-    return _hash(PACKAGE.rglob("*.py"))
+    files = sorted(PACKAGE.rglob("*.py"))
+    return _hash(part for path in files for part in (str(path.relative_to(PACKAGE)), path.read_bytes()))
 
 
 @cache
 def kernel_hash() -> str:
-    """Hash of the source files of kernels, and of the versions of the compilers."""
-    return _hash(path for room in KERNEL_ROOMS for path in (PACKAGE / room).rglob("*.py"))
+    """Hash of what the package's kernels are made of, and of the versions of the compilers."""
+    return _hash(each for (module, name), tree in kernel_sources(PACKAGE) for each in (module, name, tree))
 
 
-def _hash(files: Iterable[Path]) -> str:
+def _hash(parts: Iterable[str | bytes]) -> str:
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
     if numba.config.BOUNDSCHECK:
         digest.update(b" with bounds checked")
-    for path in sorted(files):
-        digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    for part in parts:
+        digest.update((part.encode() if isinstance(part, str) else part) + b"\0")
     return digest.hexdigest()[:16]
 
 
@@ -76,14 +81,30 @@ def _remove(folder: Path, process: int) -> None:
 
 
 def _own_folder(parent: Path) -> Path | None:
-    """The folder of these sources in another one; None where it cannot be made, or is not private."""
-    folder = parent / kernel_hash()
+    """The folder of these kernels in another one; None where it cannot be made, or is not private."""
+    hashes = _private_folder(parent, "hashes")
+    return hashes and _private_folder(parent, _kept_hash(hashes / source_hash()))
+
+
+def _private_folder(parent: Path, name: str) -> Path | None:
+    folder = parent / name
     try:
         parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
         return folder if _private(folder) and os.access(folder, os.W_OK) else None
     except OSError:
         return None
+
+
+def _kept_hash(file: Path) -> str:
+    """``kernel_hash``, which takes a quarter of a second, from a file of these sources, or written to it."""
+    with suppress(OSError, UnicodeDecodeError):
+        found = file.read_text(encoding="ascii")
+        if HASH.fullmatch(found):
+            return found
+    with suppress(OSError):
+        file.write_text(kernel_hash(), encoding="ascii")
+    return kernel_hash()
 
 
 def _user() -> int:

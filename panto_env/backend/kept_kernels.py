@@ -1,28 +1,68 @@
 """Compiled kernels on disk: Numba's cache, which survives damaged files and a full disk.
 
-Each kernel is stored with a checksum. Processes that need the same one at the same time compile it
-independently; if one overwrites the other's file with the kernel for other types, that is noticed.
+Each kernel is stored with a checksum. Of processes that need the same one at the same time, one compiles it
+and the others wait, but no longer than ``LONGEST_WAIT``; if one overwrites the other's file with the kernel
+for other types, that is noticed.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import pickle
 import sys
 import time
 import warnings
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+from .cache import PACKAGE, cache_folder
 
 PAUSE = 60.0
 """Time (s) within which a compilation of kernels is announced only once."""
 
+LONGEST_WAIT = 300.0
+"""Time (s) after which a process compiles a kernel by itself that another one seems to be compiling."""
+
 _announced = -PAUSE
+
+
+class _InPackage(_CacheLocator):  # type: ignore[misc]
+    """Place of a kernel of the package: the folder is named by what it is made of, not by dates."""
+
+    def __init__(self, function: Any) -> None:
+        self._name = hashlib.sha256(function.__module__.encode()).hexdigest()[:8]
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _InPackage | None:
+        """The place; None for a function of another package."""
+        return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) and cache_folder() else None
+
+    def get_cache_path(self) -> str:
+        """The folder of the package's kernels."""
+        return str(cache_folder())
+
+    def get_source_stamp(self) -> str:
+        """Nothing: the folder's name says it."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """What makes names of files differ where those of modules and functions do not."""
+        return self._name
 
 
 class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
     """Compiled kernels in their form on disk."""
+
+    _locator_classes = (_InPackage, *CompileResultCacheImpl._locator_classes)
 
     def reduce(self, result: Any) -> tuple[bytes, bytes]:
         """A checksum, and its data."""
@@ -41,17 +81,45 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
     """Cache of one kernel: a compiled form for each combination of types with which it was called."""
 
     _impl_class = _CheckedResults
+    _lock: int | None = None  # file that is locked while this process compiles
 
     def load_overload(self, types: Any, target_context: Any) -> Any:
         """The compiled form for these types; None where it is missing or damaged."""
+        kernel = self._stored(types, target_context)
+        if kernel is None:
+            _announce()
+            waited = self._wait(types)
+            kernel = self._stored(types, target_context) if waited else None
+            if kernel is not None:
+                self._unlock()
+        return kernel
+
+    def _stored(self, types: Any, target_context: Any) -> Any:
         try:
             kernel = super().load_overload(types, target_context)
         except Exception:  # damaged files can lead to any error
-            kernel = None
-        if kernel is None or tuple(kernel.signature.args) != tuple(types):
-            _announce()
             return None
-        return kernel
+        return kernel if kernel is not None and tuple(kernel.signature.args) == tuple(types) else None
+
+    def _wait(self, types: Any) -> bool:
+        """Be the one process that compiles the form for these types; whether another one was before."""
+        self._unlock()
+        name = hashlib.sha256(repr((self._cache_file._index_name, types)).encode()).hexdigest()[:16]
+        with suppress(OSError):
+            self._impl.locator.ensure_cache_path()
+            file = os.open(Path(self.cache_path) / f"{name}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+            end, waited = time.monotonic() + LONGEST_WAIT, False
+            while not _locked(file) and time.monotonic() < end:
+                waited = True
+                time.sleep(0.05)
+            self._lock = file
+            return waited
+        return False
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def save_overload(self, types: Any, kernel: Any) -> None:
         """Store a compiled form, with a warning where that is not possible."""
@@ -70,6 +138,19 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
                 RuntimeWarning,
                 stacklevel=2,
             )
+        finally:
+            self._unlock()
+
+
+def _locked(file: int) -> bool:
+    """Whether this process has a file for itself now; its lock ends with the process."""
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _announce() -> None:

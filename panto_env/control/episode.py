@@ -14,6 +14,7 @@ from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
+from ..plant.state import PerCollector, per_collector
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
 from .entries import AVERAGED, DEVIATIONS
 from .front import FrontArrays, front_arrays
@@ -33,7 +34,7 @@ class Episode(NamedTuple):
     Each lane has a row for each of its controlled collectors; these follow each other.
     """
 
-    controlled: tuple[int, ...]  # collectors with a row, the same in all lanes; kernels know a tuple's length
+    controlled: PerCollector  # collectors with a row, the same in all lanes
     action: Array  # (rows, actions): requested in this control step
     places: Index  # (actions,): where each entry of an action acts, a ``Place``
     force_limit: float  # force of an action of 1 (N)
@@ -76,7 +77,7 @@ def new_episode(
         )
     remembered = len(layout.memory) * layout.memory_spans * (1 + actions)
     return Episode(
-        controlled=controlled,
+        controlled=per_collector(controlled, int),
         action=np.zeros((rows, actions)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,

@@ -15,7 +15,7 @@ from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.sensors import READING, Reading
-from ..plant.state import ROW
+from ..plant.state import ROW, PerCollector, per_collector
 from ..plant.train import Train
 
 
@@ -24,7 +24,7 @@ class FrontArrays(NamedTuple):
 
     ahead: Array  # (places,): distances ahead of a controlled pantograph (m)
     behind: Array  # (agents,): its distance behind the one in front (m); 0 where there is none
-    collector: tuple[int, ...]  # that in front of each agent; its own where there is none
+    collector: PerCollector  # that in front of each agent; its own where there is none
     reading: Array  # (rows, readings): of the one in front, where it is not controlled itself
     kept: Array  # (rows, times): its contact force after each control step (N), time n in column n % times
 
@@ -56,7 +56,7 @@ def front_arrays(places: tuple[float, ...], train: Train, lanes: int, slowest: f
     return FrontArrays(
         ahead=np.array(places, dtype=float),
         behind=behind,
-        collector=tuple(max(number - 1, 0) for number in driven),
+        collector=per_collector((max(number - 1, 0) for number in driven), int),
         reading=np.zeros((rows, len(Reading) if places else 0)),
         kept=np.zeros((rows, times)),
     )

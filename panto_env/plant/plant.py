@@ -20,7 +20,7 @@ from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import NONE_REFLECTED, check_compression, pantographs, rest_state
 from .pantograph.schema import PantographData
 from .pantograph.step import Part
-from .state import SAMPLE_ROWS, Place, Row, Run, Samples
+from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
 from .train import Train
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
@@ -86,10 +86,10 @@ class Plant:
         knots = sorted({0.0, *(height for table in tables for height, _ in table)})
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),
-            distance=tuple(float(collector.distance) for collector in train.collectors),
-            driven=tuple(int(collector.driven) for collector in train.collectors),
-            aerodynamic=tuple(
-                collector.pantograph.aerodynamic_uplift(1 / self.time_step) for collector in train.collectors
+            distance=per_collector((own.distance for own in train.collectors), float),
+            driven=per_collector((own.driven for own in train.collectors), int),
+            aerodynamic=per_collector(
+                (own.pantograph.aerodynamic_uplift(1 / self.time_step) for own in train.collectors), float
             ),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
 
 from ..backend import NOT_NEGATIVE, constants, inlined
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from .alignment import AlignmentArrays
 
 
@@ -56,13 +59,27 @@ SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
 """Rows of a sample: the first ones."""
 
 
+PerCollector: TypeAlias = tuple[float] | tuple[int] | Array | Index
+"""A number for each collector, or each controlled one: (collectors,)."""
+
+
+def per_collector(numbers: Iterable[Any], kind: type) -> Any:
+    """Numbers of the collectors for kernels.
+
+    A tuple for one, so that its kernel is compiled without loops over collectors; an array for several, so
+    that trains of any size have the same kernel.
+    """
+    found = tuple(map(kind, numbers))
+    return found if len(found) == 1 else np.array(found)
+
+
 class Run(NamedTuple):
     """State of all lanes: position of each train, motion of its pantographs, contact forces."""
 
     table: Array  # (collectors, lanes, STATE + 4n): the rows above
-    distance: tuple[float, ...]  # of each collector behind the first (m); kernels know a tuple's length
-    driven: tuple[int, ...]  # 1 for each collector with an actuator, 0 without
-    aerodynamic: tuple[float, ...]  # uplift of each collector per squared distance covered in a step (N/m^2)
+    distance: PerCollector  # of each collector behind the first (m)
+    driven: PerCollector  # 1 for each collector with an actuator, 0 without
+    aerodynamic: PerCollector  # uplift of each collector per squared distance covered in a step (N/m^2)
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
     wind: Array  # (lanes, GUST_ROWS): mean and gusts; no rows where none blows

@@ -7,6 +7,7 @@ import shutil
 import stat
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -67,6 +68,40 @@ def test_processes_that_compile_at_once_never_run_one_another_s_kernel(tmp_path)
     told = [process.communicate(timeout=120) for process in started]
     assert told == [("4.5 6.0\n", ""), ("6.0 4.5\n", "")]
     assert start("1.5", "2").communicate(timeout=120) == ("4.5 6.0\n", "")
+
+
+def test_of_processes_that_need_the_same_one_only_one_compiles(tmp_path):
+    """The others wait for it, and have it from the disk."""
+    (tmp_path / "module.py").write_text(MODULE)
+    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
+    code = START + CALL
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(4)
+    ]
+    time.sleep(3)
+    (tmp_path / "go").touch()
+    told = [process.communicate(timeout=120)[0].split() for process in started]
+    assert [value for value, _ in told] == ["4.5"] * 4
+    assert sorted(hits for _, hits in told) == ["0", "1", "1", "1"]
+
+
+def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(call, tmp_path):
+    slow = (
+        "import module, time; module.thrice._compiler.compile = lambda *_: time.sleep(60); module.thrice(1.5)"
+    )
+    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
+    still = subprocess.Popen([sys.executable, "-c", slow], cwd=tmp_path, env=environment)
+    try:
+        time.sleep(5)
+        assert list((tmp_path / "cache").rglob("*.lock"))
+        brief = "from panto_env.backend import kept_kernels; kept_kernels.LONGEST_WAIT = 0.5\n"
+        assert call(code=brief + CALL) == (["4.5", "0"], "")
+    finally:
+        still.kill()
+        still.wait()
 
 
 def test_a_form_under_a_wrong_name_is_compiled_anew(call, tmp_path):
@@ -168,8 +203,8 @@ def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how):
     common = tmp_path / "tmp" / f"panto_env-{cache._user()}"
     plant(wanted, how, tmp_path)
     assert folder() == common / cache.kernel_hash()
-    (common / cache.kernel_hash()).rmdir()
-    common.rmdir()
+    shutil.rmtree(common / cache.kernel_hash())
+    shutil.rmtree(common)
     plant(common, how, tmp_path)
     alone = folder()
     assert alone.parent == tmp_path / "tmp"
