@@ -179,7 +179,11 @@ def momentum(run, pantograph, line):
     """What is left of the balance of the whole pantograph's forces, as a mean force (N), and what may be."""
     duration = run.time_step * len(run.time)
     spring, damper = pantograph.stiffnesses[-1], pantograph.dampings[-1]
-    lift = run.nominal_force - spring * stretch(run, line).mean() - damper * (run.frame[-1] - run.frame[0]) / duration
+    lift = (
+        run.nominal_force
+        - spring * stretch(run, line).mean()
+        - damper * (run.frame[-1] - run.frame[0]) / duration
+    )
     swing = sum(pantograph.masses) * max(np.abs(run.head_velocity).max(), np.abs(run.frame_velocity).max())
     return lift - run.contact_force.mean(), 2 * swing / duration
 
