@@ -134,7 +134,8 @@ def _check(model: Any, actor: Actor, facts: Facts) -> None:
     if (actor.weights[0].shape[1], len(actor.biases[-1])) != (facts.inputs, actions):
         raise InputError(
             f"The network has not the {facts.inputs} inputs and {actions} actions of the task; give as env "
-            "that of its training, and train several pantographs in the vector environment, each as a lane."
+            "that of its training, and train several pantographs in the vector environment, in which each is "
+            "a lane."
         )
     shape, sizes = model.observation_space.shape, np.logspace(-1, 2, 16)
     seen = np.random.default_rng(0).normal(0, sizes, (*shape[::-1], 16)).T.astype(np.float32)
