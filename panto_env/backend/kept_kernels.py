@@ -44,7 +44,7 @@ class _InPackage(_CacheLocator):  # type: ignore[misc]
     @classmethod
     def from_function(cls, function: Any, file: str) -> _InPackage | None:
         """The place; None for a function of another package."""
-        return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) and cache_folder() else None
+        return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) else None
 
     def get_cache_path(self) -> str:
         """The folder of the package's kernels."""
@@ -88,8 +88,8 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
         kernel = self._stored(types, target_context)
         if kernel is None:
             _announce()
-            waited = self._wait(types)
-            kernel = self._stored(types, target_context) if waited else None
+            self._wait(types)
+            kernel = self._stored(types, target_context)  # another process may just have stored it
             if kernel is not None:
                 self._unlock()
         return kernel
@@ -101,20 +101,16 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
             return None
         return kernel if kernel is not None and tuple(kernel.signature.args) == tuple(types) else None
 
-    def _wait(self, types: Any) -> bool:
-        """Be the one process that compiles the form for these types; whether another one was before."""
+    def _wait(self, types: Any) -> None:
+        """Be the one process that compiles the form for these types."""
         self._unlock()
         name = hashlib.sha256(repr((self._cache_file._index_name, types)).encode()).hexdigest()[:16]
         with suppress(OSError):
             self._impl.locator.ensure_cache_path()
             file = os.open(Path(self.cache_path) / f"{name}.lock", os.O_RDWR | os.O_CREAT, 0o600)
-            end, waited = time.monotonic() + LONGEST_WAIT, False
+            self._lock, end = file, time.monotonic() + LONGEST_WAIT
             while not _locked(file) and time.monotonic() < end:
-                waited = True
                 time.sleep(0.05)
-            self._lock = file
-            return waited
-        return False
 
     def _unlock(self) -> None:
         if self._lock is not None:

@@ -7,7 +7,6 @@ import shutil
 import stat
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -51,57 +50,51 @@ def call(tmp_path):
 START = "from pathlib import Path; import time\nwhile not Path('go').exists(): time.sleep(0.01)\n"
 
 
-def test_processes_that_compile_at_once_never_run_one_another_s_kernel(tmp_path):
-    """Each for other types first: Numba may keep one form under both names."""
+@pytest.fixture
+def start(tmp_path):
+    """Starts a process that may compile a kernel; those that are left at the end are ended."""
     (tmp_path / "module.py").write_text(MODULE)
     environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
+    started = []
+
+    def start(code):
+        command = [sys.executable, "-c", code]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        started.append(subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def test_processes_that_compile_at_once_never_run_one_another_s_kernel(start, tmp_path):
+    """Each for other types first: Numba may keep one form under both names."""
     code = START + "from module import thrice; print(thrice(%s), thrice(%s))"
-
-    def start(first, second):
-        command = [sys.executable, "-c", code % (first, second)]
-        return subprocess.Popen(
-            command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-    started = [start(*order) for order in (("1.5", "2"), ("2", "1.5"))]
+    started = [start(code % order) for order in (("1.5", "2"), ("2", "1.5"))]
     (tmp_path / "go").touch()
     told = [process.communicate(timeout=120) for process in started]
     assert told == [("4.5 6.0\n", ""), ("6.0 4.5\n", "")]
-    assert start("1.5", "2").communicate(timeout=120) == ("4.5 6.0\n", "")
+    assert start(code % ("1.5", "2")).communicate(timeout=120) == ("4.5 6.0\n", "")
 
 
-def test_of_processes_that_need_the_same_one_only_one_compiles(tmp_path):
+def test_of_processes_that_need_the_same_one_only_one_compiles(start, tmp_path):
     """The others wait for it, and have it from the disk."""
-    (tmp_path / "module.py").write_text(MODULE)
-    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
-    code = START + CALL
-    started = [
-        subprocess.Popen(
-            [sys.executable, "-c", code], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
-        )
-        for _ in range(4)
-    ]
-    time.sleep(3)
+    started = [start(START + CALL) for _ in range(4)]
     (tmp_path / "go").touch()
     told = [process.communicate(timeout=120)[0].split() for process in started]
     assert [value for value, _ in told] == ["4.5"] * 4
     assert sorted(hits for _, hits in told) == ["0", "1", "1", "1"]
 
 
-def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(call, tmp_path):
-    slow = (
-        "import module, time; module.thrice._compiler.compile = lambda *_: time.sleep(60); module.thrice(1.5)"
-    )
-    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
-    still = subprocess.Popen([sys.executable, "-c", slow], cwd=tmp_path, env=environment)
-    try:
-        time.sleep(5)
-        assert list((tmp_path / "cache").rglob("*.lock"))
-        brief = "from panto_env.backend import kept_kernels; kept_kernels.LONGEST_WAIT = 0.5\n"
-        assert call(code=brief + CALL) == (["4.5", "0"], "")
-    finally:
-        still.kill()
-        still.wait()
+def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(start, tmp_path):
+    compiling = "module.thrice._compiler.compile = lambda *_: print(flush=True) or time.sleep(600)"
+    still = start(f"import module, time; {compiling}; module.thrice(1.5)")
+    assert still.stdout.readline() == "\n"
+    assert list((tmp_path / "cache").rglob("*.lock"))
+    brief = "from panto_env.backend import kept_kernels; kept_kernels.LONGEST_WAIT = 0.5\n"
+    assert start(brief + CALL).communicate(timeout=120) == ("4.5 0\n", "")
 
 
 def test_a_form_under_a_wrong_name_is_compiled_anew(call, tmp_path):

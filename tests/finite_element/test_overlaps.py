@@ -196,10 +196,6 @@ def test_energy_is_balanced_through_an_overlap():
     assert found.error < 1e-3 * found.turnover
 
 
-def middle_of(ends):
-    return sum(ends) / 2
-
-
 OVERLAPS = [name for name, section in sections().items() if section.line.overlaps]
 
 
@@ -230,8 +226,9 @@ def test_the_force_passes_from_one_wire_to_the_other_in_the_middle_span(name, ca
     height = np.array([system.contact_point(x, 1)[3] for x in run.position])
     assert touched[1][0] == pytest.approx(np.flatnonzero(hangs & (run.head > height))[0], abs=2)
     # On both sides of the middle; in it a dropper there may hold the second wire down for some metres.
-    for side in (level[0] - overlap.level, middle_of(level)), (middle_of(level), level[1] + overlap.level):
-        assert both[(run.position > side[0]) & (run.position < side[1])].any()
+    x, reach = run.position - (begin + end) / 2, 1.5 * overlap.level
+    assert both[(-reach < x) & (x < 0)].any()
+    assert both[(x > 0) & (x < reach)].any()
     np.testing.assert_allclose(run.contact_force, run.wire_forces.sum(axis=1), atol=1e-9)
     assert run.wire_forces.min() == 0
     for pair, away in ((1, begin - run.position), (0, run.position - end)):
