@@ -52,8 +52,8 @@ def of_readme() -> str:
         if own.rank is not None and own.interval_for_lines is not None:
             change += " ({:.1f} to {:.1f})".format(*own.interval_for_lines)
         losses = f"{own.contact_loss:.2f}", f"{own.cost_change:+.0f}"
-        rows.append((f"`{policy}`", what, change, *losses))
-    table = Table("", ("policy", "what it is", "Δσ (%)", "CL (%)", "ΔCF (%)"), tuple(rows), 2)
+        rows.append((f"`{policy}`", change, *losses, what))
+    table = Table("", ("policy", "Δσ (%)", "CL (%)", "ΔCF (%)", "what it is"), tuple(rows))
     return f"{BEGIN}\n\n{table.markdown.rstrip()}\n\n{END}"
 
 
