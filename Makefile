@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark cards test lint docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
+.PHONY: demo benchmark cards test lint wheel docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -43,7 +43,12 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 test: $(READY) lint
+	$(BIN)/python -m tests.known_kernels
 	$(BIN)/pytest -n auto --dist loadfile -m 'not slow and not study'
+
+# A wheel that brings the usual kernels, compiled for x86-64-v3: the first step takes seconds. One version of Python each.
+wheel: $(READY)
+	$(BIN)/python -m tests.known_kernels --wheel dist
 
 # The documentation as a site, warnings as errors. `make proofs` builds it too, and follows every link within it.
 SITE := docs/_build/html

@@ -1,7 +1,7 @@
 """All code that uses internals of Numba and llvmlite; the rest of the package writes plain functions.
 
-``kernel`` and ``inlined`` decorate functions that are compiled; ``operation`` and ``implements`` select a
-function by the type of its first argument; ``constants`` gives kernels the names of rows.
+``kernel``, ``inlined`` and ``called`` decorate functions that are compiled; ``operation`` and ``implements``
+select a function by the type of its first argument; ``constants`` gives kernels the names of rows.
 ``load_row`` and the rest of ``vectors`` and ``mathematics`` compute with eight numbers at once. ``pack`` and
 ``bind`` convert a kernel's arguments only once; ``LaneThreads`` distributes lanes among cores;
 ``aligned_zeros`` gives memory aligned for vector instructions, which ``copy_whole`` preserves in copies.
@@ -9,7 +9,7 @@ With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
 from .cache import cache_folder, source_hash
-from .compile import JIT, constants, inlined, kernel, python_function
+from .compile import JIT, called, constants, inlined, kernel, python_function
 from .dispatch import implements, operation
 from .mathematics import NOT_NEGATIVE, any_of, choose, larger
 from .memory import CACHE_LINE, aligned_zeros, copy_whole
@@ -27,6 +27,7 @@ __all__ = [
     "any_of",
     "bind",
     "cache_folder",
+    "called",
     "choose",
     "constants",
     "copy_whole",

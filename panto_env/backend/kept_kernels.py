@@ -1,5 +1,7 @@
 """Compiled kernels on disk: Numba's cache, which survives damaged files and a full disk.
 
+A wheel brings kernels of the usual forms, for a class of processors; they are used where nothing is stored.
+
 Each kernel is stored with a checksum. Of processes that need the same one at the same time, one compiles it
 and the others wait, but no longer than ``LONGEST_WAIT``; if one overwrites the other's file with the kernel
 for other types, that is noticed.
@@ -14,9 +16,11 @@ import sys
 import time
 import warnings
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 
 try:
@@ -31,6 +35,11 @@ PAUSE = 60.0
 
 LONGEST_WAIT = 300.0
 """Time (s) after which a process compiles a kernel by itself that another one seems to be compiling."""
+
+BROUGHT = PACKAGE / "kernels"
+"""Folder of a wheel's kernels (``make wheel``)."""
+CLASS, FEATURES = "x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+"""Class of processors for which these are compiled, and what makes a processor one of it."""
 
 _announced = -PAUSE
 
@@ -77,6 +86,40 @@ class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
         return super().rebuild(target_context, pickle.loads(data))
 
 
+class _InWheel(_InPackage):
+    """Place of a kernel that the wheel brought."""
+
+    def get_cache_path(self) -> str:
+        return str(_brought_folder())
+
+
+class _BroughtResults(_CheckedResults):
+    _locator_classes = (_InWheel,)
+
+
+class BroughtKernels(FunctionCache):  # type: ignore[misc]
+    """The wheel's forms of one kernel, for any processor of their class."""
+
+    _impl_class = _BroughtResults
+
+    def _index_key(self, types: Any, codegen: Any) -> Any:
+        types, (system, *_), code = super()._index_key(types, codegen)
+        return types, (system, CLASS, ""), code
+
+
+def _brought_folder() -> Path:
+    """The wheel's kernels of the present sources, named as those that are kept."""
+    kept = cache_folder()
+    return BROUGHT / (kept.name if kept else "")
+
+
+@cache
+def brought() -> bool:
+    """Whether there are such kernels, and this processor can run them."""
+    found = llvmlite.binding.get_host_cpu_features()
+    return _brought_folder().is_dir() and all(found.get(each) for each in FEATURES)
+
+
 class KeptKernels(FunctionCache):  # type: ignore[misc]
     """Cache of one kernel: a compiled form for each combination of types with which it was called."""
 
@@ -95,11 +138,10 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
         return kernel
 
     def _stored(self, types: Any, target_context: Any) -> Any:
-        try:
-            kernel = super().load_overload(types, target_context)
-        except Exception:  # damaged files can lead to any error
-            return None
-        return kernel if kernel is not None and tuple(kernel.signature.args) == tuple(types) else None
+        kernel = _loaded(super(), types, target_context)
+        if kernel is None and brought():
+            kernel = _loaded(BroughtKernels(self._py_func), types, target_context)
+        return kernel
 
     def _wait(self, types: Any) -> None:
         """Be the one process that compiles the form for these types."""
@@ -136,6 +178,15 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
             )
         finally:
             self._unlock()
+
+
+def _loaded(kept: Any, types: Any, target_context: Any) -> Any:
+    """The compiled form for these types; None where it is missing or damaged."""
+    try:
+        kernel = kept.load_overload(types, target_context)
+    except Exception:  # damaged files can lead to any error
+        return None
+    return kernel if kernel is not None and tuple(kernel.signature.args) == tuple(types) else None
 
 
 def _locked(file: int) -> bool:

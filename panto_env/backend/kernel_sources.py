@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-DECORATORS = ("kernel", "inlined", "operation", "implements", "in_python", "intrinsic", "overload")
+DECORATORS = ("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload")
 """Names of the decorators of functions that Numba compiles."""
 COMPILER = ("compile", "dispatch", "parts")
 """Files of ``backend`` that say how kernels are compiled."""

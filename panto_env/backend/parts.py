@@ -24,7 +24,19 @@ def _library(state: Any) -> Any:
     library.enable_object_caching()  # as Numba does with one that it makes itself
     layout = library._codegen._data_layout
     library._optimize_functions = lambda module: setattr(module, "data_layout", layout)
+    library.needs = {}  # parts that it calls, and what these need
     return library
+
+
+def _link(library: Any, other: Any, add: Any) -> None:
+    """Link what a part needs into the kernel only, once: else each part would hold copies of all it needs.
+
+    The part comes before what it needs, for LLVM leaves out functions that nothing has asked for yet.
+    """
+    for each in (other, *getattr(other, "needs", ())):
+        if each not in library.needs:
+            library.needs[each] = None
+            add(each)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -37,6 +49,8 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
 
     def run_pass(self, state: Any) -> bool:
         state.library = library = _library(state)
+        add = library.add_linking_library
+        library.add_linking_library = lambda other: _link(library, other, add)
 
         def optimise() -> None:
             made = library._codegen._module_pass_manager()
@@ -56,6 +70,7 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
     def run_pass(self, state: Any) -> bool:
         state.library = library = _library(state)
+        library.add_linking_library = lambda other: _link(library, other, type(library)._ensure_finalized)
         library._optimize_final_module = lambda: None
         library._finalize_final_module = lambda: setattr(library, "_finalized", True)
         state.flags.no_compile = True
@@ -64,6 +79,21 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
         key = _NoCode().__sizeof__  # any built-in function will do, that no other part has
         state.targetctx.insert_user_function(key, lowered.fndesc, [library])
         state["cr"] = lowered._replace(cfunc=key)
+        return done
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalledLowering(_PartLowering):
+    """Lowering of a part that stays a function of its own: LLVM would inline it where it is called once."""
+
+    _name = "called_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        done = super().run_pass(state)
+        library = state.library
+        library._final_module.get_function(state["cr"].fndesc.llvm_func_name).add_function_attribute(
+            "noinline"
+        )
         return done
 
 
@@ -105,3 +135,5 @@ PART_OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
     "pipeline_class": _compiler(_PartLowering),
 }
+NOT_INLINED: dict[str, Any] = {"forceinline": False, "pipeline_class": _compiler(_CalledLowering)}
+"""What a part that is called has in the place of some of these."""

@@ -77,7 +77,7 @@ def new_episode(
         )
     remembered = len(layout.memory) * layout.memory_spans * (1 + actions)
     return Episode(
-        controlled=per_collector(controlled, int),
+        controlled=per_collector(controlled, int, len(plant.train.collectors)),
         action=np.zeros((rows, actions)),
         places=np.array(actuator.places, dtype=np.int64),
         force_limit=actuator.force_limit,

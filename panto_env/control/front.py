@@ -56,7 +56,7 @@ def front_arrays(places: tuple[float, ...], train: Train, lanes: int, slowest: f
     return FrontArrays(
         ahead=np.array(places, dtype=float),
         behind=behind,
-        collector=per_collector((max(number - 1, 0) for number in driven), int),
+        collector=per_collector((max(number - 1, 0) for number in driven), int, len(collectors)),
         reading=np.zeros((rows, len(Reading) if places else 0)),
         kept=np.zeros((rows, times)),
     )

@@ -75,7 +75,7 @@ class Plant:
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
         count, actuator = len(train.collectors), train.first.actuator
-        sizes = tuple(2 * len(own.pantograph.masses) for own in train.collectors)
+        sizes = [2 * len(own.pantograph.masses) for own in train.collectors]
         self.pantographs = pantographs(sizes, lanes if varied else 1)
         every = np.arange(self.pantographs.table.shape[1])
         for number, own in enumerate(train.collectors):
@@ -86,10 +86,12 @@ class Plant:
         knots = sorted({0.0, *(height for table in tables for height, _ in table)})
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),
-            distance=per_collector((own.distance for own in train.collectors), float),
-            driven=per_collector((own.driven for own in train.collectors), int),
+            distance=per_collector((own.distance for own in train.collectors), float, count),
+            driven=per_collector((own.driven for own in train.collectors), int, count),
             aerodynamic=per_collector(
-                (own.pantograph.aerodynamic_uplift(1 / self.time_step) for own in train.collectors), float
+                (own.pantograph.aerodynamic_uplift(1 / self.time_step) for own in train.collectors),
+                float,
+                count,
             ),
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),

@@ -63,14 +63,14 @@ PerCollector: TypeAlias = tuple[float] | tuple[int] | Array | Index
 """A number for each collector, or each controlled one: (collectors,)."""
 
 
-def per_collector(numbers: Iterable[Any], kind: type) -> Any:
-    """Numbers of the collectors for kernels.
+def per_collector(numbers: Iterable[Any], kind: type, collectors: int) -> Any:
+    """Numbers of all collectors of a train, or of the controlled ones, for kernels.
 
-    A tuple for one, so that its kernel is compiled without loops over collectors; an array for several, so
-    that trains of any size have the same kernel.
+    A tuple for a train of one collector, so that its kernel is compiled without loops over collectors; an
+    array for a train of several, so that trains of any size have the same kernel.
     """
     found = tuple(map(kind, numbers))
-    return found if len(found) == 1 else np.array(found)
+    return found if collectors == 1 else np.array(found)
 
 
 class Run(NamedTuple):

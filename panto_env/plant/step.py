@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..backend import NOT_NEGATIVE, inlined, kernel, open_packed
+from ..backend import NOT_NEGATIVE, called, inlined, kernel, open_packed
 from .actuators import drive
 from .catenary.protocol import (
     advance_wire,
@@ -126,7 +126,7 @@ def contact_law(parts, spring, gap, change, middle_yield, wire_yield):
     return gap + damped * change, resisting + damped * (wire_yield - contact_input)
 
 
-@inlined
+@called
 def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, middle, middle_yield):
     """Share the contact force between two wires, and return that on the first (N).
 

@@ -1,6 +1,7 @@
 """Compiled kernels on disk: damaged ones are compiled anew, another user's are not looked at."""
 
 import os
+import platform
 import random
 import resource
 import shutil
@@ -10,7 +11,7 @@ import sys
 
 import pytest
 
-from panto_env.backend import JIT, cache, compile
+from panto_env.backend import JIT, cache, compile, kept_kernels
 
 pytestmark = pytest.mark.skipif(not JIT, reason="nothing is compiled")
 
@@ -30,8 +31,9 @@ def call(tmp_path):
     (tmp_path / "module.py").write_text(MODULE)
     (tmp_path / "tmp").mkdir()
 
-    def call(cache="cache", code=CALL, **options):
+    def call(cache="cache", code=CALL, variables=None, **options):
         environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / cache), "TMPDIR": str(tmp_path / "tmp")}
+        environment |= variables or {}
         told = subprocess.run(
             [sys.executable, "-c", code],
             cwd=tmp_path,
@@ -119,6 +121,34 @@ def test_a_compilation_is_announced_where_somebody_sees_it(call):
     assert said.startswith("Compiling kernels, 10 to 30 s, ")
     assert said.count("\n") == 1
     assert call(code=shown) == (["4.5", "1"], "")
+
+
+OWN = """
+import numpy as np
+from panto_env.identification.response import recur
+recur(np.eye(2), np.ones((3, 2)), np.zeros((4, 2)))
+print(sum(recur.stats.cache_hits.values()))
+"""
+"""Calls a kernel of the package."""
+ON_X86 = platform.machine() == "x86_64"
+
+
+@pytest.mark.skipif(not ON_X86, reason="the wheel's kernels are for another kind of processor")
+def test_a_kernel_that_the_wheel_brought_is_used_where_none_is_kept(call, tmp_path):
+    """Not one of other sources, nor a damaged one; nor where the processor is of another class."""
+    lesser = {"NUMBA_CPU_NAME": kept_kernels.CLASS, "NUMBA_CPU_FEATURES": ""}
+    assert call("built", OWN, lesser) == (["0"], "")
+    built = str(tmp_path / "built")
+    use = f"from panto_env.backend import kept_kernels as k; k.BROUGHT = k.Path({built!r})\n"
+    assert call("first", use + OWN) == (["1"], "")
+    assert not files(tmp_path / "first", ".nbc")
+    assert call("class", use + "k.FEATURES = ('none',)\n" + OWN) == (["0"], "")
+    (kernel,) = files(tmp_path / "built", ".nbc")
+    kernel.write_bytes(DAMAGES["bit"](kernel.read_bytes()))
+    assert call("second", use + OWN) == (["0"], "")
+    (folder,) = {each.parent for each in files(tmp_path / "built", ".nbi")}
+    folder.rename(folder.with_name("0" * 16))
+    assert call("third", use + OWN) == (["0"], "")
 
 
 def files(folder, suffix):

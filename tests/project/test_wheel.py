@@ -16,6 +16,8 @@ import yaml
 
 import panto_env
 
+from ..known_kernels import build_wheel
+
 ROOT = Path(panto_env.__file__).parents[1]
 FOLDERS = {"agents": "panto_agents", "baselines": "panto_baselines", "configs": "panto_configs"}
 """Folders whose name in the wheel is another."""
@@ -47,7 +49,10 @@ def wheel(tmp_path_factory):
 @pytest.fixture(scope="module")
 def python(wheel, tmp_path_factory):
     """An interpreter that has the wheel, and what it stands on from here, but not this checkout."""
-    folder = tmp_path_factory.mktemp("elsewhere")
+    return installed(wheel, tmp_path_factory.mktemp("elsewhere"))
+
+
+def installed(wheel, folder):
     venv.create(folder, with_pip=False, symlinks=True)
     interpreter = folder / "bin" / "python"
     command = [sys.executable, "-m", "pip", "--python", interpreter, "install", "-q", "--no-deps", wheel]
@@ -82,6 +87,27 @@ def test_it_works_without_the_checkout(python, tmp_path):
     deviation, place = ran.stdout.split()
     assert float(deviation) > 0
     assert str(python.parents[1]) in place
+
+
+FIRST = """
+import gymnasium
+two = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0]}
+for settings in ({}, {"actuator": "realistic", "sensors": "realistic"}, two):
+    env = gymnasium.make("panto_env:Pantograph-v0", **settings)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+"""
+
+
+@pytest.mark.slow
+def test_one_with_kernels_compiles_nothing_for_the_usual_environments(tmp_path):
+    build_wheel(tmp_path / "dist")
+    (path,) = (tmp_path / "dist").glob("*.whl")
+    python = installed(path, tmp_path / "elsewhere")
+    kept = tmp_path / "kept"
+    ran = run([python, "-c", FIRST], cwd=tmp_path, env=os.environ | {"PANTO_CACHE_DIR": str(kept)})
+    assert ran.returncode == 0, ran.stderr
+    assert not list(kept.rglob("*.nbc"))
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from ...base.arrays import Array, Lanes
 from ...base.errors import InputError
 from ...base.shown import beside
 from ..catenary.protocol import CatenaryModel
+from ..state import PerCollector, per_collector
 from .schema import PantographData
 from .step import Part
 
@@ -39,7 +40,7 @@ class Pantographs(NamedTuple):
     With n masses the state is n displacements, then n velocities.
     """
 
-    sizes: tuple[int, ...]  # 2n: entries of each collector's state; kernels know a tuple's length
+    sizes: PerCollector  # 2n: entries of each collector's state
     table: Array  # (collectors, lanes, rows of ``Part``); one row for all lanes where they are alike
 
     def set_lanes(
@@ -71,11 +72,11 @@ def parts(
     return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
 
 
-def pantographs(sizes: tuple[int, ...], lanes: int) -> Pantographs:
+def pantographs(sizes: list[int], lanes: int) -> Pantographs:
     """Arrays for the pantographs of ``lanes`` lanes, all zero; sizes: entries of each collector's state."""
     largest = max(sizes)
     rows = Part.CONTACT_INPUT + 3 * largest + largest**2
-    return Pantographs(sizes, aligned_zeros((len(sizes), lanes, rows)))
+    return Pantographs(per_collector(sizes, int, len(sizes)), aligned_zeros((len(sizes), lanes, rows)))
 
 
 def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLECTED) -> tuple[Array, Array]:

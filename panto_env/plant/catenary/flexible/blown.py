@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ....backend import WIDTH, bind, inlined, kernel, load_row, open_packed, pack, store_row
+from ....backend import WIDTH, bind, called, kernel, load_row, open_packed, pack, store_row
 from ....base.arrays import Array
 from ...side_wind import SHORTEST_WAVE, SIDE_ROWS
 from ...trigonometry import cosine_of_turns, sine_of_turns
@@ -99,7 +99,7 @@ def blow_alone(packed, lane, steps):
         end_step(line, wire, lane)
 
 
-@inlined
+@called
 def find_gusts(line, gusts, lane, steps):
     """Compute the gusts at all points after a number of steps."""
     table, coming, turning = gusts.table[lane], gusts.coming[lane], gusts.turning[lane]
@@ -121,7 +121,7 @@ def find_gusts(line, gusts, lane, steps):
                 cosine, sine = by_cosine * cosine - by_sine * sine, by_sine * cosine + by_cosine * sine
 
 
-@inlined
+@called
 def blow(line, gusts, lane, d, inertia):
     """Change all wires' increments by the wind of one step; their damping by air is implicit in it."""
     if gusts.table.shape[1] > 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ....backend import (
     NOT_NEGATIVE,
     WIDTH,
+    called,
     gather,
     inlined,
     kernel,
@@ -82,7 +83,7 @@ def _apply_spring(u, d, node, table, row, past):
     move_nodes(d, node, table, row + SPRING.MOVE, -force)
 
 
-@inlined
+@called
 def record_scattered(line, wire, lane, uplift, tension):
     """Write uplift at masts (m) and tension of droppers (N), as ``record_wire`` does."""
     masts, links = wire.scattered.masts, wire.scattered.links
@@ -169,7 +170,7 @@ def _ease(line, wire, lane, held, n, first, node, calm):
     wire.extension[lane, s, j] -= (1.0 - share_left(line, calm, node)) * apart
 
 
-@inlined
+@called
 def take_window(line, wire, lane):
     """Take in what is in a lane's window at its present place; what has entered is at rest."""
     scattered, held = line.scattered, wire.scattered

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....backend import inlined
+from ....backend import called
 from .arrays import MESSENGER
 from .links import pull_of
 from .scattered import apply_masts, keep_past_of_masts, move_nodes, stretch_at
@@ -10,7 +10,7 @@ from .scattered_arrays import LINK
 from .stitched import advance_stitches, move_hung, pull_clamps, stretch_of_hung
 
 
-@inlined
+@called
 def begin_uneven(line, wire, lane, stencil):
     """Keep what the wires' leapfrog overwrites, and advance the stitch wires."""
     u, d, held = wire.displacement[lane], wire.increment[lane], wire.scattered
@@ -18,7 +18,7 @@ def begin_uneven(line, wire, lane, stencil):
     advance_stitches(held, lane, u, d, stencil[MESSENGER])
 
 
-@inlined
+@called
 def pull_uneven(line, wire, lane):
     """Apply stitch wires, masts and droppers to the wires."""
     u, d, held = wire.displacement[lane], wire.increment[lane], wire.scattered
