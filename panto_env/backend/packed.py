@@ -8,7 +8,8 @@ have another one as a field.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -49,11 +50,17 @@ class Packed:
 
 def words_of(value: Any) -> NDArray[np.int64]:
     """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
+    return np.array(list(_words(value)), dtype=np.int64)
+
+
+def _words(value: Any) -> Iterator[int]:
     if isinstance(value, tuple):
-        return np.concatenate([words_of(field) for field in value])
-    if isinstance(value, np.ndarray):
-        return array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
-    return np.array([float(value)]).view(np.int64) if isinstance(value, float) else np.array([int(value)])
+        for field in value:
+            yield from _words(field)
+    elif isinstance(value, np.ndarray):
+        yield from array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
+    else:
+        yield struct.unpack("q", struct.pack("d", value))[0] if isinstance(value, float) else int(value)
 
 
 ADDRESS = 4
@@ -62,9 +69,9 @@ ADDRESS = 4
 
 def array_form(
     size: int, item: int, address: int, shape: tuple[int, ...], strides: tuple[int, ...]
-) -> NDArray[np.int64]:
-    """The compiled form of an array; item, strides: bytes."""
-    return np.array([0, 0, size, item, address, *shape, *strides], dtype=np.int64)  # no owner, no parent
+) -> tuple[int, ...]:
+    """The compiled form of an array, in words of 8 bytes; item, strides: bytes."""
+    return 0, 0, size, item, address, *shape, *strides  # no owner, no parent
 
 
 _types: dict[Any, Any] = {}

@@ -11,19 +11,29 @@ KEPT = 16
 """Number of results that are kept per function."""
 
 
+class _Hashed(tuple[Any, ...]):
+    """Arguments whose hash is computed only once: that of a line takes longer than to look a result up."""
+
+    def __init__(self, _: tuple[Any, ...]) -> None:
+        self._hash = super().__hash__()
+
+    def __hash__(self) -> int:
+        return self._hash
+
+
 def remembered(function: F) -> F:
     """Cache a function's results, which must not be changed, for calls with equal arguments.
 
     A call with arguments that have no hash, such as data with a list, is not cached.
     """
-    kept = lru_cache(maxsize=KEPT)(function)
+    kept = lru_cache(maxsize=KEPT)(lambda arguments: function(*arguments))
 
     @wraps(function)
     def look_up(*arguments: Any) -> Any:
         try:
-            hash(arguments)
+            key = _Hashed(arguments)
         except TypeError:
             return function(*arguments)
-        return kept(*arguments)
+        return kept(key)
 
     return look_up  # type: ignore[return-value]

@@ -46,6 +46,7 @@ SCHEMAS: dict[str, Mapping[str, type[Settings]]] = {
 """Schemas of each part of the catalogue by the value of ``kind``."""
 
 
+@cache
 def available(family: str) -> tuple[str, ...]:
     """Names in the catalogue; ``family`` is "catenary", "pantograph", "family" (of lines) or "section"."""
     return tuple(sorted(path.stem for path in FOLDERS[family].glob("*.toml")))

@@ -102,9 +102,8 @@ class FlexibleCatenaryData(CatenaryData):
     )
 
     def __hash__(self) -> int:
-        """Hash of all values that have one, by which results for a line are cached."""
-        unhashed = ("sources", "span_types", "sequence")
-        return hash(tuple(getattr(self, name) for name in type(self).model_fields if name not in unhashed))
+        """Hash of the values in which lines differ most, by which results for a line are cached."""
+        return hash((self.name, self.spans, self.droppers, *self.wires))
 
     @model_validator(mode="wrap")
     @classmethod
