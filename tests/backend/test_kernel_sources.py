@@ -123,4 +123,4 @@ def test_decorators_are_those_of_the_backend():
     given = [getattr(each, name, None) for name in DECORATORS for each in (backend, compile, numba.extending)]
     assert sum(map(callable, given)) >= len(DECORATORS)
     made = {name for name, value in vars(compile).items() if callable(value) and "njit(" in text_of(value)}
-    assert made == {"kernel", "inlined"}
+    assert made == {"kernel", "inlined", "called"}

@@ -95,6 +95,7 @@ BY_HAND = {
     "ptx": "wants an environment of its own",
     "ray": "wants an environment of its own",
     "rllib": "wants an environment of its own",
+    "wheel": "two minutes; a slow test builds one",
     "same": "wants an earlier commit",
     "urls": "for a release; a test fills in copies",
     "mutants": "wants an environment of its own, and some hours",

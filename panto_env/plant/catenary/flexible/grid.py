@@ -8,6 +8,7 @@ import numpy as np
 
 from ....backend import WIDTH, python_function
 from ....base.arrays import Array
+from ....base.remember import remembered
 from ...interpolation import cubic_weights, stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
@@ -46,6 +47,7 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float =
     return True
 
 
+@remembered
 def point_gain(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1.0) -> float:
     """Inverse of the stiffness (m/N) from which a force that reads a wire at mid-step is unstable.
 
