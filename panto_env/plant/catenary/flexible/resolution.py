@@ -17,6 +17,7 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
+from ....base.remember import remembered
 from ....base.units import from_kmh, to_kmh
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
@@ -106,32 +107,37 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
     where no default is fine enough. Raises InputError where grid and step
     are not stable together, or waves of the wire are too short for the step.
     """
+    found, cautions = _chosen(data, numerics, runs)
+    for caution in cautions:
+        warnings.warn(caution, AccuracyWarning, stacklevel=2)
+    return found
+
+
+@remembered
+def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple[Resolution, tuple[str, ...]]:
+    """The resolution, and what to warn of."""
     fast = numerics.accuracy == "fast"
     required = _fast(data, runs) if fast else fine_enough(data, runs)
     found = _stable(data, numerics, runs, required)
     runs.check_wave(found.time_step)
-    if not fast:
-        _warn_if_coarse(data, found, required, runs)
-        _warn_if_not_carried(data, found, required, runs)
+    cautions = (
+        [] if fast else [*_coarse(data, found, required, runs), *_not_carried(data, found, required, runs)]
+    )
     if runs.hard_contact:
-        warnings.warn(
+        cautions.append(
             f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
             f"N s/m, excites waves too short for a grid of {found.spacing:.3g} m: where contact is "
             f"lost, the mean may be wrong by up to about {HARD_CONTACT_MEAN_ERROR} %, the standard deviation "
             f"by {HARD_CONTACT_ERROR} %, and the contact-loss ratio may be several times too large; compare "
-            "with half the spacing.",
-            AccuracyWarning,
-            stacklevel=2,
+            "with half the spacing."
         )
     passed = runs.speeds[0] / found.spacing
     if passed < SLOWEST_HZ:
-        warnings.warn(
+        cautions.append(
             f"At {to_kmh(runs.speeds[0]):.3g} km/h a train passes {passed:.2g} nodes per second of a grid of "
-            f"{found.spacing:.3g} m: the contact force has a numerical ripple of about 1 N at this rate.",
-            AccuracyWarning,
-            stacklevel=2,
+            f"{found.spacing:.3g} m: the contact force has a numerical ripple of about 1 N at this rate."
         )
-    return found
+    return found, tuple(cautions)
 
 
 def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
@@ -236,37 +242,31 @@ def spans_of_train(data: FlexibleCatenaryData, runs: Runs) -> int:
     return math.ceil(runs.train_length / data.stride)
 
 
-def _warn_if_coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> None:
-    """Warn of the expected error: third order in the grid and second order in the step, from 1 % on."""
+def _coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> list[str]:
+    """The expected error, from 1 % on: third order in the grid and second order in the step."""
     grid, step = found.spacing / required.spacing, found.time_step / required.time_step
     if max(grid, step) < 1.01:
-        return
+        return []
     error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
     slow, quick = (to_kmh(speed) for speed in runs.speeds)
     speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
-    warnings.warn(
+    return [
         f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
         f"line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
         f"{1e3 * required.time_step:.3g} ms): "
-        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more.",
-        AccuracyWarning,
-        stacklevel=2,
-    )
+        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more."
+    ]
 
 
-def _warn_if_not_carried(
-    data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs
-) -> None:
-    """Warn where a grid as fine as required does not carry the waves ahead of the fastest train."""
+def _not_carried(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> list[str]:
+    """What a grid as fine as required means where it does not carry the waves ahead of the fastest train."""
     carrying, quick = carrying_grid(data, runs.speeds[1]), runs.speeds[1]
     if found.spacing <= REACH * carrying or found.spacing > 1.01 * required.spacing:
-        return
+        return []
     force, loss = NOT_CARRIED
-    warnings.warn(
+    return [
         f"At {to_kmh(quick):.0f} km/h, {100 * quick / data.contact_wire.wave_speed:.0f} % of the wave speed, "
         f"the waves ahead of a train need a grid of {carrying:.2g} m on line '{data.name}'; on the "
         f"{found.spacing:.3g} m in use standard deviation, maximum and minimum may be wrong by up to about "
-        f"{force} %, the contact-loss ratio by {loss} points. Give a smaller spacing.",
-        AccuracyWarning,
-        stacklevel=2,
-    )
+        f"{force} %, the contact-loss ratio by {loss} points. Give a smaller spacing."
+    ]
