@@ -9,7 +9,7 @@ have another one as a field.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -50,17 +50,19 @@ class Packed:
 
 def words_of(value: Any) -> NDArray[np.int64]:
     """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
-    return np.array(list(_words(value)), dtype=np.int64)
+    words: list[int] = []
+    _add_words(value, words)
+    return np.array(words, dtype=np.int64)
 
 
-def _words(value: Any) -> Iterator[int]:
+def _add_words(value: Any, words: list[int]) -> None:
     if isinstance(value, tuple):
         for field in value:
-            yield from _words(field)
+            _add_words(field, words)
     elif isinstance(value, np.ndarray):
-        yield from array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
+        words += array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
     else:
-        yield struct.unpack("q", struct.pack("d", value))[0] if isinstance(value, float) else int(value)
+        words += struct.unpack("q", struct.pack("d", value)) if isinstance(value, float) else [int(value)]
 
 
 ADDRESS = 4
