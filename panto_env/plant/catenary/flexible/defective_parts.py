@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 
 import numpy as np
 
@@ -41,6 +42,12 @@ class DefectiveParts:
         """The static state of each tension length."""
         self._droppers = sum(len(part.droppers) for part in self._parts)
         self._breaks = [self._breaks_of(pair)[0] for pair in (0, 1)]
+
+    def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
+        """The same line with wires of other tensions, as ``DrawnLine`` has them."""
+        other = copy(self)
+        other.lines = [each.with_tensions(tensions) for each in self.lines]
+        return other
 
     def _breaks_of(self, pair: int) -> tuple[Array, list[slice]]:
         """Limits of all pieces of a pair's contact wire (m), and which are those of each tension length."""

@@ -9,6 +9,7 @@ contact wire itself. The matrix is banded, and a line of any length costs a few 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,6 @@ import numpy as np
 
 from ....base.arrays import Array, Index
 from ....base.errors import InputError
-from ...alignment import Alignment
 from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
@@ -25,7 +25,7 @@ from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
 from .spans import spans_of
 from .static import solve
-from .stitches import Stitches, as_wire, moving, stitches_of
+from .stitches import as_wire, moving, stitches_of
 from .tension import misfit, shape_left, with_tension_left
 from .wire_defects import WireDefects, locate
 
@@ -65,17 +65,13 @@ class DefectiveLine:
         Raises InputError for what a line of so many spans has not.
         """
         each = spans_of(data, spans).each
-        alignment = data.alignment(spans)
-        left = with_tension_left(data, condition, tensions)
-        shape = solve(data) if left is data else shape_left(data, left)
-        self._times = repeats = spans // shape.spans
-        self._static = np.tile(shape.dropper_tension, repeats)
-        self._stiffness = np.tile(shape.dropper_stiffness, repeats)
-        self._broken, self._error, height = _locate(
+        self._data, self._spans, self._condition = data, spans, condition
+        self._alignment = alignment = data.alignment(spans)
+        self._broken, self._miscut, height = _locate(
             data, [len(span.droppers.sag) for span in each], condition
         )
-        own = locate(data, spans, condition)
-        stitches = moving(stitches_of(data, spans), spans)
+        self._own = own = locate(data, spans, condition)
+        self._stitches = stitches = moving(stitches_of(data, spans), spans)
         stitched = len(stitches.support) > 0
         self._per_node = per_node = STITCHED if stitched else UNKNOWNS
 
@@ -91,38 +87,55 @@ class DefectiveLine:
         number = np.arange(firsts[-1] + 1)
         hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
         self._ends = per_node * hung[:, None] + [0, 2]  # of the droppers
-        self._masts = masts = per_node * firsts[1:-1]
-        self._band = np.zeros((STITCHED_BAND if stitched else BAND, per_node * len(number)))
-        self._load = np.zeros(per_node * len(number))
-        lengths = np.concatenate([lengths for _, lengths, _ in divided])
+        if stitched:
+            self._ends[stitches.carrying >= 0, 1] += 2
+        self._masts = per_node * firsts[1:-1]
+        self._lengths = np.concatenate([lengths for _, lengths, _ in divided])
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
         self._repeats = not data.sequence
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
-        self._beams = Beams(left.contact_wire, lengths)
-        add_to_band(self._band, self._unknowns, self._beams.stiffness)
-        above = self._unknowns + 2 * (MESSENGER - CONTACT)
-        self._above = Beams(left.messenger_wire, lengths)
-        if stitched:
-            self._stitch(left.messenger_wire, stitches, lengths, above)
+        self._arm_stiffness = np.array([span.steady_arm.stiffness for span in each[1:]])
+        self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
+        self._raised, self._lifted = self._support_stiffness * height, self._masts + 2
+        self._hang(tensions)
+
+    def with_tensions(self, tensions: tuple[float, float]) -> DefectiveLine:
+        """The same line with wires of other tensions, as ``DrawnLine`` has them."""
+        other = copy(self)
+        other._hang(tensions)
+        return other
+
+    def _hang(self, tensions: tuple[float, float]) -> None:
+        """Set what depends on the wires' tensions."""
+        data, per_node, unknowns, masts = self._data, self._per_node, self._unknowns, self._masts
+        left = with_tension_left(data, self._condition, tensions)
+        shape = solve(data) if left is data else shape_left(data, left)
+        self._times = repeats = self._spans // shape.spans
+        self._static = np.tile(shape.dropper_tension, repeats)
+        self._stiffness = np.tile(shape.dropper_stiffness, repeats)
+        size = per_node * (len(unknowns) + 1)
+        self._band = np.zeros((STITCHED_BAND if per_node == STITCHED else BAND, size))
+        self._load = np.zeros(size)
+        self._beams = Beams(left.contact_wire, self._lengths)
+        add_to_band(self._band, unknowns, self._beams.stiffness)
+        above = unknowns + 2 * (MESSENGER - CONTACT)
+        self._above = Beams(left.messenger_wire, self._lengths)
+        if per_node == STITCHED:
+            self._stitch(left.messenger_wire, above)
         else:
             add_to_band(self._band, above, self._above.stiffness)
-        self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
-        self._band[0, masts] += [span.steady_arm.stiffness for span in each[1:]]
+        self._band[0, masts] += self._arm_stiffness
         self._band[0, masts + 2] += self._support_stiffness
-        self._load[masts + 2] = self._support_stiffness * height
-        self._lifted = masts + 2
+        self._load[self._lifted] = self._raised
         self._band[0, [0, 2, -per_node, 2 - per_node]] = HELD
         self.decay = self._beams.decay
-        self._carry(data, left, own, alignment)
+        self._carry(left)
 
-    def _stitch(self, messenger: Wire, stitches: Stitches, lengths: Array, above: Any) -> None:
-        """Add the messenger and the stitch wires, and hang droppers from these.
-
-        above: unknowns of the messenger's elements.
-        """
-        places = self._places
+    def _stitch(self, messenger: Wire, above: Any) -> None:
+        """Add the messenger and the stitch wires; above: unknowns of the messenger's elements."""
+        places, stitches, lengths = self._places, self._stitches, self._lengths
         tensions = messenger.tension - stitches.deficit(places, places + lengths)
         for tension in np.unique(np.round(tensions, 6)):
             which = np.flatnonzero(np.round(tensions, 6) == tension)
@@ -139,22 +152,20 @@ class DefectiveLine:
             rope[0, 0], rope[-1, 2] = above[first, 0], above[last - 1, 2]
             add_to_band(self._band, rope, Beams(as_wire(stitches, k), lengths[first:last]).stiffness)
         self._band[0, unused] = 1.0
-        self._ends[stitches.carrying >= 0, 1] += 2
 
-    def _carry(
-        self, data: FlexibleCatenaryData, left: FlexibleCatenaryData, own: WireDefects, alignment: Alignment
-    ) -> None:
+    def _carry(self, left: FlexibleCatenaryData) -> None:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
-        wire, ends, length = left.contact_wire, self._places, self._beams.lengths
+        wire, ends, length, own = left.contact_wire, self._places, self._lengths, self._own
         self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
         np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in own.spots:
             self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
-        surface = own.surface(np.append(ends, alignment.length))
+        surface = own.surface(np.append(ends, self._alignment.length))
         self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
-        if left is not data:
-            fit = misfit(data, left)
-            self._error = self._error + np.tile(fit.too_long, self._times)
+        self._error = self._miscut
+        if left is not self._data:
+            fit = misfit(self._data, left)
+            self._error = self._miscut + np.tile(fit.too_long, self._times)
             self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
             self._load[self._masts] += fit.lift
 

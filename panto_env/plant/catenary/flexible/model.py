@@ -166,7 +166,7 @@ class FlexibleCatenary:
         shape = shape_left(designed, own)
         defective = self._defective[drawn.condition]
         if drawn.tensions != (1.0, 1.0):
-            defective = _defective(designed, self.alignment.spans, drawn.condition, tensions)
+            defective = defective.with_tensions(tensions)
         return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
 
     def _write_tension(self, row: int, shape: StaticShape, tensioned: Tensioned) -> None:
