@@ -68,11 +68,16 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
     _name = "part_lowering"
 
-    def run_pass(self, state: Any) -> bool:
-        state.library = library = _library(state)
+    def library(self, state: Any) -> Any:
+        """A library that is neither optimised nor turned into machine code."""
+        library = _library(state)
         library.add_linking_library = lambda other: _link(library, other, type(library)._ensure_finalized)
         library._optimize_final_module = lambda: None
         library._finalize_final_module = lambda: setattr(library, "_finalized", True)
+        return library
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = library = self.library(state)
         state.flags.no_compile = True
         done: bool = super().run_pass(state)
         lowered = state["cr"]
@@ -88,13 +93,18 @@ class _CalledLowering(_PartLowering):
 
     _name = "called_lowering"
 
-    def run_pass(self, state: Any) -> bool:
-        done = super().run_pass(state)
-        library = state.library
-        library._final_module.get_function(state["cr"].fndesc.llvm_func_name).add_function_attribute(
-            "noinline"
-        )
-        return done
+    def library(self, state: Any) -> Any:
+        library = super().library(state)
+        add = library.add_ir_module
+
+        def add_marked(module: Any) -> None:
+            for function in module.functions:
+                if not function.is_declaration:
+                    function.attributes.add("noinline")
+            add(module)
+
+        library.add_ir_module = add_marked
+        return library
 
 
 class _NoCode:
