@@ -46,7 +46,7 @@ def reset(
         plant.time_step,
         plant.alignment,
     )
-    forces, used = static_forces(drawn.speed), lanes[plant.run.table[0, lanes, Row.STEP] > 0]
+    forces = static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantographs, forces, drawn.drift)
     run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
     end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
@@ -62,7 +62,7 @@ def reset(
         if uncounted:
             counted_from[agent] = task.length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
     _begin(task, lanes, end, counted_from)
-    plant.clear(task.samples, lanes, used)
+    plant.clear(task.samples, lanes)
     samples = plant.run.table[:, lanes, :SAMPLE_ROWS]
     task.sensors.reset(lanes, samples)
     if task.keep_samples:

@@ -248,12 +248,9 @@ class Plant:
             tension=np.zeros((self.lanes, rows, droppers), dtype=np.float32),
         )
 
-    def clear(self, samples: Samples, lanes: Array, used: Array | None = None) -> None:
-        """Reset the samples of lanes, (n,), to rest: kernels write only what lies within the window.
-
-        used: those that have run since their samples were made or cleared, by default all.
-        """
-        samples.uplift[lanes if used is None else used] = 0.0
+    def clear(self, samples: Samples, lanes: Array) -> None:
+        """Reset the samples of lanes, (n,), to rest: kernels write only what lies within the window."""
+        samples.uplift[lanes] = 0.0
         if samples.tension.shape[2]:
             for lane in lanes.tolist():
                 samples.tension[lane] = self.model.rest_tension(lane)
