@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from panto_env.backend.kept_kernels import BROUGHT, CLASS
+from panto_env.base.machine import cores
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN = """
@@ -25,7 +26,7 @@ import gymnasium
 from panto_env import simulate
 warnings.simplefilter("ignore")
 def make(name, **settings):
-    env = gymnasium.make(name, **settings)
+    env = gymnasium.make(f"panto_env:{name}", **settings)
     env.reset(seed=0)
     env.step(env.action_space.sample())
 two = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0]}
@@ -41,12 +42,12 @@ USUAL = (
 
 
 def compile_all(statements: tuple[str, ...], environment: dict[str, str]) -> None:
-    """Run statements in processes of their own, as many at a time as there are processors."""
+    """Run statements in processes of their own, as many at a time as there are cores."""
 
     def run(statement: str) -> None:
         subprocess.run([sys.executable, "-c", BEGIN + statement], check=True, env=os.environ | environment)
 
-    with ThreadPoolExecutor(os.cpu_count()) as processes:
+    with ThreadPoolExecutor(cores()) as processes:
         list(processes.map(run, statements))
 
 

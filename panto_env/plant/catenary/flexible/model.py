@@ -114,9 +114,8 @@ class FlexibleCatenary:
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
         """Write the defects into the line, or tables for them where each lane draws its own."""
-        self._defective = {
-            condition: _defective(data, spans, condition, self._fixed) for condition in conditions
-        }
+        kind = DefectiveParts if data.overlaps else DefectiveLine
+        self._defective = {condition: kind(data, spans, condition, self._fixed) for condition in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -198,15 +197,6 @@ class FlexibleCatenary:
     def shape_of(self, lane: int) -> StaticShape:
         """Static shape of one lane's line, without defects of its droppers and supports."""
         return self._shapes.get(lane, self._shapes[DESIGNED])
-
-
-def _defective(
-    data: FlexibleCatenaryData,
-    spans: int,
-    condition: LineCondition,
-    tensions: tuple[float, float] = (1.0, 1.0),
-) -> DefectiveLine | DefectiveParts:
-    return (DefectiveParts if data.overlaps else DefectiveLine)(data, spans, condition, tensions)
 
 
 def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
