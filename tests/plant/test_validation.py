@@ -13,7 +13,7 @@ from ..finite_element import __main__ as comparison
 
 def test_numerics_in_use_are_those_that_a_run_takes():
     used = convergence.in_use(Numerics(), 300.0)
-    assert (used.spacing, used.time_step) == pytest.approx((60 / 168, 1.25e-3))
+    assert (used.spacing, used.time_step) == pytest.approx((60 / 192, 1e-2 / 6))
     default, told = simulate(distance=120.0), simulate(distance=120.0, **used.model_dump())
     assert default.time_step == used.time_step
     assert (default.contact_force == told.contact_force).all()
@@ -41,7 +41,7 @@ def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch
     monkeypatch.setattr(validate.console, "_width", 150)
     validate.validate(convergence=True, wear=True)
     printed = capsys.readouterr().out
-    assert row_of(printed, "300")[1:5] == ["0.357", "1.25", "8", "single"]
+    assert row_of(printed, "300")[1:5] == ["0.312", "1.67", "8", "single"]
     assert row_of(printed, "0.8")[1:5] == ["0.5", "0.357", "1.11", "8.6"]
 
 
@@ -49,7 +49,7 @@ def test_json_holds_the_same_tables(short, capsys):
     validate.validate(convergence=True, wear=True, json=True)
     told = json.loads(capsys.readouterr().out)
     (converged,), (worn,) = told["convergence"], told["wear"]
-    assert (converged["spacing"], converged["time_step"]) == pytest.approx((60 / 168, 1.25e-3))
+    assert (converged["spacing"], converged["time_step"]) == pytest.approx((60 / 192, 1e-2 / 6))
     assert worn["time_step"] == pytest.approx(0.01 / 9)
     assert converged["std"] == simulate(spans=reference.LINE_SPANS).summary(reference.SPANS).std
     assert worn["std"][1] > 0
@@ -60,7 +60,7 @@ def test_finite_elements_are_compared_with_the_default_s_grid_and_step(monkeypat
     monkeypatch.setattr(comparison, "OURS", (Numerics(),))
     monkeypatch.setenv("COLUMNS", "120")
     comparison.main()
-    assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.357", "1.25"]
+    assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.312", "1.67"]
 
 
 def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_on_any_grid():
@@ -73,7 +73,7 @@ def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_
             assert other.max[0] == pytest.approx(true.max[0], abs=1.5)
             assert other.min[0] == pytest.approx(true.min[0], abs=1.5)
         assert ours.contact_loss[0] == pytest.approx(true.contact_loss[0], abs=0.1)
-        assert ours.steps >= 8
+        assert ours.steps >= (8 if ours.depth > 0.5e-3 else 4)
 
 
 def test_errors_of_lines_are_shown_with_the_largest_by_warning():

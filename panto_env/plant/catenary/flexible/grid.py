@@ -36,15 +36,29 @@ def stable(data: FlexibleCatenaryData, dx: float, step: float, lightest: float =
     And whether its waves turn in a step by at most ``TURNED``. dx: spacing (m). step: s. lightest: mass of
     the most worn contact wire, as a share of a new one's.
     """
+    shares = zip(data.wires, (lightest, 1.0), strict=True)
+    return all(_stable(wire, dx, step, data.damping.beta, share) for wire, share in shares)
+
+
+def _stable(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1.0) -> bool:
+    if _frequency(wire, FITTED / dx) * step > TURNED:
+        return False
     angle = np.linspace(0.0, np.pi, 181)  # of a wave from node to node
-    beta = data.damping.beta
-    for wire, share in ((data.contact_wire, lightest), (data.messenger_wire, 1.0)):
-        if _frequency(wire, FITTED / dx) * step > TURNED:
-            return False
-        squared = _response(stencil_weights(wire, dx, step, beta), angle) / share
-        if squared.min() < -1e-9 or squared.max() * (1 + 2 * beta / step) > 4 + 1e-9:
-            return False
-    return True
+    squared = _response(stencil_weights(wire, dx, step, beta), angle) / lightest
+    return bool(squared.min() >= -1e-9 and squared.max() * (1 + 2 * beta / step) <= 4 + 1e-9)
+
+
+def finest_stable(data: FlexibleCatenaryData, step: float) -> float:
+    """Spacing (m) of the finest grid on which a step (s) is stable."""
+    return _finest_stable(data.wires, data.damping.beta, data.stride, step)
+
+
+@remembered
+def _finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+    count = WIDTH * round(stride / (step * max(wire.wave_speed for wire in wires)) / WIDTH)
+    while count > WIDTH and not all(_stable(wire, stride / count, step, beta) for wire in wires):
+        count -= WIDTH
+    return stride / count
 
 
 @remembered

@@ -1,10 +1,11 @@
 """Grid, time step and window of a flexible catenary: fine enough for the runs that it is built for.
 
-A coarse grid fails in two ways. The waves ahead of a train are short: without bending stiffness a force at f
-Hz sends waves of length (c - v) / f ahead (``waves``). And a slow train passes a node every dx / v, and the
-force has a ripple of this period, which the 20 Hz filter removes only while it is short. A long step
-makes the force of slow trains, which changes by little, too even. docs/validation.md compares the figures at
-every speed, on every line, with converged ones.
+A step is given by the speed as a share of the wave speed, and the grid is the finest that is stable with it:
+near that limit waves of all lengths travel as on the wire. A coarse grid fails in two ways. The waves ahead
+of a train are short: without bending stiffness a force at f Hz sends waves of length (c - v) / f ahead
+(``waves``). And a slow train passes a node every dx / v, and the force has a ripple of this period, which the
+20 Hz filter removes only while it is short. A long step makes the force of slow trains, which changes by
+little, too even. docs/validation.md compares the figures at every speed, on every line, with converged ones.
 """
 
 from __future__ import annotations
@@ -18,17 +19,36 @@ import numpy as np
 from ....backend import WIDTH
 from ....base.errors import AccuracyWarning, InputError
 from ....base.remember import remembered
-from ....base.units import from_kmh, to_kmh
+from ....base.units import to_kmh
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
-from .grid import nodes_per_span, stable
+from .grid import finest_stable, nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 from .stitches import stitched
 from .waves import carrying_grid
 from .window import window_of
 
-GRIDS = ((0.6, 0.36, 1e-2 / 6), (0.7, 0.36, 1e-2 / 8), (0.88, 0.25, 1e-2 / 12), (1.0, 0.2, 1e-2 / 16))
-"""Up to a share of the wave speed: a grid (m) that is fine enough, a time step (s) that is short enough."""
+STEPS = (
+    (0.2, 1e-2 / 10),
+    (0.45, 1e-2 / 8),
+    (0.7, 1e-2 / 6),
+    (0.86, 1e-2 / 8),
+    (1.0, 1e-2 / 14),
+)
+"""Up to a share of the wave speed: a time step (s) that is short enough for one pantograph."""
+STEPS_OF_TRAINS = ((0.2, 1e-2 / 10), (0.7, 1e-2 / 8), (0.86, 1e-2 / 12), (1.0, 1e-2 / 16))
+"""The same for several, the second of which loses contact earlier."""
+MARGINS = ((0.2, 1.6), (0.3, 1.3), (1.0, 1.06))
+"""Up to a share of the wave speed: on its grid a step is stable that is so many times as long, and the finest
+such grid is taken. Near their limit waves of all lengths travel on a grid as on the wire. Under a slow train
+sigma is a few newtons, and near the limit it was wrong by up to 3 %."""
+PER_DAMPING, MOST_DAMPED = 1.6, 2.0
+"""Such a margin is at least 1 + this times beta / step, up to a maximum: damping acts a step late, and near
+the limit of a line damped five times as much as usual the maximum was wrong by 4 % of the mean force."""
+FINE = ((0.45, 0.3), (1.0, 0.2))
+"""Up to a share of the wave speed: a grid (m) that is fine enough for shorter steps too."""
+COARSEST = 0.45
+"""Maximum grid (m)."""
 NODES_HZ = 27.0
 """Minimum rate at which a train passes nodes (Hz): well above the 20 Hz to which forces are filtered."""
 SLOWEST_HZ = 22.0
@@ -40,8 +60,6 @@ REACH = 1.2
 NOT_CARRIED = (5, 4)
 """Errors beyond it, on the finest grid: of the standard deviation, maximum and minimum (%), and of the
 contact-loss ratio (points)."""
-SLOW = ((from_kmh(120), 1e-2 / 14), (from_kmh(200), 1e-2 / 8), (np.inf, np.inf))
-"""Below a speed (m/s): a time step (s) that is short enough."""
 LIMP, LIMP_STEP = 0.2, 0.6e-3
 """Grid (m) and time step (s) for a contact wire without bending stiffness, which kinks within a cell."""
 LIMP_NODES = 0.2
@@ -58,12 +76,20 @@ HARD_SPOT_GRID = 0.3
 the force over the spot was wrong by a tenth of what the spot does to it, here by a fiftieth."""
 DEEP = 0.5e-3
 """Depth of wear waves (m) above which the grid must resolve the waves that they excite."""
+SAMPLES_PER_SHALLOW_WAVE = 4
+"""Time steps in which a train passes the shortest wave of the wire, unless wear waves are deep."""
 DEEP_GRID = 0.125
 """Finest grid (m) for them, unless clamps are heavy."""
 NODES_PER_WAVE = 4
 """Nodes per wave that runs ahead of the train at the rate at which it passes deep wear waves. With two, the
 contact loss at every wear wave was wrong by up to 6 points of 29."""
-CLAMPS = ((0.25, np.inf, np.inf), (1.0, 0.16, 8e-4), (np.inf, 0.125, 2.5e-4))
+CLAMPS = (
+    (0.12, np.inf, np.inf),
+    (0.25, np.inf, 1e-3),
+    (0.5, 0.16, 8e-4),
+    (1.0, 0.14, 7e-4),
+    (np.inf, 0.1, 2.5e-4),
+)
 """Up to a mass of a clamp (kg), which hangs on two nodes: a grid (m) that is fine enough, a time step (s)
 that is short enough."""
 HEAVY_CLAMP = 1.0
@@ -117,7 +143,7 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
 def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple[Resolution, tuple[str, ...]]:
     """The resolution, and what to warn of."""
     fast = numerics.accuracy == "fast"
-    required = _fast(data, runs) if fast else fine_enough(data, runs)
+    required = _fast(data, runs) if fast else fine_enough(data, runs, numerics.time_step)
     found = _stable(data, numerics, runs, required)
     runs.check_wave(found.time_step)
     cautions = (
@@ -140,19 +166,22 @@ def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple
     return found, tuple(cautions)
 
 
-def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
+def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None = None) -> Required:
     """The coarsest grid and the longest step, stable or not, that give figures within these bounds.
 
-    Beside a grid of 0.05 m sigma is within 1 % on all lines up to 95 % of the wave speed, within 2 % where
-    neither wire has bending stiffness. On the catalogue's lines maximum and minimum are within 1 % of the
-    mean force, and contact loss within 0.25 points; on others within 1.5 %, above 70 % of the wave speed
-    2.5 %, and 0.75 points (``panto validate --lines``). Where spans of very unlike length stand side by side
-    and contact is lost, maximum and minimum of a single pantograph were wrong by up to 3 %.
+    time_step: the given one (s), if any, on whose grid the figures are. Beside a grid of 0.06 to 0.1 m sigma,
+    maximum and minimum, of the mean force, were within 1 % in 95 % of 335 runs of all kinds up to 95 % of the
+    wave speed, and in all within 3 % (``panto validate --lines``, docs/validation.md). Beyond 1 % were mostly
+    runs that lose contact, above 70 % of the wave speed or with heavy clamps.
     """
     slow, quick = runs.speeds
     wave_speed = data.contact_wire.wave_speed
-    spacing, longest = next((fine for share, *fine in GRIDS if quick <= share * wave_speed), GRIDS[-1][1:])
-    spacing = min(spacing, max(slow / NODES_HZ, FINEST_GRID))
+    steps = STEPS_OF_TRAINS if runs.train_length else STEPS
+    longest = min(
+        next((step for share, step in steps if speed <= share * wave_speed), steps[-1][1])
+        for speed in runs.speeds
+    )
+    spacing = max(slow / NODES_HZ, FINEST_GRID)
     deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
     if deep:
         ahead = min(deep) * (wave_speed - quick) / quick
@@ -175,8 +204,22 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs) -> Required:
         needed.append(TRAIN_ON_UNLIKE_SPANS)
     for grid, step in needed:
         spacing, longest = min(spacing, grid), min(longest, step)
-    step = next(step for speed, step in SLOW if slow < speed)
-    return Required(spacing, min(longest, step, runs.wave_step(SAMPLES_PER_WAVE)))
+    samples = SAMPLES_PER_WAVE if deep else SAMPLES_PER_SHALLOW_WAVE
+    longest = min(longest, runs.wave_step(samples))
+    step = min(time_step or longest, runs.whole_part(longest))
+    near_limit = finest_stable(data, _margin(data, runs, step) * step)
+    fine = next((grid for share, grid in FINE if quick <= share * wave_speed), FINE[-1][1])
+    return Required(min(spacing, max(near_limit, fine), COARSEST), longest)
+
+
+def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
+    """How many times as long a step must be stable on the grid of this one (s)."""
+    slow, quick = (speed / data.contact_wire.wave_speed for speed in runs.speeds)
+    margin = next(margin for share, margin in MARGINS if quick <= share or share == 1)
+    if slow <= MARGINS[1][0]:
+        margin = max(margin, MARGINS[1][1])
+    damped = min(1 + PER_DAMPING * data.damping.beta / step, MOST_DAMPED)
+    return max(margin, damped)
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
