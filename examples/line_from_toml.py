@@ -4,7 +4,7 @@
 
 printed that it keeps EN 50367 and EN 50119 at 250 km/h (sigma 32.1 N, twice the uplift 144 mm), and
 
-    200 km/h: mean 108.8 N, sigma 18.8 N
+    200 km/h: mean 108.8 N, sigma 18.9 N
     220 km/h: mean 116.9 N, sigma 25.4 N
     240 km/h: mean 125.8 N, sigma 32.7 N
     260 km/h: mean 135.5 N, sigma 35.6 N

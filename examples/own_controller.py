@@ -9,9 +9,9 @@ force; a policy that moves the mean by more than 1.5 %, as pd does, is shown but
 printed
 
     passive: sigma +0.0 %, mean force +0.00 %, rank 2
-    pd: sigma -11.3 %, mean force +5.07 %, not ranked: it moves the mean force by +5.1 %, more than 1.5 %
+    pd: sigma -11.2 %, mean force +5.06 %, not ranked: it moves the mean force by +5.1 %, more than 1.5 %
     (a policy's attribute washout = 1.0 keeps the mean)
-    Damper: sigma -8.5 %, mean force +0.09 %, rank 1
+    Damper: sigma -8.4 %, mean force +0.08 %, rank 1
 
 `panto benchmark examples/own_controller.py:Damper pd --speed 300 --seeds 2` takes it as well.
 """
