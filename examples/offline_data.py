@@ -4,7 +4,7 @@
 
 printed
 
-    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -795.9 and -685.2
+    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -798.5 and -683.5
     replayed from seed and actions: the same rewards to the last bit
 """
 
