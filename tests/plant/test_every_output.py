@@ -5,8 +5,8 @@ import pytest
 from ..every_output import cases, differences
 
 CASES = cases()
-DROPPERS = {"uniform, `en50318-2002`": 3.2}
-"""Bound of the largest force of a dropper (N) where it is not 3: eight spans take 3.05 N from 221 at any short step."""
+DROPPERS = {"uniform, `en50318-2002`": 3.5}
+"""Bound of the largest force of a dropper (N) where it is not 3: eight spans take 3.4 N of 221 at any short step."""
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -22,7 +22,9 @@ def test_every_output_in_a_window_is_that_of_the_whole_line(name):
     assert found["the same within two spans of the train (mm)"] < 3.5
     assert abs(found["largest dropper force (N)"]) < DROPPERS.get(name, 3)
     whole = found["the same on the whole line"]
-    assert found["dropper ahead of the train (N over rest)"] == pytest.approx(whole, abs=6)
+    assert found["dropper ahead of the train (N over rest)"] == pytest.approx(
+        whole, abs=0.5 if name.startswith("uniform") else 5
+    )
 
 
 def test_a_long_pass_on_a_stitched_line_has_no_forces_of_its_own_ahead():

@@ -19,9 +19,10 @@ from .arrays import MESSENGER, PAD
 from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of, share_ends
 
-EASED = 8.0
-"""Share of a span, as its inverse, over which wires come to rest towards a new span. With longer
-ramps the wires in overlaps send back more than they do without any."""
+EASED_ALIKE, EASED = 4.0, 8.0
+"""Share of a span, as its inverse, over which wires come to rest towards a new span, where all spans are alike,
+and elsewhere. With longer ramps the wires in overlaps send back more than they do without any; with a
+shorter one EN 50318's line sends back 2 % of the mean force."""
 
 
 @inlined
@@ -128,12 +129,9 @@ def calm_from(line, start):
     """Number of the window's node from which the line is at rest when the window has just moved to ``start``.
 
     There it ended, or the first stitch wire begins of those that come in: they were not there before, and
-    what would have hung from them swung freely. A step of some millimetres would be 300 N in a dropper. All
-    moves on where spans are of one length and none has stitch wires, as it does where they are alike.
+    what would have hung from them swung freely. A step of some millimetres would be 300 N in a dropper.
     """
     nodes = line.rows * WIDTH
-    if line.alignment.per_metre > 0.0 and line.scattered.deficit.size == 0:
-        return 2 * nodes
     ended = nodes - nodes // line.window
     calm, stitches = ended - PAD, line.scattered.stitches
     for n in range(stitches.number.size):
@@ -145,7 +143,8 @@ def calm_from(line, start):
 @inlined
 def share_left(line, calm, node):
     """Share of its motion that a node of the window keeps, ``calm`` being the first at rest: an even ramp."""
-    share = min(max((calm - node) * EASED * line.window / (line.rows * WIDTH), 0.0), 1.0)
+    per_span = EASED if line.scattered.mobility.shape[1] > 0 else EASED_ALIKE
+    share = min(max((calm - node) * per_span * line.window / (line.rows * WIDTH), 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
@@ -162,25 +161,39 @@ def _come_to_rest(line, wire, lane, calm):
 
 
 @inlined
-def _ease(line, wire, lane, held, n, first, node, calm):
-    """Bring link n of those whose sets begin with ``first`` to rest as the wires at a node of the window."""
-    sets, slot = held.node.shape[1], n % held.number.shape[1]
-    s, j = first + slot % sets, slot // sets
+def _ease(line, wire, lane, s, j, node, calm):
+    """Bring link j of set s to rest as the wires at a node of the window."""
     apart = wire.extension[lane, s, j] + wire.gap[lane, s, j]
     wire.extension[lane, s, j] -= (1.0 - share_left(line, calm, node)) * apart
+
+
+@inlined
+def _ease_held(line, wire, lane, held, n, first, node, calm):
+    """Bring link n of those whose sets begin with ``first`` to rest as the wires at a node of the window."""
+    sets, slot = held.node.shape[1], n % held.number.shape[1]
+    _ease(line, wire, lane, first + slot % sets, slot // sets, node, calm)
+
+
+@inlined
+def _ease_alike(line, wire, lane, calm):
+    """Bring the links in equal rows to rest as the wires."""
+    for k in range(line.link_set.size):
+        s, j = line.link_set[k], line.link_segment[k]
+        _ease(line, wire, lane, s, j, j * line.rows + line.link_row[s] + 1 - PAD, calm)
 
 
 @called
 def take_window(line, wire, lane):
     """Take in what is in a lane's window at its present place; what has entered is at rest."""
     scattered, held = line.scattered, wire.scattered
-    if scattered.mobility.shape[1] > 0:
-        nodes = line.rows * WIDTH
-        travelled = wire.travelled[lane]
-        start = travelled * (nodes // line.window)
+    nodes, travelled = line.rows * WIDTH, wire.travelled[lane]
+    start = travelled * (nodes // line.window)
+    calm = calm_from(line, start)
+    _come_to_rest(line, wire, lane, calm)
+    if scattered.mobility.shape[1] == 0:
+        _ease_alike(line, wire, lane, calm)
+    else:
         at_start, at_end = travelled == 0, at_line_end(line, wire, lane)
-        calm = calm_from(line, start)
-        _come_to_rest(line, wire, lane, calm)
         _take_nodes(scattered, wire.inertia[lane], wire.mobility[lane], start, line.rows)
         if line.pairs > 1:
             _hold_anchors(wire.displacement[lane], wire.increment[lane], wire.inertia[lane], line.rows)
@@ -197,7 +210,7 @@ def take_window(line, wire, lane):
                 _rest(line, wire, lane, scattered.links, held.links, n, 0)
             else:
                 node = scattered.links.first[n, 0] + 1 - start
-                _ease(line, wire, lane, held.links, n, 0, node, calm)
+                _ease_held(line, wire, lane, held.links, n, 0, node, calm)
             n += 1
         if scattered.deficit.size > 0:
             _take_stitches(line, wire, lane, start, end, at_start, at_end, calm)
@@ -238,7 +251,7 @@ def _take_stitches(line, wire, lane, start, end, at_start, at_end, calm):
             held.hung.node[lane, slot % own, 4, slot // own] = upper
             held.hung.node[lane, slot % own, 5, slot // own] = upper + WIDTH
         else:
-            _ease(line, wire, lane, held.hung, n, first, scattered.hung.first[n, 0] + 1 - start, calm)
+            _ease_held(line, wire, lane, held.hung, n, first, scattered.hung.first[n, 0] + 1 - start, calm)
         n += 1
 
 
