@@ -6,7 +6,7 @@ from ..every_output import cases, differences
 
 CASES = cases()
 DROPPERS = {"uniform, `en50318-2002`": 3.5}
-"""Bound of the largest force of a dropper (N) where it is not 3: eight spans take 3.4 N of 221 at any short step."""
+"""Bound of the largest force of a dropper (N) where it is not 3: 8 spans take 3.4 N of 221 at any step."""
 
 
 @pytest.mark.parametrize("name", CASES)

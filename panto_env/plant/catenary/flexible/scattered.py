@@ -20,8 +20,8 @@ from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of, share_ends
 
 EASED_ALIKE, EASED = 4.0, 8.0
-"""Share of a span, as its inverse, over which wires come to rest towards a new span, where all spans are alike,
-and elsewhere. With longer ramps the wires in overlaps send back more than they do without any; with a
+"""Share of a span, as its inverse, over which wires come to rest towards a new span, where all spans are
+alike, and elsewhere. With longer ramps the wires in overlaps send back more than they do without any; with a
 shorter one EN 50318's line sends back 2 % of the mean force."""
 
 
