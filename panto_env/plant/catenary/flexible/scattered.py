@@ -20,9 +20,9 @@ from .scattered_arrays import MAST, SPRING, STITCH
 from .segments import row_of, segment_of, share_ends
 
 EASED_ALIKE, EASED = 4.0, 8.0
-"""Share of a span, as its inverse, over which wires come to rest towards a new span, where all spans are
-alike, and elsewhere. With longer ramps the wires in overlaps send back more than they do without any; with a
-shorter one EN 50318's line sends back 2 % of the mean force."""
+"""Share of a span, as its inverse, over which wires come to rest towards a new span, where spans are of one
+length without overlaps, and elsewhere. With longer ramps the wires in overlaps send back more than they do
+without any; with a shorter one EN 50318's line sends back 2 % of the mean force."""
 
 
 @inlined
@@ -143,7 +143,8 @@ def calm_from(line, start):
 @inlined
 def share_left(line, calm, node):
     """Share of its motion that a node of the window keeps, ``calm`` being the first at rest: an even ramp."""
-    per_span = EASED if line.scattered.mobility.shape[1] > 0 else EASED_ALIKE
+    alike = line.alignment.per_metre > 0.0 and line.pairs == 1
+    per_span = EASED_ALIKE if alike else EASED
     share = min(max((calm - node) * per_span * line.window / (line.rows * WIDTH), 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)
 
