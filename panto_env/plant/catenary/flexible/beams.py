@@ -8,16 +8,19 @@ long they are, and nodes are needed only where a force or a spring acts on the w
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.remember import remembered
 from ..schema import Wire
 
 GRAVITY = 9.81  # m/s^2
 HELD = 1e18  # N/m, that holds a wire, in a banded matrix
 SHARPEST = 1e-12  # m over which a wire without bending stiffness rounds a kink, as elements need one
+_LOWER = np.tril_indices(4)  # rows and columns of the lower half of an element's matrix
 
 
 class Profile(NamedTuple):
@@ -58,12 +61,20 @@ class Beams:
         level = np.array([half, no, half, no]) - (1 + far) * even
         # Contiguous, as a pickled copy is: products would otherwise add up in another order there.
         shapes = np.array([level - tilt * lengths / 2, tilt, even + lean, even - lean])
-        self._shapes = np.ascontiguousarray(np.moveaxis(shapes, -1, 0))
+        self._shapes = np.ascontiguousarray(shapes.transpose(2, 0, 1))
         # The ends are held by T y' - EI y''' = T b and EI y'' = T (c exp(-kappa s) + d exp(-kappa (l - s))).
         one = np.ones(len(lengths))
         held = np.array([[no, -one, no, no], [no, no, -one, -far], [no, one, no, no], [no, no, far, one]])
-        self.stiffness = wire.tension * np.moveaxis(held, -1, 0) @ self._shapes
+        self.stiffness = wire.tension * held.transpose(2, 0, 1) @ self._shapes
         """Forces (N) and moments (N m) at the ends by the unknowns, (n, 4, 4)."""
+
+    def repeated(self, times: int) -> Beams:
+        """The elements of so many spans that are divided alike."""
+        other = copy(self)
+        other.lengths = np.tile(self.lengths, times)
+        other._shapes = np.tile(self._shapes, (times, 1, 1))
+        other.stiffness = np.tile(self.stiffness, (times, 1, 1))
+        return other
 
     def bulge(self, load: Array) -> Array:
         """E (1/m), (n,), of elements under even loads (N/m), (n,)."""
@@ -87,14 +98,27 @@ class Beams:
         return np.outer(self.lengths, [0, 1, 0, -1])
 
 
-def add_to_band(band: Array, unknowns: Any, stiffness: Array) -> None:
+@remembered
+def beams_of(wire: Wire, lengths: tuple[float, ...]) -> Beams:
+    """A wire's elements: the static shape of a line needs the same ones as the line with its defects."""
+    return Beams(wire, np.array(lengths))
+
+
+def places_in_band(unknowns: Any, size: int) -> Index:
+    """Where the lower halves of elements' matrices lie in a matrix's lower diagonals, read row after row.
+
+    unknowns: (elements, 4), rising numbers of the matrix's rows, of which there are ``size``.
+    """
+    row, column = unknowns[:, _LOWER[0]], unknowns[:, _LOWER[1]]
+    return np.asarray(((row - column) * size + column).ravel())
+
+
+def add_to_band(band: Array, places: Index, stiffness: Array) -> None:
     """Add the elements' stiffness matrices, (elements, 4, 4), to a matrix.
 
-    band: the matrix's lower diagonals, (diagonals, n). unknowns: (elements, 4), numbers of its rows.
+    band: the matrix's lower diagonals, (diagonals, n). places: of the elements, from ``places_in_band``.
     """
-    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-    lower = row >= column
-    np.add.at(band, ((row - column)[lower], column[lower]), stiffness[lower])
+    np.add.at(band.reshape(-1), places, stiffness[:, *_LOWER].ravel())
 
 
 class PeriodicWire:
@@ -103,7 +127,7 @@ class PeriodicWire:
     def __init__(self, wire: Wire, breaks: Array, held: Index) -> None:
         """breaks: nodes (m), (n + 1,), of which the last is the first one again; held: their numbers."""
         self.breaks, nodes, size = breaks, len(breaks) - 1, 2 * len(breaks) - 2
-        self.beams = Beams(wire, np.diff(breaks))
+        self.beams = beams_of(wire, tuple(np.diff(breaks).tolist()))
         self._bulge = self.beams.bulge(np.full(nodes, -GRAVITY * wire.mass))
         self._unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
         self._stiffness, self._weight = np.zeros((size, size)), np.zeros(size)
@@ -143,7 +167,7 @@ class LongWire:
         self._bulge = self.beams.bulge(np.full(nodes - 1, -GRAVITY * wire.mass))
         self._unknowns = 2 * np.arange(nodes - 1)[:, None] + np.arange(4)
         self._band, self._load, self._springs = np.zeros((4, 2 * nodes)), np.zeros(2 * nodes), springs
-        add_to_band(self._band, self._unknowns, self.beams.stiffness)
+        add_to_band(self._band, places_in_band(self._unknowns, 2 * nodes), self.beams.stiffness)
         self._band[0, ::2] += springs
         self._band[0, [1, -1]] += HELD
         np.add.at(self._load, self._unknowns, self.beams.end_loads(self._bulge))

@@ -20,7 +20,7 @@ from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, HELD, Beams, Profile, add_to_band
+from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
 from .spans import spans_of
@@ -91,11 +91,15 @@ class DefectiveLine:
             self._ends[stitches.carrying >= 0, 1] += 2
         self._masts = per_node * firsts[1:-1]
         self._lengths = np.concatenate([lengths for _, lengths, _ in divided])
+        alike = not data.sequence
+        self._divided = tuple((divided[0][1] if alike else self._lengths).tolist()), spans if alike else 1
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
         self._repeats = not data.sequence
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
+        self._size = per_node * len(number)
+        self._in_band = places_in_band(self._unknowns, self._size)
         self._arm_stiffness = np.array([span.steady_arm.stiffness for span in each[1:]])
         self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
         self._raised, self._lifted = self._support_stiffness * height, self._masts + 2
@@ -109,23 +113,22 @@ class DefectiveLine:
 
     def _hang(self, tensions: tuple[float, float]) -> None:
         """Set what depends on the wires' tensions."""
-        data, per_node, unknowns, masts = self._data, self._per_node, self._unknowns, self._masts
+        data, per_node, masts = self._data, self._per_node, self._masts
         left = with_tension_left(data, self._condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
         self._times = repeats = self._spans // shape.spans
         self._static = np.tile(shape.dropper_tension, repeats)
         self._stiffness = np.tile(shape.dropper_stiffness, repeats)
-        size = per_node * (len(unknowns) + 1)
-        self._band = np.zeros((STITCHED_BAND if per_node == STITCHED else BAND, size))
-        self._load = np.zeros(size)
-        self._beams = Beams(left.contact_wire, self._lengths)
-        add_to_band(self._band, unknowns, self._beams.stiffness)
-        above = unknowns + 2 * (MESSENGER - CONTACT)
-        self._above = Beams(left.messenger_wire, self._lengths)
+        self._band = np.zeros((STITCHED_BAND if per_node == STITCHED else BAND, self._size))
+        self._load = np.zeros(self._size)
+        lengths, times = self._divided
+        self._beams = beams_of(left.contact_wire, lengths).repeated(times)
+        add_to_band(self._band, self._in_band, self._beams.stiffness)
+        self._above = beams_of(left.messenger_wire, lengths).repeated(times)
         if per_node == STITCHED:
-            self._stitch(left.messenger_wire, above)
+            self._stitch(left.messenger_wire)
         else:
-            add_to_band(self._band, above, self._above.stiffness)
+            add_to_band(self._band, self._in_band + 2 * (MESSENGER - CONTACT), self._above.stiffness)
         self._band[0, masts] += self._arm_stiffness
         self._band[0, masts + 2] += self._support_stiffness
         self._load[self._lifted] = self._raised
@@ -133,15 +136,17 @@ class DefectiveLine:
         self.decay = self._beams.decay
         self._carry(left)
 
-    def _stitch(self, messenger: Wire, above: Any) -> None:
-        """Add the messenger and the stitch wires; above: unknowns of the messenger's elements."""
-        places, stitches, lengths = self._places, self._stitches, self._lengths
+    def _stitch(self, messenger: Wire) -> None:
+        """Add the messenger and the stitch wires."""
+        places, stitches, lengths, size = self._places, self._stitches, self._lengths, self._size
+        above = self._unknowns + 2 * (MESSENGER - CONTACT)
         tensions = messenger.tension - stitches.deficit(places, places + lengths)
         for tension in np.unique(np.round(tensions, 6)):
             which = np.flatnonzero(np.round(tensions, 6) == tension)
             thinner = messenger.model_copy(update={"tension": float(tension)})
-            add_to_band(self._band, above[which], Beams(thinner, lengths[which]).stiffness)
-        unused = np.ones(len(self._load), dtype=bool)
+            stiffness = Beams(thinner, lengths[which]).stiffness
+            add_to_band(self._band, places_in_band(above[which], size), stiffness)
+        unused = np.ones(size, dtype=bool)
         unused[:: self._per_node] = unused[1 :: self._per_node] = False
         unused[2 :: self._per_node] = unused[3 :: self._per_node] = False
         for k in range(len(stitches.support)):
@@ -150,7 +155,8 @@ class DefectiveLine:
             unused[np.unique(rope)] = False
             unused[[rope[0, 0], rope[-1, 2]]] = True
             rope[0, 0], rope[-1, 2] = above[first, 0], above[last - 1, 2]
-            add_to_band(self._band, rope, Beams(as_wire(stitches, k), lengths[first:last]).stiffness)
+            stiffness = Beams(as_wire(stitches, k), lengths[first:last]).stiffness
+            add_to_band(self._band, places_in_band(rope, size), stiffness)
         self._band[0, unused] = 1.0
 
     def _carry(self, left: FlexibleCatenaryData) -> None:
