@@ -211,6 +211,8 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
 def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
     """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
+    if line.stitch_wire is None:
+        return None
     found = stitches_of(line, 1)
     if not len(found.support):
         return None

@@ -22,6 +22,15 @@ from .spans import spans_of
 from .static import StaticShape, solve
 
 
+class _Arms(NamedTuple):
+    """Steady arms of a line as it was designed: at its supports, or one for all."""
+
+    places: Array  # (arms,): m
+    stiffness: Array  # (arms,): N/m
+    heights: Array  # (arms,): of the contact wire there (m)
+    holding: Any  # (arms,): whether each holds the wire
+
+
 class Misfit(NamedTuple):
     """Differences of a line that has lost tension, or bears ice, from one that was designed for that."""
 
@@ -64,14 +73,25 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
     """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
     was, now = solve(designed), solve(left)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
-    arms = [span.steady_arm for span in spans_of(designed, 1).each]
-    if designed.sequence:
-        arms.append(arms[-1])
-    x = np.array(designed.alignment().supports[: len(arms)])
-    lift: Any = np.array([arm.stiffness for arm in arms]) * (was.contact.height(x) - now.contact.height(x))
-    lift[[arm.holds_wire for arm in arms]] += was.arm_force - now.arm_force
+    arms = _arms(designed)
+    lift: Any = arms.stiffness * (arms.heights - now.contact.height(arms.places))
+    lift[arms.holding] += was.arm_force - now.arm_force
     return Misfit(
         too_long=was.dropper_length - now.dropper_length + stretch,
         lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,
         lift=lift[1:-1] if designed.sequence else lift,
+    )
+
+
+@remembered
+def _arms(designed: FlexibleCatenaryData) -> _Arms:
+    arms = [span.steady_arm for span in spans_of(designed, 1).each]
+    if designed.sequence:
+        arms.append(arms[-1])
+    x = np.array(designed.alignment().supports[: len(arms)])
+    return _Arms(
+        x,
+        np.array([arm.stiffness for arm in arms]),
+        solve(designed).contact.height(x),
+        np.array([arm.holds_wire for arm in arms]),
     )
