@@ -126,17 +126,16 @@ class PeriodicWire:
 
     def __init__(self, wire: Wire, breaks: Array, held: Index) -> None:
         """breaks: nodes (m), (n + 1,), of which the last is the first one again; held: their numbers."""
-        self.breaks, nodes, size = breaks, len(breaks) - 1, 2 * len(breaks) - 2
+        self.breaks, nodes = breaks, len(breaks) - 1
         self.beams = beams_of(wire, tuple(np.diff(breaks).tolist()))
         self._bulge = self.beams.bulge(np.full(nodes, -GRAVITY * wire.mass))
-        self._unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
-        self._stiffness, self._weight = np.zeros((size, size)), np.zeros(size)
-        at = self._unknowns[:, :, None], self._unknowns[:, None, :]
-        np.add.at(self._stiffness, at, self.beams.stiffness)
-        np.add.at(self._weight, self._unknowns, self.beams.end_loads(self._bulge))
-        self._held = 2 * held
-        self._free = np.delete(np.arange(size), self._held)
-        self._among_free = self._stiffness[np.ix_(self._free, self._free)]
+        self._ring = ring = _ring_of(nodes, tuple(held.tolist()))
+        size = 2 * nodes
+        stiffness = np.bincount(ring.in_matrix, self.beams.stiffness.ravel(), size**2)
+        self._stiffness = stiffness.reshape(size, size)
+        loads = self.beams.end_loads(self._bulge)
+        self._weight = np.bincount(ring.unknowns.ravel(), loads.ravel(), size)
+        self._among_free = self._stiffness[ring.among_free]
 
     def hang(self, heights: Array, forces: Array) -> tuple[Array, Array]:
         """Unknowns of the wire with held nodes at ``heights`` (m), and the upward forces (N) that hold them.
@@ -144,14 +143,36 @@ class PeriodicWire:
         forces: further upward forces at all nodes (N), (n,).
         """
         load, state = self._weight.copy(), np.zeros(len(self._weight))
+        held, free = self._ring.held, self._ring.free
         load[::2] += forces
-        state[self._held] = heights
-        state[self._free] = np.linalg.solve(self._among_free, (load - self._stiffness @ state)[self._free])
-        return state, (self._stiffness @ state - load)[self._held]
+        state[held] = heights
+        state[free] = np.linalg.solve(self._among_free, (load - self._stiffness @ state)[free])
+        return state, (self._stiffness @ state - load)[held]
 
     def profile(self, state: Array) -> Profile:
         """Height along the wire, by its unknowns."""
-        return Profile(self.breaks, self.beams.pieces(state[self._unknowns], self._bulge), self.beams.decay)
+        pieces = self.beams.pieces(state[self._ring.unknowns], self._bulge)
+        return Profile(self.breaks, pieces, self.beams.decay)
+
+
+class _Ring(NamedTuple):
+    """Numbers of a periodic wire's unknowns."""
+
+    unknowns: Index  # (elements, 4): of each element
+    in_matrix: Index  # (16 elements,): where their stiffness lies in the whole matrix, read row after row
+    held: Index  # those that are given
+    free: Index  # all others
+    among_free: tuple[Any, ...]  # index of the matrix's part between free ones
+
+
+@remembered
+def _ring_of(nodes: int, held: tuple[int, ...]) -> _Ring:
+    """held: numbers of the held nodes."""
+    size, given = 2 * nodes, 2 * np.array(held)
+    unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
+    in_matrix = (size * unknowns[:, :, None] + unknowns[:, None, :]).ravel()
+    free = np.delete(np.arange(size), given)
+    return _Ring(unknowns, in_matrix, given, free, np.ix_(free, free))
 
 
 class LongWire:

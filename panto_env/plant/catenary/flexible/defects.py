@@ -66,7 +66,7 @@ class DefectiveLine:
         """
         each = spans_of(data, spans).each
         self._data, self._spans, self._condition = data, spans, condition
-        self._alignment = alignment = data.alignment(spans)
+        alignment = data.alignment(spans)
         self._broken, self._miscut, height = _locate(
             data, [len(span.droppers.sag) for span in each], condition
         )
@@ -103,6 +103,9 @@ class DefectiveLine:
         self._arm_stiffness = np.array([span.steady_arm.stiffness for span in each[1:]])
         self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
         self._raised, self._lifted = self._support_stiffness * height, self._masts + 2
+        self._lightening = own.lightening(self._places + self._lengths / 2)
+        surface = own.surface(np.append(self._places, alignment.length))
+        self._surface = np.stack([surface[:-1], np.diff(surface) / self._lengths], axis=1)
         self._hang(tensions)
 
     def with_tensions(self, tensions: tuple[float, float]) -> DefectiveLine:
@@ -161,13 +164,11 @@ class DefectiveLine:
 
     def _carry(self, left: FlexibleCatenaryData) -> None:
         """Load the wires with what their own defects, and the tension that they have lost, do to them."""
-        wire, ends, length, own = left.contact_wire, self._places, self._lengths, self._own
-        self._bulge = self._beams.bulge(GRAVITY * wire.mass * own.lightening(ends + length / 2))
-        np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
-        for spot in own.spots:
+        self._bulge = self._beams.bulge(GRAVITY * left.contact_wire.mass * self._lightening)
+        if self._own.stretches:
+            np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
+        for spot in self._own.spots:
             self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
-        surface = own.surface(np.append(ends, self._alignment.length))
-        self._surface = np.stack([surface[:-1], np.diff(surface) / length], axis=1)
         self._error = self._miscut
         if left is not self._data:
             fit = misfit(self._data, left)
