@@ -172,15 +172,24 @@ def stencil_weights(wire: Wire, dx: float, step: float, beta: float) -> Array:
     proportion to the stiffness (s).
     """
     courant = wire.tension / wire.mass * (step / dx) ** 2
-    angle = (np.arange(64) + 0.5) / 64 * FITTED
+    angle, differences = _fitted(1.0)
+    frequency = _frequency(wire, angle / dx)
     # On a fine grid damping lets no short wave swing that need be fitted.
-    swinging = beta * _frequency(wire, angle / dx) < 1
-    angle *= max(float(angle[swinging].max(initial=angle[0])) / angle[-1], 0.1)
-    wanted = exact_answer(_frequency(wire, angle / dx), step, beta)
+    swinging = beta * frequency < 1
+    if not swinging.all():
+        angle, differences = _fitted(max(float(angle[swinging].max(initial=angle[0])) / angle[-1], 0.1))
+        frequency = _frequency(wire, angle / dx)
     # Relative to what is wanted, so that long and short waves count alike.
-    one, two, three = _differences(angle) / wanted
+    one, two, three = differences / exact_answer(frequency, step, beta)
     far, *_ = np.linalg.lstsq(np.stack([two - 4 * one, three - 9 * one], axis=1), 1 - courant * one)
     return np.array([courant - 4 * far[0] - 9 * far[1], *far])
+
+
+@remembered
+def _fitted(share: float) -> tuple[Array, Array]:
+    """Angles from node to node of fitted waves, up to a share of ``FITTED``, and their ``_differences``."""
+    angle = (np.arange(64) + 0.5) / 64 * FITTED * share
+    return angle, _differences(angle)
 
 
 def _frequency(wire: Wire, number: Any) -> Any:
