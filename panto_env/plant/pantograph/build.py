@@ -92,8 +92,9 @@ def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLE
     forces[0, 2] += 1.0
     if n > 1:
         forces[1, 2] -= 1.0
-    a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse_mass @ stiffness, -inverse_mass @ damping]])
-    b = np.vstack([np.zeros((n, 3)), inverse_mass @ forces])
+    a, b = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 3))
+    a[:n, n:] = np.eye(n)
+    a[n:, :n], a[n:, n:], b[n:] = -inverse_mass @ stiffness, -inverse_mass @ damping, inverse_mass @ forces
     return a, b
 
 
