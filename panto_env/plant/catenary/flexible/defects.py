@@ -20,7 +20,7 @@ from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band
+from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
 from .spans import spans_of
@@ -249,8 +249,6 @@ class DefectiveLine:
 
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:
         """Change of all unknowns, so loaded, with these droppers taut, the others without tension."""
-        from scipy.linalg import solveh_banded  # slow to import
-
         band, load = self._band.copy(), loaded.copy()
         spring = np.where(taut, self._stiffness, 0.0)
         contact, messenger = self._ends.T
@@ -260,7 +258,7 @@ class DefectiveLine:
         gain = np.where(taut, -spring * error, -self._static)  # of tension, were the wires held
         load[contact] += gain
         load[messenger] -= gain
-        return np.asarray(solveh_banded(band, load, lower=True, overwrite_ab=True, overwrite_b=True))
+        return solve_band(band, load)
 
 
 def _divided(
