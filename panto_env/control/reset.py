@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,8 @@ def reset(
         uncounted = distance - distances[0] + task.length.settling
         if uncounted:
             counted_from[agent] = task.length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
-    _begin(task, lanes, end, counted_from)
+    at_start = [_at_start(task, agent, lanes) for agent in range(task.agents)]
+    _begin(task, lanes, at_start, end, counted_from)
     plant.clear(task.samples, lanes)
     samples = plant.run.table[:, lanes, :SAMPLE_ROWS]
     task.sensors.reset(lanes, samples)
@@ -75,8 +76,9 @@ def reset(
         for lane in lanes.tolist():
             task.noise.start(task.sensors, lane, of_lane(lane))
     task.observe_start(lanes, results)
-    if run_in.any():
-        _run_in(task, lanes[run_in > 0], run_in[run_in > 0], results)
+    ran = run_in > 0
+    if ran.any():
+        _run_in(task, lanes[ran], run_in[ran], [own[ran] for own in at_start], results)
 
 
 def _rows(task: TaskState, lanes: Any) -> Any:
@@ -84,22 +86,11 @@ def _rows(task: TaskState, lanes: Any) -> Any:
     return task.agents * lanes + np.arange(task.agents)[:, None]
 
 
-def _begin(task: TaskState, lanes: Any, end: Array, counted_from: Array) -> None:
-    """Begin episodes in lanes, (n,), at their present positions.
-
-    end, counted_from: plant steps from the line's start at which they end, (n,), and after which they count,
-    (agents, n). Raises InputError where nothing of an episode would count.
-    """
-    for agent, rows in enumerate(_rows(task, lanes)):
-        _begin_agent(task, agent, lanes, rows, end, counted_from[agent])
-
-
-def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array, counted_from: Array) -> None:
-    """As ``_begin``, for one of the controlled collectors; rows: its own, (n,)."""
-    collector, table = task.episode.controlled[agent], task.episode.table
+def _at_start(task: TaskState, agent: int, lanes: Any) -> Array:
+    """Rows of a controlled collector in lanes, (n, rows of ``TaskRow``), wherever their episodes begin."""
+    collector = task.episode.controlled[agent]
     start, pantograph = task.plant.run.table[collector, lanes], task.settings.riding[collector]
-    values = np.tile(no_figures(table.shape[1]), (len(lanes), 1))
-    values[:, TaskRow.END] = end
+    values = np.tile(no_figures(task.episode.table.shape[1]), (len(lanes), 1))
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
     if not nominal[low] > 0:  # the reward is relative to it
@@ -113,6 +104,26 @@ def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array,
     values[:, TaskRow.PER_SPREAD] = 1 / spread
     uplift, force = limits(task.settings.line, task.speed[lanes])
     values[:, TaskRow.UPLIFT_LIMIT], values[:, TaskRow.FORCE_LIMIT] = uplift, force
+    return values
+
+
+def _begin(task: TaskState, lanes: Any, at_start: Sequence[Array], end: Array, counted_from: Array) -> None:
+    """Begin episodes in lanes, (n,), at their present positions.
+
+    at_start: of each agent, from ``_at_start``. end, counted_from: plant steps from the line's start at which
+    they end, (n,), and after which they count, (agents, n). Raises InputError where nothing of an episode
+    would count.
+    """
+    for agent, rows in enumerate(_rows(task, lanes)):
+        _begin_agent(task, agent, lanes, rows, at_start[agent], end, counted_from[agent])
+
+
+def _begin_agent(
+    task: TaskState, agent: int, lanes: Any, rows: Any, values: Array, end: Array, counted_from: Array
+) -> None:
+    """As ``_begin``, for one of the controlled collectors; rows: its own, (n,)."""
+    start, table = task.plant.run.table[task.episode.controlled[agent], lanes], task.episode.table
+    values[:, TaskRow.END] = end
     counted_from = np.maximum(counted_from, start[:, Row.STEP])
     if (counted_from >= end).any():
         raise InputError(
@@ -133,8 +144,11 @@ def _begin_agent(task: TaskState, agent: int, lanes: Any, rows: Any, end: Array,
     task.running.peak[rows] = -np.inf
 
 
-def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
-    """Run lanes, just reset, for ``steps`` control steps each without control, and begin episodes there."""
+def _run_in(task: TaskState, lanes: Any, steps: Any, at_start: Sequence[Array], results: Results) -> None:
+    """Run lanes, just reset, for ``steps`` control steps each without control, and begin episodes there.
+
+    at_start: of these lanes and each agent, from ``_at_start``.
+    """
     left = np.zeros(task.lanes, dtype=np.int64)
     left[lanes] = steps
     task.coast(left, results)
@@ -142,7 +156,7 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, results: Results) -> None:
     before = task.episode.table[rows]
     for lane in lanes[before[0, :, TaskRow.ENDING] != Ending.NONE].tolist():
         raise InputError(ending(task, lane))
-    _begin(task, lanes, before[0, :, TaskRow.END], before[..., TaskRow.COUNTED_FROM])
+    _begin(task, lanes, at_start, before[0, :, TaskRow.END], before[..., TaskRow.COUNTED_FROM])
     # What the run-in would have earned and cost does not count.
     results.values[rows, : Result.CONTACT_FORCE] = results.values[rows, Result.COST] = 0.0
     if task.layout.history:
