@@ -14,6 +14,7 @@ from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .attached import joined_springs, links_of, springs_of
+from .beams import Located, Profile, located
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
 from .near_build import near_droppers
@@ -145,13 +146,32 @@ def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: 
         for wire in wires
     ]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
-    table = np.linspace(0, data.period, int(np.ceil(data.period / SHAPE_SPACING)) + 1)
+    heights, beside = _heights(data, shape)
     return Tensioned(
-        shape=heights_of_pair(data, shape, 0, table),
-        beside=heights_of_pair(data, shape, 1, table) if data.overlaps else np.zeros(0),
+        shape=heights,
+        beside=beside,
         stencil=np.array(stencil),
         absorbing=(courant - 1) / (courant + 1),
     )
+
+
+def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Array]:
+    """Tables of the static height of the contact wire, (n,), and of that beside it, or none."""
+    if isinstance(shape.contact, Profile):
+        breaks, _, _, repeats = own = shape.contact
+        return own.height_at(_table(data.period, tuple(breaks.tolist()), repeats)), np.zeros(0)
+    table = _table_places(data.period)
+    return heights_of_pair(data, shape, 0, table), heights_of_pair(data, shape, 1, table)
+
+
+@remembered
+def _table(period: float, breaks: tuple[float, ...], repeats: bool) -> Located:
+    """Places of the table of the static height: the same for all tensions."""
+    return located(np.array(breaks), _table_places(period), repeats)
+
+
+def _table_places(period: float) -> Array:
+    return np.linspace(0, period, int(np.ceil(period / SHAPE_SPACING)) + 1)
 
 
 def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
