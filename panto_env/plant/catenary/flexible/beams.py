@@ -100,7 +100,7 @@ class Beams:
     def end_loads(self, bulge: Array) -> Array:
         """Forces (N) and moments (N m), (n, 4), that act on the ends as the even loads of a bulge do."""
         bending = np.full(len(bulge), 2 / self.decay**2)
-        held = -self.tension * np.stack([self.lengths, -bending, self.lengths, bending], axis=1)
+        held = -self.tension * np.array([self.lengths, -bending, self.lengths, bending]).T
         loads = np.einsum("eij,ej->ei", self.stiffness, self._end_slopes) - held
         return np.asarray(bulge[:, None] * loads)
 
@@ -133,9 +133,10 @@ def places_in_band(unknowns: Any, size: int) -> Index:
 def add_to_band(band: Array, places: Index, stiffness: Array) -> None:
     """Add the elements' stiffness matrices, (elements, 4, 4), to a matrix.
 
-    band: the matrix's lower diagonals, (diagonals, n). places: of the elements, from ``places_in_band``.
+    band: the matrix's lower diagonals, (diagonals, n). places: from ``places_in_band``, also of several spans
+    with these elements in each.
     """
-    np.add.at(band.reshape(-1), places, stiffness[:, *_LOWER].ravel())
+    np.add.at(band.reshape(-1), places, np.resize(stiffness[:, *_LOWER], len(places)))
 
 
 def solve_band(band: Array, load: Array) -> Array:

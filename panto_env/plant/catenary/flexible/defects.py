@@ -125,9 +125,9 @@ class DefectiveLine:
         self._band = np.zeros((STITCHED_BAND if per_node == STITCHED else BAND, self._size))
         self._load = np.zeros(self._size)
         lengths, times = self._divided
-        self._beams = beams_of(left.contact_wire, lengths).repeated(times)
-        add_to_band(self._band, self._in_band, self._beams.stiffness)
-        self._above = beams_of(left.messenger_wire, lengths).repeated(times)
+        wire, self._above = beams_of(left.contact_wire, lengths), beams_of(left.messenger_wire, lengths)
+        self._beams = wire.repeated(times)
+        add_to_band(self._band, self._in_band, wire.stiffness)
         if per_node == STITCHED:
             self._stitch(left.messenger_wire)
         else:
@@ -244,7 +244,8 @@ class DefectiveLine:
     def rises(self, state: StaticState) -> tuple[Profile, Profile]:
         """Change of the running surface's and of the messenger's height in a state."""
         unknowns = state.change[self._unknowns + 2 * (MESSENGER - CONTACT)]
-        pieces = self._above.pieces(unknowns, np.zeros(len(unknowns)))
+        above = self._above.repeated(self._divided[1])
+        pieces = above.pieces(unknowns, np.zeros(len(unknowns)))
         return self.rise(state), Profile(self.breaks, pieces, self._above.decay, self._repeats)
 
     def _solve_linear(self, taut: Any, error: Array, loaded: Array) -> Array:

@@ -181,7 +181,7 @@ def stencil_weights(wire: Wire, dx: float, step: float, beta: float) -> Array:
         frequency = _frequency(wire, angle / dx)
     # Relative to what is wanted, so that long and short waves count alike.
     one, two, three = differences / exact_answer(frequency, step, beta)
-    far, *_ = np.linalg.lstsq(np.stack([two - 4 * one, three - 9 * one], axis=1), 1 - courant * one)
+    far, *_ = np.linalg.lstsq(np.array([two - 4 * one, three - 9 * one]).T, 1 - courant * one)
     return np.array([courant - 4 * far[0] - 9 * far[1], *far])
 
 
