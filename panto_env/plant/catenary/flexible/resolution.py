@@ -29,14 +29,14 @@ from .waves import carrying_grid
 from .window import window_of
 
 STEPS = (
-    (0.2, 1e-2 / 10),
+    (0.2, 1e-2 / 14),
     (0.45, 1e-2 / 8),
     (0.7, 1e-2 / 6),
     (0.86, 1e-2 / 8),
     (1.0, 1e-2 / 14),
 )
 """Up to a share of the wave speed: a time step (s) that is short enough for one pantograph."""
-STEPS_OF_TRAINS = ((0.2, 1e-2 / 10), (0.7, 1e-2 / 8), (0.86, 1e-2 / 12), (1.0, 1e-2 / 16))
+STEPS_OF_TRAINS = ((0.2, 1e-2 / 14), (0.7, 1e-2 / 8), (0.86, 1e-2 / 12), (1.0, 1e-2 / 16))
 """The same for several, the second of which loses contact earlier."""
 MARGINS = ((0.2, 1.6), (0.3, 1.3), (1.0, 1.06))
 """Up to a share of the wave speed: on its grid a step is stable that is so many times as long, and the finest
