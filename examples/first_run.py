@@ -7,8 +7,8 @@ simulation, step by step, so that its figures are the same.
 
 printed
 
-    mean force 115.6 N, sigma 35.30 N
-    sigma of the environment: 35.30 N
+    mean force 115.6 N, sigma 35.15 N
+    sigma of the environment: 35.15 N
     broken of EN 50367 and EN 50119: standard deviation σ (N)
 """
 

@@ -2,7 +2,7 @@
 
     python examples/line_from_toml.py --plot line.png
 
-printed that it keeps EN 50367 and EN 50119 at 250 km/h (sigma 32.1 N, twice the uplift 144 mm), and
+printed that it keeps EN 50367 and EN 50119 at 250 km/h (sigma 32.0 N, twice the uplift 144 mm), and
 
     200 km/h: mean 108.8 N, sigma 18.9 N
     220 km/h: mean 116.9 N, sigma 25.4 N

@@ -9,7 +9,7 @@ force; a policy that moves the mean by more than 1.5 %, as pd does, is shown but
 printed
 
     passive: sigma +0.0 %, mean force +0.00 %, rank 2
-    pd: sigma -11.2 %, mean force +5.06 %, not ranked: it moves the mean force by +5.1 %, more than 1.5 %
+    pd: sigma -11.1 %, mean force +5.09 %, not ranked: it moves the mean force by +5.1 %, more than 1.5 %
     (a policy's attribute washout = 1.0 keeps the mean)
     Damper: sigma -8.4 %, mean force +0.08 %, rank 1
 
