@@ -4,7 +4,7 @@
 
 printed
 
-    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -798.5 and -683.5
+    pantograph/known-line/tuned-pd-v0: 2 episodes, 1,309 steps, returns -802.5 and -684.8
     replayed from seed and actions: the same rewards to the last bit
 """
 

@@ -198,7 +198,7 @@ LONG = {"spans": 1000, "distance": 59e3, "speed_kmh": 20.0}
 
 def test_a_run_that_would_not_fit_into_memory_is_refused_with_the_estimate(monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
-    with pytest.raises(InputError, match=r"11,682,000 time steps with 999 supports would take 188.2 GB, but"):
+    with pytest.raises(InputError, match=r"14,868,000 time steps with 999 supports would take 239.6 GB, but"):
         simulate(**LONG, record_droppers=False)
 
 
