@@ -177,10 +177,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     slow, quick = runs.speeds
     wave_speed = data.contact_wire.wave_speed
     steps = STEPS_OF_TRAINS if runs.train_length else STEPS
-    longest = min(
-        next((step for share, step in steps if speed <= share * wave_speed), steps[-1][1])
-        for speed in runs.speeds
-    )
+    longest = min(_by_share(steps, speed, wave_speed) for speed in runs.speeds)
     spacing = max(slow / NODES_HZ, FINEST_GRID)
     deep = [each.wear_wavelength for each in runs.conditions if each.wear_depth > DEEP]
     if deep:
@@ -208,8 +205,13 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     longest = min(longest, runs.wave_step(samples))
     step = min(time_step or longest, runs.whole_part(longest))
     near_limit = finest_stable(data, _margin(data, runs, step) * step)
-    fine = next((grid for share, grid in FINE if quick <= share * wave_speed), FINE[-1][1])
+    fine = _by_share(FINE, quick, wave_speed)
     return Required(min(spacing, max(near_limit, fine), COARSEST), longest)
+
+
+def _by_share(table: tuple[tuple[float, float], ...], speed: float, wave_speed: float) -> float:
+    """Value of a table by shares of the wave speed; beyond the largest share, the last one."""
+    return next((value for share, value in table if speed <= share * wave_speed), table[-1][1])
 
 
 def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
@@ -235,7 +237,7 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
     longer, shorter = FAST_STEPS
     slow, quick = runs.speeds
     wave_speed = data.contact_wire.wave_speed
-    spacing = next((grid for share, grid in FAST_GRIDS if quick <= share * wave_speed), FAST_GRIDS[-1][1])
+    spacing = _by_share(FAST_GRIDS, quick, wave_speed)
     spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
     if np.isfinite(runs.shortest_wave):
         spacing = min(spacing, FAST_GRIDS[-1][1])
