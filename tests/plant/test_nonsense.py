@@ -206,7 +206,8 @@ SHORTEST = 1e-6
 def finer(line, pantograph, case, run, **numbers):
     """The same run on a grid twice as fine, with at most half the time step.
 
-    None where no step is short enough that a run may have: the damping of a stiff wire wants a sixteenth.
+    None where there is none to compare with: the damping of a stiff wire wants a shorter step than a run may
+    have, or a contact damped by 1000 N s/m diverges on wires that are nearly limp, as the run then says.
     """
     for part in (2, 4, 8, 16, 32):
         if run.time_step / part < SHORTEST:
@@ -216,6 +217,8 @@ def finer(line, pantograph, case, run, **numbers):
             with warnings.catch_warnings(action="ignore"):
                 return simulate(line, pantograph, case["speed_kmh"], seed=1, **numbers, **numerics)
         except InputError as error:
+            if pantograph.hard_contact and "diverged, so it has no result" in str(error):
+                return None
             if "is unstable on a grid" not in str(error):
                 raise
     raise AssertionError("no time step is short enough")
