@@ -13,10 +13,9 @@ import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
 from panto_baselines.policies.washout import WashoutSettings
-from panto_env.base.array_file import read_arrays, write_arrays
+from panto_env.base.checksums import __version__, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.settings import Positive, Settings
-from panto_env.base.version import __version__
 from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from panto_env.base.errors import InputError
-from panto_env.base.names import listed
+from panto_env.base.errors import InputError, listed
 
 PACKAGES = ("torch", "stable_baselines3", "tensorboard")
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.policies import Policy, check_named, find_policy

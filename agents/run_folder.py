@@ -11,11 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.base.checksums import read_checked, write_checked
-from panto_env.base.errors import InputError
-from panto_env.base.files import make_folder, write_whole
-from panto_env.base.locks import alone_in
-from panto_env.base.paths import check_path
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
+from panto_env.base.files import alone_in, check_path, make_folder, write_whole
 
 from .evaluation import Pair
 from .model_file import read_model

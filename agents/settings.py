@@ -10,12 +10,10 @@ from pydantic import Field, SerializeAsAny
 
 from panto_baselines.policies.washout import WashoutSettings
 from panto_configs import find
-from panto_env.base.errors import InputError
+from panto_env.base.arrays import to_kmh
+from panto_env.base.errors import InputError, shown, suggest
 from panto_env.base.files import read_toml
-from panto_env.base.names import suggest
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.base.shown import shown
-from panto_env.base.units import to_kmh
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings

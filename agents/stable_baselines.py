@@ -11,9 +11,8 @@ import numpy as np
 from gymnasium.vector import VectorRewardWrapper, VectorWrapper
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.files import check_output
-from panto_env.base.shown import shown
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import fields, run_settings

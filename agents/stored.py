@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 
 from .ensemble import Ensemble
 from .policy import TrainedPolicy, load

@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import configure
 
 from panto_baselines.benchmark.seeds import SELECTION, check_seeds
-from panto_env.base.version import commit
+from panto_env.base.checksums import commit
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings

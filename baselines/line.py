@@ -8,9 +8,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.settings import Positive, Settings
-from panto_env.base.shown import shown
 from panto_env.control.settings import controlled_numbers, default, description
 
 T = TypeVar("T")

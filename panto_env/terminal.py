@@ -1,19 +1,23 @@
-"""Output of commands: tables, progress, JSON."""
+"""Replacement of characters that an output's encoding cannot show, so that no result is lost."""
 
 from __future__ import annotations
 
+import codecs
 import copy
+import errno
+import io
 import json
 import math
 import os
 import re
 import shlex
 import sys
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO, cast
 
 import rich.progress
 import rich.table
@@ -23,12 +27,122 @@ from rich.measure import Measurement
 from rich.segment import Segment
 from rich.text import Text
 
-from .base.errors import InputError
+from .base.errors import InputError, harmless
 from .base.files import PICTURES, check_output, finite
-from .base.plain_characters import shows_all
-from .base.shown import harmless
-from .base.standard_streams import say
 from .base.table import Alarm, Table
+
+HANDLER = "panto-plain"
+PLAIN = {
+    "−": "-", "–": "-", "—": "-", "‑": "-", "…": "...", "≤": "<=", "≥": ">=", "≈": "~", "±": "+-",
+    "×": "x", "·": "*", "√": "sqrt", "∞": "inf", "→": "->", "←": "<-", "↑": "^", "↓": "v", "‘": "'",
+    "’": "'", "“": '"', "”": '"', "°": " deg", "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta",
+    "Δ": "Delta", "ε": "epsilon", "ζ": "zeta", "η": "eta", "θ": "theta", "λ": "lambda", "μ": "u",
+    "µ": "u", "ν": "nu", "π": "pi", "ρ": "rho", "σ": "sigma", "Σ": "Sigma", "τ": "tau", "φ": "phi",
+    "ω": "omega", "Ω": "Ohm", "ß": "ss", "ø": "o", "Ø": "O", "æ": "ae", "‰": "per mille",
+}  # fmt: skip
+"""Replacements of characters without a plain form in Unicode's tables."""
+BOXES, BLOCKS = range(0x2500, 0x2580), range(0x2580, 0x25A0)
+"""Characters of lines of tables and frames, and of bars and pictures in a terminal."""
+
+
+def show_always() -> None:
+    """Let standard output and error replace characters that their encoding lacks by plain ones."""
+    codecs.register_error(HANDLER, _plain)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=HANDLER)
+
+
+def shows_all(stream: object) -> bool:
+    """Whether a stream can show every character: it has one of Unicode's encodings, or none."""
+    return str(getattr(stream, "encoding", None) or "utf").lower().startswith("utf")
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """Error handler of a codec: plain characters instead of those that it cannot encode."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(map(plain, error.object[error.start : error.end])), error.end
+
+
+def plain(character: str) -> str:
+    """A character replaced by ASCII."""
+    if character in PLAIN:
+        return PLAIN[character]
+    code = ord(character)
+    if code in BOXES:
+        return "-" if character in "─━═╌┄┈╴╶╸╺" else "|" if character in "│┃║╎┆┊╵╷╹╻" else "+"
+    if code in BLOCKS:
+        return "#"
+    # Accents are removed, superscript and subscript digits become normal ones.
+    return unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode() or "?"
+
+
+def say(sentence: str) -> None:
+    """Print a line on standard error, if that is open."""
+    if sys.stderr is not None:  # print would use standard output instead, which is for results
+        print(f"panto: {harmless(sentence)}", file=sys.stderr)
+
+
+class _Guarded:
+    """A stream that calls a handler where it cannot be written."""
+
+    def __init__(self, stream: TextIO, failed: Callable[[OSError], None]) -> None:
+        self._stream = stream
+        self._failed = failed
+
+    def write(self, text: str) -> int:
+        try:
+            self._stream.write(text)
+        except OSError as error:
+            self._failed(error)
+        return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except OSError as error:
+            self._failed(error)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def guarded_streams() -> Iterator[None]:
+    """Within the body, standard output that cannot be written raises InputError; standard error is dropped.
+
+    Where the reader has closed the pipe, as in ``panto list | head``, the process exits silently with 1.
+    """
+    output, remarks = sys.stdout, sys.stderr
+
+    def output_failed(error: OSError) -> None:
+        if error.errno == errno.EPIPE:
+            raise SystemExit(1) from error
+        raise InputError(f"Standard output cannot be written: {error.strerror or error}.") from error
+
+    if output is not None:
+        sys.stdout = cast(TextIO, _Guarded(output, output_failed))
+    if remarks is not None:
+        sys.stderr = cast(TextIO, _Guarded(remarks, lambda error: None))
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = output, remarks
+        for stream in (output, remarks):
+            _empty(stream)
+
+
+def _empty(stream: TextIO | None) -> None:
+    """Drop a stream's buffer where it cannot be written: otherwise the exit would fail."""
+    if stream is None:
+        return
+    try:
+        stream.flush()
+    except OSError:
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
 
 OUTPUTS = "panto_env.outputs"
 """Where a command keeps the output files that it was given."""

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.array_file import read_arrays, write_arrays
-from panto_env.base.checksums import checksum
+from panto_env.base.checksums import checksum, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
-from panto_env.base import marks
-from panto_env.base.colours import LIMIT, series_colour
-from panto_env.base.units import from_kmh
+from panto_env.base import plotting as marks
+from panto_env.base.arrays import from_kmh
+from panto_env.base.plotting import LIMIT, series_colour
 from panto_env.metrics import en50367
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.low_pass import zero_phase_low_pass

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
-from panto_env.base.checksums import write_checked
+from panto_env.base.checksums import __version__, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, finite
 from panto_env.base.machine import cores
-from panto_env.base.table_file import TABLES, write_rows
-from panto_env.base.version import __version__
+from panto_env.base.table import TABLES, write_rows
 from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.lines import fewest_spans, on_example

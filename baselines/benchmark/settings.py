@@ -9,11 +9,9 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_configs import find
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
-from panto_env.base.ranges import Between
-from panto_env.base.settings import Positive, Settings, parse
-from panto_env.base.shown import shown
+from panto_env.base.settings import Between, Positive, Settings, parse
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,

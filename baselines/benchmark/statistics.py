@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from panto_env.base.shown import beside
+from panto_env.base.errors import beside
 
 from .intervals import Array, Clusters, Interval, interquartile_mean, interval_of_mean
 from .settings import REFERENCE

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from panto_env.base.checksums import sha256_of
 from panto_env.base.errors import InputError
-from panto_env.base.files import write_whole
-from panto_env.base.paths import check_path
+from panto_env.base.files import check_path, write_whole
 
 LIST = "SHA256SUMS"
 

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.array_file import read_arrays, write_arrays
+from panto_env.base.checksums import read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes

@@ -12,8 +12,7 @@ from typing import Any
 
 from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
-from panto_env.base.files import make_folder
-from panto_env.base.locks import alone_in
+from panto_env.base.files import alone_in, make_folder
 from panto_env.cluster.parts import (
     PARTS,
     Job,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from panto_env.base.checksums import __version__
 from panto_env.base.errors import InputError
-from panto_env.base.version import __version__
 
 from .episodes import Episode, make
 from .settings import EpisodesSettings, Plan, PolicySet

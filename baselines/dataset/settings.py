@@ -11,11 +11,9 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, field_validator, model_validator
 
 from panto_configs import find
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
-from panto_env.base.ranges import Between
-from panto_env.base.settings import NonNegative, Settings, parse
-from panto_env.base.shown import shown
+from panto_env.base.settings import Between, NonNegative, Settings, parse
 from panto_env.control.settings import description
 from panto_env.policies import check_named
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports
-from panto_env.base import marks
-from panto_env.base.colours import BLUE
-from panto_env.base.legend import legend_above
+from panto_env.base import plotting as marks
+from panto_env.base.plotting import BLUE, legend_above
 from panto_env.base.table import Table
 from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings

@@ -9,8 +9,7 @@ import numpy as np
 
 from panto_env import Trajectory
 from panto_env.base.arrays import Array
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.low_pass import zero_phase_low_pass
 

@@ -10,8 +10,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from panto_configs import find
 from panto_env.base.files import read_toml
-from panto_env.base.ranges import Between
-from panto_env.base.settings import Positive, Settings, parse
+from panto_env.base.settings import Between, Positive, Settings, parse
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.checksums import read_checked, with_checksum
+from panto_env.base.checksums import __version__, read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, write_whole
-from panto_env.base.version import __version__
 from panto_env.catalog.content import is_entry
 from panto_env.control.identity import OF_TRAINS
 from panto_env.control.lines import draws_line, line_name

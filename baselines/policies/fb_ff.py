@@ -8,9 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.base.units import METRES_PER_SECOND, to_kmh
+from panto_env.base.arrays import METRES_PER_SECOND, to_kmh
+from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 
 from .force_law import ForceLaw, number, time_constant

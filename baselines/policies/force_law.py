@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.shown import shown
+from panto_env.base.errors import shown
 from panto_env.control.context import Context
 
 

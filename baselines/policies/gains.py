@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from panto_configs import FOLDER
+from panto_env.base.arrays import to_kmh
+from panto_env.base.checksums import remembered
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
-from panto_env.base.remember import remembered
 from panto_env.base.settings import Settings, parse
-from panto_env.base.units import to_kmh
 from panto_env.catalog.content import is_entry
 from panto_env.catalog.drawn_lines import DRAWN
 from panto_env.control.context import Context

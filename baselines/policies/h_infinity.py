@@ -7,8 +7,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from panto_env.base.arrays import one_thread
 from panto_env.base.errors import InputError
-from panto_env.base.linear_algebra import one_thread
 from panto_env.control.context import Context
 
 from .gains import Source

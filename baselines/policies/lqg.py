@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from panto_env.base.linear_algebra import one_thread
+from panto_env.base.arrays import one_thread
 from panto_env.control.context import Context
 from panto_env.estimation.kalman import steady_gain
 

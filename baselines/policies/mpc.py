@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 
 from .gains import Source

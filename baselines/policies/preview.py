@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.arrays import to_kmh
+from panto_env.base.checksums import remembered
 from panto_env.base.errors import InputError
-from panto_env.base.remember import remembered
-from panto_env.base.units import to_kmh
 from panto_env.control import Task
 from panto_env.control.context import Context
 from panto_env.control.settings import run_settings

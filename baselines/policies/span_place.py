@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from panto_env.base.shown import shown
+from panto_env.base.errors import shown
 
 from .lanes_law import Array, LanesLaw, Observations
 

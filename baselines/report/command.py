@@ -8,9 +8,8 @@ from typing import Annotated
 import typer
 
 from panto_env.analysis.options import DroppersFile, FiguresFile
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, harmless
 from panto_env.base.files import PAGES, check_output
-from panto_env.base.shown import harmless
 from panto_env.terminal import announce_overwriting, console
 
 

@@ -19,7 +19,7 @@ from pydantic import (
 
 from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
-from panto_env.base.explanation import dotted
+from panto_env.base.settings import dotted
 
 from ..benchmark.intervals import Share
 from ..benchmark.overall import with_feedback

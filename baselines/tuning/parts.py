@@ -10,7 +10,7 @@ from typing import Any
 
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import read_checked, write_checked
-from panto_env.base.locks import alone_in
+from panto_env.base.files import alone_in
 from panto_env.cluster import spread
 from panto_env.cluster.parts import identity, open_parts
 from panto_env.control.settings import RunSettings

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from panto_env.base.checksums import __version__
 from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, write_whole
-from panto_env.base.version import __version__
 from panto_env.catalog.content import content_unless_catalogue
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings

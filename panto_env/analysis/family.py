@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..base.arrays import to_kmh
 from ..base.table import Alarm, Table
-from ..base.units import to_kmh
 from ..catalog.en50119 import gradients
 from ..catalog.family import LineFamily
 from ..catalog.section import LineSection

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.colours import BLUE, GREEN, ORANGE, SUPPORT, VERMILION
-from ..base.marks import POSITION, mark_supports
+from ..base.plotting import BLUE, GREEN, ORANGE, POSITION, SUPPORT, VERMILION, mark_supports
 from ..plant.catenary.flexible.attached import dropper_positions
 from ..plant.catenary.flexible.overlaps import profiles
 from ..plant.catenary.flexible.spans import spans_of

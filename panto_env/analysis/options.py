@@ -14,7 +14,7 @@ import typer
 from typer.models import OptionInfo
 
 from ..base.errors import InputError
-from ..base.table_file import TABLES
+from ..base.table import TABLES
 from ..control.settings import fields
 from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
 from ..plant.numerics import Numerics

@@ -8,11 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from ..base.errors import InputError
-from ..base.explanation import complaints, explain
-from ..base.names import hint
-from ..base.ranges import ranges_of
-from ..base.settings import Settings
+from ..base.errors import InputError, hint
+from ..base.settings import Settings, complaints, explain, ranges_of
 from ..plant.catenary import CatenaryData, check_line
 from ..plant.catenary.flexible.parts import Droppers, Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import marks
-from ..base.colours import BLUE, GREEN, PURPLE, VERMILION, series_colour
+from ..base import plotting as marks
 from ..base.files import PICTURES, check_output, write_whole
-from ..base.legend import legend_above
+from ..base.plotting import BLUE, GREEN, PURPLE, VERMILION, legend_above, series_colour
 from ..metrics import en50367
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass

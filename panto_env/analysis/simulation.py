@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.shown import shown
+from ..base.errors import InputError, shown
 from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
 from ..control.lines import on_drawn_line

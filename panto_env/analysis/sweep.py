@@ -12,11 +12,9 @@ from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.names import hint
+from ..base.errors import InputError, hint, shown
 from ..base.settings import Settings
-from ..base.shown import shown
-from ..base.table_file import write_rows
+from ..base.table import write_rows
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range

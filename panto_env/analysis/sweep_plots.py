@@ -7,10 +7,10 @@ from math import isnan
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from ..base import marks
-from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..base import plotting as marks
+from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
+from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
 from ..metrics import en50367
 from ..metrics.labels import LABELS, NUMBER
 

@@ -1,4 +1,4 @@
-"""Files: reading TOML with clear errors, writing whole or not at all, data fit for JSON."""
+"""Names that no file can have: refused with a clear message before the system fails in its own ways."""
 
 from __future__ import annotations
 
@@ -13,8 +13,52 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
-from .paths import check_path
+from filelock import FileLock, Timeout
+
+from .errors import InputError, shown
+
+LONGEST_NAME = 200
+"""Maximum bytes of a file's or folder's name; systems allow 255, but a temporary file's name is longer."""
+LONGEST_PATH = 3000
+"""Maximum bytes of a whole path; Linux allows 4096."""
+
+
+def check_path(path: str | Path) -> None:
+    """Raise InputError for a path that no file or folder can have."""
+    text = os.fspath(path)
+    if "\0" in text:
+        raise InputError(f"{shown(text)} cannot be a file: its name contains a null byte.")
+    try:
+        sizes = [len(part.encode()) for part in Path(text).parts]
+    except UnicodeEncodeError as error:
+        raise InputError(f"{shown(text)} cannot be a file: its name is not text in UTF-8.") from error
+    if max(sizes, default=0) > LONGEST_NAME or sum(sizes) > LONGEST_PATH:
+        raise InputError(
+            f"{text[:40]}... cannot be a file: the maximum is {LONGEST_NAME} bytes for a name, "
+            f"{LONGEST_PATH} for a path."
+        )
+
+
+@contextmanager
+def alone_in(folder: Path, doing: str) -> Iterator[None]:
+    """Within the body no other process is in the folder, as far as files can be locked there.
+
+    doing: what a process does there, such as "trains into". The folder is made if necessary; the system
+    releases the lock of a killed process. Raises InputError where another process holds the lock.
+    """
+    make_folder(folder)
+    lock = FileLock(folder / ".lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise InputError(f"Another process {doing} {folder}; wait until it has ended, or end it.") from error
+    except (OSError, NotImplementedError):
+        pass  # files cannot be locked here
+    try:
+        yield
+    finally:
+        lock.release()
+
 
 TRIAL = 4096
 """Bytes written to test whether a folder is writable: the smallest unit that a disk stores."""

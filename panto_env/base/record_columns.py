@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
-from .errors import InputError
+from .errors import InputError, suggest
 from .files import check_regular
-from .names import suggest
 
 JITTER = 0.05
 """Maximum distance of a time stamp from equal steps, as a share of the step: more is not rounding."""

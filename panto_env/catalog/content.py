@@ -6,7 +6,7 @@ import hashlib
 import json
 from typing import Any
 
-from ..base.remember import remembered
+from ..base.checksums import remembered
 from ..plant.catenary import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from .loader import available, load_catenary, load_pantograph

@@ -14,8 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from .line_ranges import Length, Range, Share
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..base.ranges import Between
-from ..base.units import to_kmh
+from ..base.arrays import to_kmh
+from ..base.settings import Between
 from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang

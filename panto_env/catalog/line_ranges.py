@@ -13,8 +13,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.spans import evenly, parabola
 from ..plant.catenary.schema import LONGEST_SPAN
 

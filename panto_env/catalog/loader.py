@@ -12,12 +12,9 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.errors import InputError, UnusualWarning
-from ..base.explanation import explain
+from ..base.errors import InputError, UnusualWarning, nearest, shown, suggest
 from ..base.files import read_toml
-from ..base.names import nearest, suggest
-from ..base.settings import Settings
-from ..base.shown import shown
+from ..base.settings import Settings, explain
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.build import check_at_rest

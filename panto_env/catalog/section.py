@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.arrays import Array
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from ..plant.catenary import check_line
 from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData

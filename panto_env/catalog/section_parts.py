@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.arrays import Array
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, SHORTEST_SPAN, SpanLength
 from .line_ranges import Length, Range, Share
 

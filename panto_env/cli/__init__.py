@@ -11,12 +11,9 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer import Abort
 
-from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning
-from ..base.plain_characters import show_always
-from ..base.shown import one_line
-from ..base.standard_streams import guarded_streams, say
-from ..base.version import __version__
-from ..terminal import NARROW, console
+from ..base.checksums import __version__
+from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning, one_line
+from ..terminal import NARROW, console, guarded_streams, say, show_always
 from .group import PlugInGroup, give_options_once
 
 UsageError: Any = typer.BadParameter.__base__

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from ..base.errors import InputError
-from ..base.table_file import TABLES, write_rows
+from ..base.table import TABLES, write_rows
 from ..catalog.loader import text_of
 from ..plant.catenary.flexible.dropper_table import HEADINGS, as_rows, dropper_table
 from ..terminal import Json, console, print_json, print_table, writable

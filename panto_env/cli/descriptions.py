@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from ..base.errors import InputError
+from ..base.errors import InputError, suggest
 from ..base.files import finite, read_toml
-from ..base.names import suggest
 from ..catalog import available, load_catenary, load_family, load_pantograph, load_section
 from ..catalog.drawn_lines import DrawnLines
 from ..catalog.loader import SCHEMAS

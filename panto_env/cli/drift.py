@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.table_file import TABLES, write_rows
+from ..base.table import TABLES, write_rows
 from ..terminal import Json, Plot, alert, console, print_json, print_table, writable, written_last
 from .fit import by_kind
 

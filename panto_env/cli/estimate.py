@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.table import Alarm, Table
-from ..base.table_file import TABLES, Sheet, write_table
-from ..base.units import from_kmh
+from ..base.table import TABLES, Alarm, Sheet, Table, write_table
 from ..terminal import (
     Json,
     Plot,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import InputError
-from ..base.table_file import TABLES, write_rows
+from ..base.table import TABLES, write_rows
 from ..terminal import (
     Json,
     Plot,
@@ -158,7 +158,7 @@ def fit(
 
 def by_kind(given: list[str]) -> dict[str, float]:
     """Tolerances by kind. Raises InputError for a kind that is unknown, or no positive number."""
-    from ..base.names import suggest
+    from ..base.errors import suggest
     from ..fitting.values import FREE
 
     found = {}

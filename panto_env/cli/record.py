@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.files import PAGES
-from ..base.table_file import TABLES, write_rows
+from ..base.table import TABLES, write_rows
 from ..terminal import (
     Json,
     Plot,

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from ..analysis.options import DroppersFile, FiguresFile, Seed, Spans, parse_spans, with_settings
 from ..analysis.requirements import print_criteria
-from ..base.standard_streams import say
 from ..metrics.labels import LABELS
 from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.spans import SpanChoice, in_words
@@ -25,6 +24,7 @@ from ..terminal import (
     console,
     number,
     print_json,
+    say,
     writable,
     written_last,
 )

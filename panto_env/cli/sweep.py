@@ -18,9 +18,9 @@ from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
 from ..analysis.sweep_plots import pantographs_of
 from ..analysis.swept_train import with_distances
+from ..base.checksums import __version__
 from ..base.errors import InputError
-from ..base.table_file import TABLES
-from ..base.version import __version__
+from ..base.table import TABLES
 from ..control.identity import plain
 from ..control.settings import run_settings
 from ..metrics.labels import LABELS, NUMBER

@@ -11,10 +11,9 @@ from typing import Any
 
 from ..analysis.pool import Progress
 from ..backend.cache import source_hash
-from ..base.checksums import read_checked, write_checked
+from ..base.checksums import __version__, commit, read_checked, write_checked
 from ..base.errors import InputError
 from ..base.files import make_folder
-from ..base.version import __version__, commit
 from .spread import spread
 
 Job = Callable[[Path], None]

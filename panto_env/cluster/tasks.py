@@ -11,9 +11,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, Take, collect
 from ..backend.cache import source_hash
-from ..base.errors import InputError
+from ..base.errors import InputError, shown
 from ..base.machine import cores
-from ..base.shown import shown
 
 T = TypeVar("T")
 LOCAL = "local"

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.shown import shortly
+from ..base.errors import InputError, shortly
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 NUMBERS = "fiub"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from ..base.names import nearest
+from ..base.errors import nearest
 from .settings import RunSettings, fields
 
 P = ParamSpec("P")

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
 
 
 class BySpeed:

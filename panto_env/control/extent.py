@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from ..base.errors import InputError
-from ..base.shown import beside
+from ..base.errors import InputError, beside
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.plant import Plant

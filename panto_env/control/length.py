@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.shown import beside
-from ..base.units import from_kmh
+from ..base.arrays import Array, from_kmh
+from ..base.errors import InputError, beside
 from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
 from .extent import whole_steps

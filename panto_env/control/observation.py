@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
-from ..base.errors import InputError
-from ..base.names import suggest
+from ..base.errors import InputError, suggest
 from ..plant.alignment import in_spans
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW

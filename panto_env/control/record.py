@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..catalog.values import by_value
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory

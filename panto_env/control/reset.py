@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..plant.state import SAMPLE_ROWS, Row
 from ..plant.valid_range import Ending
 from .episode import Results

@@ -14,13 +14,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-from ..base.errors import InputError
-from ..base.explanation import sentence
-from ..base.names import suggest
-from ..base.ranges import Between
-from ..base.settings import parse, plain
-from ..base.shown import shown
-from ..base.units import from_kmh, to_kmh
+from ..base.arrays import from_kmh, to_kmh
+from ..base.errors import InputError, shown, suggest
+from ..base.settings import Between, parse, plain, sentence
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
 from ..estimation.settings import ESTIMATORS, EstimatorSettings

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array, Lanes
-from ..base.errors import InputError
-from ..base.shown import shown
+from ..base.errors import InputError, shown
 from ..metrics.figures import Figures
 from ..metrics.spans import SpanChoice, settled_spans
 from ..metrics.trajectory import Trajectory

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.shown import beside
+from ..base.errors import beside
 from ..catalog import load_pantograph
 from ..fitting.stored import Stored
 from ..metrics.trajectory import Trajectory

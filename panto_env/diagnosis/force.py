@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
-from ..base.units import to_kmh
 from ..estimation.estimate import filter_motion, gains_of, model_of
 from ..estimation.motion import Motion, measure, on_frame, warn_of_wind
 from ..estimation.plausibility import check_motion

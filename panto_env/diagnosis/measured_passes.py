@@ -14,9 +14,8 @@ from dataclasses import replace
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.arrays import Array
+from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
 from ..fitting.misfit import OWN, Part
 from ..fitting.problem import Problem, problem
 from ..fitting.stored import Stored, turned

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
 from ..metrics.low_pass import CUTOFF
 from ..metrics.spans import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory

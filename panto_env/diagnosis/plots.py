@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import marks
-from ..base.colours import BLUE, LIMIT, ORANGE
-from ..base.legend import legend_above
+from ..base import plotting as marks
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
 from .diagnosis import Diagnosis
 from .tables import place
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
 from ..control import Task
 from ..control.episode import Flags, Results
 from ..control.state import Result

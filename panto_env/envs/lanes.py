@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Index, to_kmh
 from ..base.errors import AccuracyWarning
-from ..base.units import to_kmh
 from ..control import Task
 from ..control.episode import Flags, Results
 from .episodes import Episodes

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError
-from ..base.shown import shown
+from ..base.errors import InputError, shown
 
 
 def checked_seed(seed: Any, others: str = "") -> int | None:

@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal
 from gymnasium.vector import AutoresetMode
 from pydantic import Field, field_validator, model_validator
 
-from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.shown import shown
+from ..base.errors import InputError, shown
+from ..base.settings import Between
 from ..control.lines import draws_line
 from ..control.settings import RunSettings
 

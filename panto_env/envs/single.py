@@ -9,8 +9,8 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+from ..base.arrays import to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..control import Context, Task
 from ..control.action import checked
 from ..control.arguments import takes

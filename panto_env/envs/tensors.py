@@ -12,9 +12,8 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ..base.errors import InputError
-from ..base.shown import shown
-from ..base.units import to_kmh
+from ..base.arrays import to_kmh
+from ..base.errors import InputError, shown
 from ..control import Context
 from ..control.arguments import takes
 from ..control.lines import draws_line

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Index, one_thread
 from ..base.errors import InputError
-from ..base.linear_algebra import one_thread
 from .model import Model
 
 SETTLED = 1e-10

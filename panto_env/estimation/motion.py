@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import AccuracyWarning
-from ..base.units import to_kmh
 from ..metrics.trajectory import Trajectory
 
 RATE = 1000.0

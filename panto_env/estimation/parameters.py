@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.names import suggest
+from ..base.errors import InputError, suggest
 from ..plant.pantograph.schema import PantographData
 from .estimate import filter_motion, first_settled, model_of
 from .kalman import corrected, correction, steady_gains

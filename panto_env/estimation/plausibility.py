@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.shown import beside
+from ..base.errors import InputError, beside
 from ..plant.pantograph.schema import PantographData
 from .motion import Motion
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..base.arrays import Array
-from ..base.colours import BLUE, LIMIT, ORANGE
-from ..base.legend import legend_above
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
 from ..metrics.low_pass import zero_phase_low_pass
 from .estimate import Estimate
 from .verdict import window_bound

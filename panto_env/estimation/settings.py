@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from .force import ForceModel, RandomWalk, as_force_model
 from .motion import DISPLACEMENT_NOISE, VELOCITY_NOISE
 

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.names import suggest
-from ..base.ranges import Between, ranges_of
+from ..base.errors import InputError, suggest
+from ..base.settings import Between, ranges_of
 from ..plant.pantograph.schema import PantographData
 from .estimate import filter_motion, first_settled, model_of
 from .innovations import log_likelihood

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.shown import beside
+from ..base.errors import beside
 from .innovations import Consistency
 
 NIS = (0.667, 1.5)

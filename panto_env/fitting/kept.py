@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.array_file import read_arrays, write_arrays
+from ..base.checksums import read_arrays, write_arrays
 from ..records.record import Record
 from .misfit import OWN, State
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import marks
-from ..base.colours import series_colour
-from ..base.legend import legend_above
+from ..base import plotting as marks
+from ..base.plotting import legend_above, series_colour
 from .fit import INTERVAL, Fit, Found
 
 if TYPE_CHECKING:

@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
-from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
+from ..base.checksums import read_arrays, write_arrays
 from ..base.errors import InputError
-from ..base.explanation import explain
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings, explain
 from .doubts import doubts
 from .fit import Fit
 from .measured import BANDS

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.ranges import ranges_of
+from ..base.settings import ranges_of
 from ..plant.pantograph.schema import PantographData
 
 Parameters = Mapping[str, float]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..base.ranges import ranges_of
+from ..base.settings import ranges_of
 from ..plant.pantograph.schema import PantographData
 from .fit import Fit
 from .model import UNITS

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..base.arrays import Array
-from ..base.colours import BLUE, ORANGE
+from ..base.plotting import BLUE, ORANGE
 from .performance import Match
 from .record import Record
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..base.shown import beside
+from ..base.errors import beside
 from ..base.table import Alarm, Table
 
 

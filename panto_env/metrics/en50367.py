@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from ..base.arrays import to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..plant.catenary.schema import PowerSystem
 from .criterion import Criterion
 from .figures import ARC, Figures

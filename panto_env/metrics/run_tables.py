@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.checksums import __version__
 from ..base.errors import InputError
-from ..base.table_file import WORKBOOKS, Sheet, write_table, write_workbook
-from ..base.version import __version__
+from ..base.table import WORKBOOKS, Sheet, write_table, write_workbook
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
 from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest

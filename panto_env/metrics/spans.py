@@ -9,8 +9,7 @@ from __future__ import annotations
 import warnings
 from typing import Any, Literal, TypeAlias
 
-from ..base.errors import AccuracyWarning, InputError
-from ..base.shown import shortly
+from ..base.errors import AccuracyWarning, InputError, shortly
 from ..plant.alignment import Alignment, Spans
 from ..plant.catenary.schema import CLEAR, MOST_SPANS
 

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import machine
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.checksums import with_checksum, without_checksum
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..base.units import to_kmh
 from ..plant.alignment import Alignment, Spans
 from ..plant.pantograph.schema import PantographData
 from .compliance import LineFacts, compliance

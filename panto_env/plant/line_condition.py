@@ -11,8 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from ..base.arrays import Array
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
 from .side_wind import SideWind
 from .wind import Wind
 

@@ -8,10 +8,9 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, field_validator
 
+from ..base.arrays import from_kmh, to_kmh
 from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.settings import Settings
-from ..base.units import from_kmh, to_kmh
+from ..base.settings import Between, Settings
 from .line_condition import LineCondition
 from .wind import SHORTEST_GUST
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Index, Lanes
-from ..base.errors import InputError
-from ..base.shown import beside
+from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..backend import inlined
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from .pantograph.schema import PantographData
 from .trigonometry import cosine_of_turns
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import METRES_PER_SECOND
 from ..base.errors import InputError
 from ..base.files import check_regular
 from ..base.record_columns import LENGTHS, TIME, Column, places_of, read_columns
-from ..base.units import METRES_PER_SECOND
 from ..metrics.trajectory import KEY
 
 STRIPS = 4

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..metrics.criterion import Criterion
 from ..metrics.labels import LABELS
 from ..metrics.low_pass import low_pass, zero_phase_low_pass

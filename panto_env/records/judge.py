@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh, to_kmh
 from ..metrics.compliance import LineFacts, compliance
 from ..metrics.criterion import Criterion
 from ..metrics.figures import ARC, Figures, arcing, contact_loss

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from ..base.checksums import __version__
 from ..base.files import PAGES, check_output, write_whole
 from ..base.table import Alarm, Table
-from ..base.version import __version__
 from ..report.charts import drawn
 from ..report.template import page_template
 from ..report.words import FILTER

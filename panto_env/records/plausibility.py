@@ -7,9 +7,8 @@ from typing import overload
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from .record import Piece
 
 FORCE = (5.0, 1000.0)

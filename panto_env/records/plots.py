@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import marks
+from ..base import plotting as marks
 from ..base.arrays import Array
-from ..base.colours import BLUE, LIMIT, ORANGE
-from ..base.legend import legend_above
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
 from .compare import Comparison

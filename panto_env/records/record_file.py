@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
+from ..base.errors import InputError, shortly
 from ..base.record_columns import JITTER
-from ..base.shown import shortly
-from ..base.table_file import Sheet, write_table
+from ..base.table import Sheet, write_table
 from . import columns
 from .axes import axes_of
 from .cut import RUNS_BACK, Break, cut

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..base.arrays import to_kmh
 from ..base.table import Table
-from ..base.units import to_kmh
 from ..metrics.criterion import criteria_table, remarks
 from ..metrics.labels import HEADINGS, LABELS
 from ..terminal import number

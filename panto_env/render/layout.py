@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.marks import NEAR
+from ..base.plotting import NEAR
 from .moment import AHEAD, BEHIND, Moment
 
 TITLE, CHART, ROOF = 0.075, 0.30, 0.045

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ..base.errors import InputError
-from ..base.names import listed
+from ..base.errors import InputError, listed
 
 IN_WORDS = {"cv2": "OpenCV", "pygame": "pygame", "imageio_ffmpeg": "imageio-ffmpeg"}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..base.colours import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
+from ..base.plotting import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
 from .canvas import rgb
 
 GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222, 227, 232)

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
 from ..plant.state import Place
 from .canvas import SMALLEST, Canvas, Colour, zigzag
 from .layout import TITLE, Layout, force_axis, lost

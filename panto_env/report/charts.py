@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base import marks
-from ..base.colours import BLUE, series_colour
-from ..base.legend import legend_above
+from ..base import plotting as marks
+from ..base.plotting import BLUE, legend_above, series_colour
 from ..metrics import en50367
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spectrum import amplitudes

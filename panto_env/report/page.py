@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.files import PAGES, check_output, write_whole
-from ..base.version import __version__
 from ..catalog.values import values_of
 from ..metrics.criterion import limits_in_words, margin_in_words, value_in_words
 from ..metrics.labels import LABELS

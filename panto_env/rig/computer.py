@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from ..backend import bind, pack
+from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
 from ..catalog import load_catenary
 from ..plant.catenary.protocol import check_speeds
 from ..plant.catenary.rig import Rig, RigData

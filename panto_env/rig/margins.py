@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.units import from_kmh
+from ..base.arrays import Array, from_kmh
 from ..plant.catenary.rig import RigData
 from ..plant.numerics import Numerics
 from ..plant.pantograph.build import STRIP_STIFFNESS, matrices

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import mark_supports
-from ..base import marks
-from ..base.colours import series_colour
-from ..base.legend import legend_above
+from ..base import plotting as marks
+from ..base.plotting import legend_above, series_colour
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.spectrum import amplitudes
 from .comparison import Pair

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import from_kmh
 from ..base.table import Table
-from ..base.units import from_kmh
 from ..plant.catenary.rig import RigData
 from ..plant.pantograph.schema import PantographData
 from . import growth

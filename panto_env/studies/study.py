@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ..analysis.plots import save
 from ..base.checksums import write_checked
 from ..base.files import check_output, finite, make_folder
-from ..base.table import Table
-from ..base.table_file import write_rows
+from ..base.table import Table, write_rows
 from ..metrics.labels import HEADINGS
 
 if TYPE_CHECKING:

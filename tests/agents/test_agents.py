@@ -33,7 +33,7 @@ from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
 from panto_baselines.benchmark.seeds import TRAINING, check_seeds
 from panto_env import InputError, simulate
-from panto_env.base.array_file import write_arrays
+from panto_env.base.checksums import write_arrays
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS

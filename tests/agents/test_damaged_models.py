@@ -12,8 +12,7 @@ from panto_agents.model_file import read_model
 from panto_agents.policy import load
 from panto_agents.stored import FOLDER
 from panto_env import InputError
-from panto_env.base.array_file import KEY, read_arrays, write_arrays
-from panto_env.base.checksums import CHECKSUM, checksum, with_checksum
+from panto_env.base.checksums import CHECKSUM, KEY, checksum, read_arrays, with_checksum, write_arrays
 from panto_env.policies import find_policy
 
 MODEL = FOLDER / "head.safetensors"

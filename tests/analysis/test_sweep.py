@@ -223,7 +223,7 @@ def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path
 
 
 def test_failed_write_leaves_the_old_table(tmp_path, monkeypatch):
-    from panto_env.base.table_file import write_rows
+    from panto_env.base.table import write_rows
 
     path = tmp_path / "s.parquet"
     path.write_text("mine")

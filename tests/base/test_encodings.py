@@ -10,10 +10,9 @@ import warnings
 
 import pytest
 
-from panto_env.base import plain_characters
-from panto_env.base.plain_characters import plain
+from panto_env import terminal as plain_characters
 from panto_env.cli import main
-from panto_env.terminal import print_json
+from panto_env.terminal import plain, print_json
 
 from ..documents import ROOT
 from ..fuzz.lines import SHORT

@@ -24,8 +24,7 @@ from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate
 from panto_env.base.checksums import checksum, read_checked
 from panto_env.base.files import DEEPEST, MOST_KEYS, read_toml
-from panto_env.base.inline import parse_inline
-from panto_env.base.settings import Settings, parse
+from panto_env.base.settings import Settings, parse, parse_inline
 from panto_env.catalog import load_catenary, load_family, load_pantograph, load_section
 from panto_env.catalog.loader import text_of
 from panto_env.cli.descriptions import described

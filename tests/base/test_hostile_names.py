@@ -10,9 +10,8 @@ import rich.table
 
 from panto_baselines.report.command import report
 from panto_env.base.checksums import read_checked, with_checksum
-from panto_env.base.shown import harmless, one_line
-from panto_env.base.standard_streams import say
-from panto_env.terminal import PlainConsole, alert
+from panto_env.base.errors import harmless, one_line
+from panto_env.terminal import PlainConsole, alert, say
 
 from ..documents import ROOT
 

@@ -10,9 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from panto_env import InputError
-from panto_env.base import explanation, files, machine, paths, remember, shown, table_file
+from panto_env.base import checksums as remember
+from panto_env.base import errors as shown
+from panto_env.base import files, machine
+from panto_env.base import files as paths
+from panto_env.base import settings as explanation
+from panto_env.base import table as table_file
 from panto_env.base.checksums import read_checked, write_checked
-from panto_env.base.shown import beside
+from panto_env.base.errors import beside
 
 # As the documents and messages have them.
 NAME, PATH, DEPTH, KEYS, BYTES = 200, 3000, 32, 20_000, 20_000_000

@@ -4,7 +4,7 @@ import pytest
 from filelock import FileLock
 
 from panto_env import InputError
-from panto_env.base.locks import alone_in
+from panto_env.base.files import alone_in
 
 
 def test_a_folder_that_another_process_holds_is_refused_at_once(tmp_path):

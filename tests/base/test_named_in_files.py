@@ -16,8 +16,7 @@ from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.dataset.settings import load_episodes
 from panto_env import InputError, policies, simulate
 from panto_env.analysis.saved_run import check_made_anew, load_with_settings
-from panto_env.base.array_file import read_arrays, write_arrays
-from panto_env.base.checksums import read_checked, write_checked
+from panto_env.base.checksums import read_arrays, read_checked, write_arrays, write_checked
 from panto_env.base.settings import parse
 from panto_env.cli import make_app
 from panto_env.policies import find_policy

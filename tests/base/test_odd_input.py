@@ -15,10 +15,9 @@ from panto_env import InputError, simulate
 from panto_env.analysis.options import parse_spans
 from panto_env.analysis.plots import plot_run, save
 from panto_env.base import machine
+from panto_env.base.errors import LONGEST_LINE, beside, shown
 from panto_env.base.files import read_toml, write_whole
-from panto_env.base.inline import parse_inline
-from panto_env.base.settings import Settings, parse
-from panto_env.base.shown import LONGEST_LINE, beside, shown
+from panto_env.base.settings import Settings, parse, parse_inline
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.envs import IDS
 from panto_env.policies import find_policy

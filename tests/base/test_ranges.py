@@ -10,9 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from panto_env import InputError, simulate
-from panto_env.base.explanation import dotted
-from panto_env.base.ranges import Between, ranges_of
-from panto_env.base.settings import parse
+from panto_env.base.settings import Between, dotted, parse, ranges_of
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.estimation.force import FORCE_MODELS, as_force_model
 from panto_env.estimation.settings import EstimatorSettings

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from panto_env.base.remember import remembered
+from panto_env.base.checksums import remembered
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.static import hang
 

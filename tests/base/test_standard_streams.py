@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from panto_env import InputError, Trajectory
-from panto_env.base.standard_streams import guarded_streams
+from panto_env.terminal import guarded_streams
 
 from ..fuzz.lines import SHORT
 

@@ -1,6 +1,6 @@
 import pytest
 
-from panto_env.base.names import listed
+from panto_env.base.errors import listed
 from panto_env.base.table import Alarm, Table
 from panto_env.terminal import console, number, print_table
 

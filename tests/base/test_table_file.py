@@ -11,8 +11,8 @@ import pandas
 import pytest
 
 from panto_env import InputError
-from panto_env.base import table_file
-from panto_env.base.table_file import TABLES, Sheet, write_rows, write_table, write_workbook
+from panto_env.base import table as table_file
+from panto_env.base.table import TABLES, Sheet, write_rows, write_table, write_workbook
 
 LIBREOFFICE = shutil.which("libreoffice") or shutil.which("soffice")
 READ = {".csv": pandas.read_csv, ".xlsx": pandas.read_excel, ".parquet": pandas.read_parquet}

@@ -26,9 +26,8 @@ from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_epis
 from panto_baselines.dataset.steps_table import COLUMNS
 from panto_configs import names
 from panto_env import InputError, simulate
-from panto_env.base.array_file import write_arrays
-from panto_env.base.checksums import read_checked, write_checked
-from panto_env.base.locks import alone_in
+from panto_env.base.checksums import read_checked, write_arrays, write_checked
+from panto_env.base.files import alone_in
 from panto_env.base.settings import parse
 from panto_env.cluster import parts
 

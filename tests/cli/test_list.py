@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
-from panto_env.base.version import __version__
+from panto_env.base.checksums import __version__
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.cli import make_app
 from panto_env.metrics.trajectory import Trajectory

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from panto_env.base.array_file import read_arrays, write_arrays
+from panto_env.base.checksums import read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.fitting.drift import SMALLER, drift
 from panto_env.fitting.stored import Stored, store, stored, turned

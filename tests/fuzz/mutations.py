@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from panto_env import InputError
-from panto_env.base.shown import LONGEST_LINE
+from panto_env.base.errors import LONGEST_LINE
 
 from ..said import said
 from .processes import run_all

@@ -25,8 +25,7 @@ from panto_baselines.oracle import stored
 from panto_baselines.policies.gains import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
-from panto_env.base.array_file import write_arrays
-from panto_env.base.checksums import read_checked
+from panto_env.base.checksums import read_checked, write_arrays
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import load_family, load_section, text_of
 from panto_env.catalog.masts import line_from_masts

@@ -7,8 +7,7 @@ from pydantic import ValidationError
 
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
-from panto_env.base.explanation import explain
-from panto_env.base.ranges import ranges_of
+from panto_env.base.settings import explain, ranges_of
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary import check_line
 from panto_env.plant.catenary.flexible import static as static_shape

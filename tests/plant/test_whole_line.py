@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from panto_env import InputError
-from panto_env.base.explanation import explain
+from panto_env.base.settings import explain
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity

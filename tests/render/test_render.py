@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
-from panto_env.base.colours import BLUE, ORANGE, VERMILION
+from panto_env.base.plotting import BLUE, ORANGE, VERMILION
 from panto_env.cli import make_app
 from panto_env.control import Task
 from panto_env.control.settings import run_settings

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from panto_env.base.colours import series_colour
+from panto_env.base.plotting import series_colour
 from panto_env.report import charts
 
 

@@ -17,10 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ...backend import operation
-from ...base.arrays import Array
-from ...base.errors import InputError
-from ...base.shown import beside
-from ...base.units import from_kmh, to_kmh
+from ...base.arrays import Array, from_kmh, to_kmh
+from ...base.errors import InputError, beside
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from ..valid_range import ENDING

@@ -7,10 +7,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
-from ...base.errors import InputError
-from ...base.ranges import Between
-from ...base.settings import Settings
-from ...base.shown import shown
+from ...base.errors import InputError, shown
+from ...base.settings import Between, Settings
 from ..alignment import Alignment
 from ..valid_range import FREE_UPLIFT
 

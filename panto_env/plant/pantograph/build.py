@@ -11,8 +11,7 @@ import numpy as np
 
 from ...backend import aligned_zeros
 from ...base.arrays import Array, Lanes
-from ...base.errors import InputError
-from ...base.shown import beside
+from ...base.errors import InputError, beside
 from ..catenary.protocol import CatenaryModel
 from ..state import PerCollector, per_collector
 from .schema import PantographData

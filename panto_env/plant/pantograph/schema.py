@@ -7,11 +7,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...base.arrays import to_kmh
 from ...base.errors import InputError
-from ...base.explanation import comma_hint
-from ...base.ranges import Between
-from ...base.settings import Settings
-from ...base.units import to_kmh
+from ...base.settings import Between, Settings, comma_hint
 
 Mass = Annotated[float, Between(0.1, 200, "kg")]
 Spring = Annotated[float, Between(0, 1e7, "N/m")]

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...backend import aligned_zeros, implements, inlined
 from ...base.arrays import Array, Index, Lanes
-from ...base.ranges import Between
+from ...base.settings import Between
 from ..state import Row
 from .base import Reading, SensorSettings, take_first_readings, take_readings
 from .noise import AHEAD

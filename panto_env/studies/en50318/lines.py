@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis.simulation import simulate
+from ...base.arrays import from_kmh, to_kmh
 from ...base.errors import AccuracyWarning
-from ...base.units import from_kmh, to_kmh
 from ...catalog import load_catenary, load_pantograph
 from ...catalog.loader import available, load_family
 from ...metrics.low_pass import low_pass

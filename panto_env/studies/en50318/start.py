@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import available, load_catenary
 from ...metrics.spans import FIRST_SETTLED, LAST_USUAL
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData

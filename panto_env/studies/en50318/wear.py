@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
-from ...base.units import from_kmh
+from ...base.arrays import from_kmh
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
 from .convergence import in_use

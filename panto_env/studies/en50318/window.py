@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...analysis.simulation import simulate
-from ...base.units import to_kmh
+from ...base.arrays import to_kmh
 from ...metrics.low_pass import low_pass
 from ...metrics.spans import FIRST_SETTLED, LAST_USUAL
 from ...metrics.trajectory import Trajectory

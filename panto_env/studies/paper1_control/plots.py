@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ...analysis.plots import mark_supports, say_what_is_hidden
-from ...base import marks
-from ...base.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, series_colour
-from ...base.legend import legend_above
+from ...base import plotting as marks
+from ...base.plotting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, legend_above, series_colour
 from ...metrics.labels import LABELS
 from .angles import cost_over_angle
 from .cases import (

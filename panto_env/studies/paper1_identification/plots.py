@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.colours import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
+from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.equation_error import equations
 from ...identification.plots import plot_matches, plot_record

@@ -10,7 +10,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from ...analysis.simulation import simulate
-from ...base.colours import BLUE, ORANGE
+from ...base.plotting import BLUE, ORANGE
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...metrics.figures import Figures

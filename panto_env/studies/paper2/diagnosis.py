@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
-from ...base.colours import LIMIT, series_colour
-from ...base.legend import legend_above
+from ...base.plotting import LIMIT, legend_above, series_colour
 from ...base.table import Table
 from ...diagnosis import diagnose
 from ...diagnosis.cases import Track, draw_defect, drive

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.colours import ORANGE, series_colour
-from ...base.legend import legend_above
+from ...base.plotting import ORANGE, legend_above, series_colour
 from ...estimation.motion import Motion
 from ...estimation.score import COHERENT, phases
 from .estimation import MISMATCH, OBSERVATIONS, SPEED_KMH, START

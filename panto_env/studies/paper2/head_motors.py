@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.colours import series_colour
-from ...base.legend import legend_above
+from ...base.plotting import legend_above, series_colour
 from ..study import Comparison, Outcome, Report
 from .motor_bench import BenchRun, bench_run, line_pass
 from .motors import (

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ...base.arrays import from_kmh
 from ...base.errors import InputError
 from ...base.table import Table
-from ...base.units import from_kmh
 from ...catalog import load_pantograph
 from ...metrics.spectrum import amplitudes
 from ...rig.comparison import Pair, compare, rms

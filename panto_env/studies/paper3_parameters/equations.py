@@ -9,8 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary, load_pantograph
 from .passes import CATENARY, PANTOGRAPH, SPANS
 

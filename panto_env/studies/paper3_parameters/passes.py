@@ -10,8 +10,7 @@ import numpy as np
 
 from ...analysis.parameters import change
 from ...analysis.simulation import simulate
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary, load_pantograph
 from ...metrics import en50367
 from ...metrics.criterion import Criterion

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base import marks
-from ...base.colours import series_colour
+from ...base import plotting as marks
+from ...base.plotting import series_colour
 from .passes import SPANS, SPEED_KMH, Influence, Pass, Passes
 
 if TYPE_CHECKING:

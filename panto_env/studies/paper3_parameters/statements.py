@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...metrics import en50367
 from ..study import Comparison
 from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, SYSTEM, Pass, Passes, largest_static_force

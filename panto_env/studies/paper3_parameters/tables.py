@@ -8,8 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from ...base.arrays import from_kmh, to_kmh
 from ...base.table import Table
-from ...base.units import from_kmh, to_kmh
 from ...metrics import en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...analysis.sweep import Row, sweep
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary
 from ...control import Task
 from ...metrics.labels import NUMBER

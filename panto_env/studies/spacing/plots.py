@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.colours import BLUE, GREEN, LIMIT, VERMILION, series_colour
-from ...base.units import from_kmh
+from ...base.arrays import from_kmh
+from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, series_colour
 from ...catalog import load_catenary
 from ...metrics.en50367 import STD_OF_MEAN
 from .passes import Case, Curve

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...base.arrays import from_kmh
 from ...base.table import Table
-from ...base.units import from_kmh
 from ...metrics.en50367 import STD_OF_MEAN
 from ..study import Comparison
 from .passes import SPEEDS_KMH, Case, Curve

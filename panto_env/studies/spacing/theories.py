@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary
 from .passes import INTERVAL, Case, Curve, Wake
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ...base.colours import series_colour
-from ...base.legend import legend_above
+from ...base.plotting import legend_above, series_colour
 from .tables import Row
 
 if TYPE_CHECKING:

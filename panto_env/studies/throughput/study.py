@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ...backend import WIDTH
-from ...base.checksums import read_checked
+from ...base.checksums import __version__, read_checked
 from ...base.errors import InputError
-from ...base.version import __version__
 from ...envs import IDS
 from . import roofline
 from .environments import by_cores, by_lanes

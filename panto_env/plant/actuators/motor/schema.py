@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ....backend import aligned_zeros
-from ....base.ranges import Between
+from ....base.settings import Between
 from ...state import Place
 from ..base import ActuatorSettings
 from .arrays import MOTOR_ROWS, MotorArrays

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from ....base.arrays import Array
+from ....base.arrays import Array, to_kmh
 from ....base.table import Table
-from ....base.units import to_kmh
 from ...line_condition import NEW, LineCondition
 from .attached import dropper_positions
 from .defects import DefectiveLine

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ....base.remember import remembered
+from ....base.checksums import remembered
 from ..schema import Wire
 
 GRAVITY = 9.81  # m/s^2

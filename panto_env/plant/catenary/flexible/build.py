@@ -8,8 +8,8 @@ import numpy as np
 
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
 from ....base.arrays import Array
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
 from ...numerics import Numerics
 from ...valid_range import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
 from ...line_condition import LineCondition
 from ..schema import LOWEST_TENSION
 from .defects import DefectiveLine

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....base.errors import InputError
-from ....base.shown import beside
+from ....base.errors import InputError, beside
 from .beams import Profile
 from .schema import FlexibleCatenaryData
 from .spans import spans_of

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
 from ..schema import FEWEST_SPANS
 from .arrays import CONTACT
 from .beams import Profile

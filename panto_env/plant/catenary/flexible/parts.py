@@ -10,9 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ....base.arrays import Array, Index
-from ....base.explanation import comma_hint
-from ....base.ranges import Between
-from ....base.settings import Settings
+from ....base.settings import Between, Settings, comma_hint
 from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength, Wire
 
 CLOSEST = 0.1

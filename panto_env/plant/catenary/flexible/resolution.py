@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ....backend import WIDTH
+from ....base.arrays import to_kmh
+from ....base.checksums import remembered
 from ....base.errors import AccuracyWarning, InputError
-from ....base.remember import remembered
-from ....base.units import to_kmh
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from .grid import finest_stable, nodes_per_span, stable

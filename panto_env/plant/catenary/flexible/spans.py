@@ -13,12 +13,9 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ....base.explanation import explain
-from ....base.names import suggest
-from ....base.ranges import Between
-from ....base.remember import remembered
-from ....base.settings import Settings
+from ....base.checksums import remembered
+from ....base.errors import InputError, suggest
+from ....base.settings import Between, Settings, explain
 from ..schema import LONGEST_SPAN, SHORTEST_SPAN
 from .parts import CLOSEST, Span, StitchWire
 

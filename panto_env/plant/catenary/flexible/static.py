@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ....base.remember import remembered
-from ....base.shown import beside
+from ....base.checksums import remembered
+from ....base.errors import InputError, beside
 from .beams import GRAVITY, PeriodicWire
 from .overlaps import joined, tension_lengths
 from .parts import Span

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
 from ..schema import Wire
 from .overlaps import tension_lengths
 from .parts import CLOSEST, SAME, nearer

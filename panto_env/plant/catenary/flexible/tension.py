@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.remember import remembered
+from ....base.checksums import remembered
 from ...line_condition import LineCondition
 from .beams import GRAVITY
 from .overlaps import joined, tension_lengths

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 import warnings
 
+from ....base.arrays import to_kmh
 from ....base.errors import AccuracyWarning, InputError
-from ....base.units import to_kmh
 from ...numerics import Numerics, Runs
 from ..schema import CLEAR, MOST_SPANS, Wire
 

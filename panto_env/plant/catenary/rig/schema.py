@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ....base.ranges import Between
-from ....base.settings import Settings
+from ....base.settings import Between, Settings
 from ...alignment import Alignment
 from ..flexible import FlexibleCatenaryData
 from ..schema import CatenaryData

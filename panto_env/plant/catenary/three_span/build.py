@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....base.arrays import Array
-from ....base.linear_algebra import one_thread
+from ....base.arrays import Array, one_thread
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ..protocol import StartPoint, check_speeds, refuse_defects

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ....base.ranges import Between
+from ....base.settings import Between
 from ..schema import CatenaryData, Wire
 
 

@@ -1,14 +1,30 @@
-"""Marks that all plots along a line share: supports, losses of contact, and the axis of the contact force."""
+"""Colours, marks and legends that all pictures share."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .colours import LIMIT, SUPPORT, VERMILION
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
+PURPLE, ORANGE, SKY, BROWN = "#b0528a", "#e69f00", "#56b4e9", "#7a4b2a"
+SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BROWN)
+"""Colours of several series, in this order."""
+LIMIT = "0.1"
+"""Colour of limits: nearly black, unlike all series."""
+SUPPORT = "0.55"
+"""Colour of the lines at supports, darker than a grid."""
+HIGH_IS_BAD, LOW_IS_BAD = "cividis", "cividis_r"
+"""Colour maps of Matplotlib: in both dark is good and bright is bad."""
+
+
+def series_colour(number: int) -> str:
+    """Colour of a series by its number; after the seventh the colours repeat."""
+    return SERIES[number % len(SERIES)]
+
 
 POSITION = "position (m); dashed lines: supports"
 """Label of the axis along the line."""
@@ -44,3 +60,8 @@ def fit_force_axis(axes: Sequence[Axes], limit: float, standard: str, others: Se
         axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
         axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
         axis.set_ylim(low - 0.05 * top, 1.06 * top)
+
+
+def legend_above(axis: Axes, columns: int = 5) -> None:
+    """Draw a legend above the axis, at the right, where it covers no data."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=columns, fontsize="small", frameon=False)
