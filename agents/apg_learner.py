@@ -12,12 +12,11 @@ from torch import nn
 from panto_baselines.benchmark.statistics import MOVED
 from panto_env.backend import WIDTH
 
-from .linear_rollout import Group
-from .network import Network
+from .linear_rollout import Group, Network
 from .own_learner import OwnLearner
 
 if TYPE_CHECKING:
-    from .apg import APG
+    from .algorithm import APG
     from .pass_lanes import PassLanes
 
 MOST = 4.0

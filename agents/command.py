@@ -1,17 +1,23 @@
-"""``panto train``, ``panto export`` and ``panto evaluate``. Torch is imported only when they run."""
+"""The commands that train, evaluate and export. Torch is imported only when they run."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
+from rich import table as rich_table
 
 from panto_env.analysis.options import with_settings
 from panto_env.analysis.requirements import print_criteria
+from panto_env.base.errors import InputError, listed
 from panto_env.base.files import make_folder
+from panto_env.base.table import Table
+from panto_env.cluster import RayAddress
 from panto_env.metrics.criterion import worst
 from panto_env.metrics.labels import LABELS
 from panto_env.metrics.spans import FIRST_SETTLED
@@ -19,18 +25,33 @@ from panto_env.terminal import (
     Json,
     Plot,
     console,
+    counting,
     number,
     print_json,
+    print_table,
     progress_console,
     this_command,
     writable,
     written_last,
 )
 
-from .packages import check_packages
-
 if TYPE_CHECKING:
     from .evaluation import Pair
+    from .trainings import Outcome
+
+
+PACKAGES = ("torch", "stable_baselines3", "tensorboard")
+
+
+def check_packages() -> None:
+    """Raise InputError, naming them, if packages that a training needs are not installed."""
+    missing = [name for name in PACKAGES if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"Training needs {listed(missing)} not installed; install panto-env with its "
+            "extra: pip install 'panto-env[agents]'."
+        )
+
 
 ROWS = (
     "mean",
@@ -137,9 +158,8 @@ def evaluate(
     from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy, wishes
 
-    from .ensemble import Ensemble
     from .evaluation import Comparison, in_words, verdict
-    from .policy import TrainedPolicy
+    from .policy import Ensemble, TrainedPolicy
     from .settings import arguments, speeds
 
     driver = find_policy(policy)
@@ -182,7 +202,7 @@ def evaluate(
 def _print_pairs(pairs: list[Pair]) -> None:
     """Print a table with a section for each speed: means over the seeds."""
     spans = " or ".join(sorted({pair.spans for pair in pairs} - {""})) or "none"
-    table = Table(title=f"spans {spans}")
+    table = rich_table.Table(title=f"spans {spans}")
     for heading in ("km/h", "figure", "policy", "passive", "change"):
         table.add_column(heading, justify="left" if heading == "figure" else "right")
     for speed in sorted({pair.speed_kmh for pair in pairs}):
@@ -208,3 +228,83 @@ def _print_pairs(pairs: list[Pair]) -> None:
         if notes:
             table.add_row("", f"of {len(pairs_here)} passes, " + ", ".join(notes), "", "", "")
     console.print(table)
+
+
+def trainings(
+    configs: Annotated[
+        list[Path], typer.Argument(help="Trainings: TOML files, or names such as ppo and sac.")
+    ],
+    seed: Annotated[
+        list[int] | None, typer.Option(help="Seed, instead of the files'; repeatable.", min=0)
+    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Environment steps, instead of the files'.")] = None,
+    output: Annotated[
+        Path, typer.Option(help="Folder in which each run has one, NAME-ALGORITHM-seedK.")
+    ] = Path("runs"),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue runs that have begun, and begin the others.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Train several configurations under several seeds in parallel, each run as by `panto train`.
+
+    On a Ray cluster all machines must see the folder of the runs, and a run whose worker dies continues from
+    its newest checkpoint. On one machine, repeat the command with --resume.
+    """
+    check_packages()
+    from .trainings import plan, train_all
+
+    planned = plan(configs, seed or None, steps, output)
+    make_folder(output)  # now, and not in each worker
+    try:
+        with counting("trainings") as progress:
+            command = this_command()
+            outcomes = train_all(
+                planned, resume=resume, workers=workers, ray=ray, progress=progress, command=command
+            )
+    except KeyboardInterrupt as error:
+        progress_console.print(f"Stopped. To continue, repeat the command with --resume ({output}).")
+        raise typer.Exit(130) from error
+    if json:
+        print_json([asdict(each) for each in outcomes])
+        return
+    print_table(_outcome_table(outcomes))
+
+
+def _outcome_table(outcomes: Sequence[Outcome]) -> Table:
+    """Table of the best models, one row per run."""
+    rows = []
+    for each in outcomes:
+        change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"
+        note = "" if each.qualified else "F_m out of range"
+        rows.append((each.best, str(each.best_steps), change, note))
+    return Table("best models", ("model file", "step", "σ to passive", "disqualified"), tuple(rows))
+
+
+def ablation(
+    config: Annotated[Path, typer.Argument(help="Ablation: a TOML file, or a name such as ablation.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Train an agent with and without each of its parts, under several seeds, and compare the models."""
+    check_packages()
+    from .ablation import load_ablation, run, table, variants
+
+    settings = load_ablation(config)
+    folder, command = output or Path("runs") / config.stem, this_command()
+    make_folder(folder)  # now, and not in each worker
+    with counting("trainings") as progress:
+        models, outcome = run(settings, folder, workers, ray, progress, command)
+    found = variants(models, outcome)
+    if json:
+        rows = [asdict(each) for each in found]
+        print_json({"settings": settings.model_dump(mode="json"), "variants": rows})
+        return
+    print_table(table(found, f"{settings.training}, {settings.total_steps:,} steps, {settings.judged_by}"))

@@ -20,7 +20,7 @@ from .own_learner import OwnLearner
 if TYPE_CHECKING:
     from panto_env.envs.tensors import PantographTensorEnv
 
-    from .ppo import PPO
+    from .algorithm import PPO
     from .settings import Training
 
 

@@ -1,23 +1,279 @@
-"""The environments of a training."""
+"""The environments of a training, in the form that Stable-Baselines3 takes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
+from threading import get_ident
 from typing import Any
 
 import gymnasium
-from stable_baselines3.common.vec_env import VecMonitor
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 
 from panto_baselines.benchmark.seeds import TRAINING, check_seeds
-from panto_env.envs import PantographVectorEnv
+from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_env.base.errors import InputError
+from panto_env.control.context import Context
+from panto_env.envs import IDS, PantographVectorEnv
+from panto_env.envs.settings import Whole
+from panto_env.policies import errors_name, find_policy
 
-from .apg import APG
-from .base_policy import PolicyLanes
-from .residual import ResidualVecEnv
+from .algorithm import APG
+from .policy import added
 from .settings import Training
-from .side_by_side import SideBySide
-from .vec_env import PantographVecEnv
-from .washout import WashoutVecEnv
+
+
+class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
+    """A ``VecEnv`` around a vector environment of Gymnasium, ``PantographVectorEnv`` or a wrapper of one.
+
+    Any autoreset mode works. Observations and rewards are the environment's own arrays, not copies.
+    When its episode ends, a lane's info holds "terminal_observation", "TimeLimit.truncated" and the
+    episode's "figures", and as "episode" what ``Monitor`` gives.
+    """
+
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        """Raises InputError if ``env`` is not a vector environment of this project."""
+        if not (isinstance(env, VectorEnv) and isinstance(env.unwrapped, PantographVectorEnv)):
+            raise InputError(
+                f"PantographVecEnv needs an environment of gymnasium.make_vec for {', '.join(IDS)}, "
+                f"not {type(env).__name__}; Stable-Baselines3 takes single environments as they are."
+            )
+        self.env: Any = env
+        self.seconds = 0.0  # spent in the environment so far
+        self._actions: dict[int, NDArray[np.float32]] = {}  # of the steps begun, by thread
+        self._returns, self._lengths = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=np.int64)
+        self._begun = time.time()
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.metadata["render_fps"] = env.metadata["render_fps"]
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i."""
+        seeded = any(seed is not None for seed in self._seeds)
+        options = self._options[0]
+        if any(each != options for each in self._options):
+            raise InputError("The lanes share one environment; give set_options the same options for all.")
+        observation, info = self.env.reset(seed=list(self._seeds) if seeded else None, options=options)
+        self._returns[:], self._lengths[:] = 0.0, 0
+        self._reset_seeds()
+        self._reset_options()
+        self.reset_infos = [{"speed_kmh": float(speed)} for speed in info["speed_kmh"]]
+        first: NDArray[np.float32] = observation
+        return first
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep the actions, (lanes, actions), for ``step_wait``."""
+        self._actions[get_ident()] = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[Any]]:
+        """Step all lanes: observations, rewards, dones and one info per lane."""
+        start = time.perf_counter()
+        observation, reward, terminated, truncated, info = self.env.step(self._actions.pop(get_ident()))
+        self._returns, self._lengths = self._returns + reward, self._lengths + 1
+        done = terminated | truncated
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if done.any():
+            if "final_obs" in info:  # same-step autoreset
+                last, figures = info["final_obs"], info["final_info"]["figures"]
+            else:  # next-step or no autoreset: ended lanes are reset now, as Stable-Baselines3 expects
+                last, figures = observation, info["figures"]
+                observation, _ = self.env.reset(options={"reset_mask": done})
+            names = [
+                name for name in figures if not name.startswith("_")
+            ]  # "_name" marks lanes that have one
+            for lane in np.flatnonzero(done).tolist():
+                own = float(self._returns[lane]), int(self._lengths[lane]), time.time() - self._begun
+                infos[lane] = {
+                    "episode": dict(zip("rlt", own, strict=True)),
+                    "terminal_observation": last[lane],
+                    "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
+                    "figures": {
+                        name: float(figures[name][lane]) for name in names if figures[f"_{name}"][lane]
+                    },
+                }
+            self._returns[done], self._lengths[done] = 0.0, 0
+        self.seconds += time.perf_counter() - start
+        return observation, reward.astype(np.float32), done, infos
+
+    def get_images(self) -> Sequence[NDArray[np.uint8]]:
+        """Frames, (height, width, 3), of the drawn lanes. Raises InputError where none are drawn."""
+        if self.render_mode is None:
+            raise InputError("There are no pictures; add render_mode='rgb_array' to gymnasium.make_vec.")
+        return list(self.env.render())
+
+    def close(self) -> None:
+        """Close the native environment."""
+        self.env.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The native environment's attribute, repeated for each requested lane."""
+        return [getattr(self.env, attr_name)] * len(self._lanes(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused, because lanes share one environment: an attribute cannot be set for some of them only."""
+        raise NotImplementedError("The lanes share one environment; make it anew to change an attribute.")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of the native environment once; its result, repeated for each requested lane."""
+        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """False for each lane: no lane has a wrapper of its own."""
+        return [False] * len(self._lanes(indices))
+
+    def _lanes(self, indices: Any) -> Sequence[int]:
+        lanes: Sequence[int] = self._get_indices(indices)
+        return lanes
+
+
+Array = NDArray[np.float64]
+
+
+class PolicyLanes:
+    """One policy per lane, all of the same name: each has its own episode and memory."""
+
+    def __init__(self, name: str, native: PantographVectorEnv) -> None:
+        """name: see ``find_policy``. native: the environment of the lanes."""
+        self.name, self._native = name, native
+        self._policies = [find_policy(name) for _ in range(native.num_envs)]
+
+    def begin(self, lanes: Any) -> None:
+        """Begin the episodes that the lanes, (n,), have just begun."""
+        with errors_name(self.name, "reset"):
+            for lane in lanes.tolist():
+                self._policies[lane].reset(self._native.context(lane))
+
+    def act(self, observations: NDArray[np.float32]) -> Array:
+        """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""
+        with errors_name(self.name, "act"):
+            # Copies: a policy may keep its observation.
+            pairs = zip(self._policies, observations.copy(), strict=True)
+            actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
+        return np.clip(actions, -1.0, 1.0)
+
+
+class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]
+    """Lanes in which a base policy acts too: the agent's action is added to the base policy's."""
+
+    def __init__(self, lanes: VecEnv, base: PolicyLanes, share: float) -> None:
+        """share: part of the actuator's force limit that an agent's action of 1 adds."""
+        super().__init__(lanes)
+        self._base, self._share = base, share
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start episodes in all lanes."""
+        observations: NDArray[np.float32] = self.venv.reset()
+        self._base.begin(np.arange(self.num_envs))
+        self._actions = self._base.act(observations)
+        return observations
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep the sum of the base policy's and these actions, (lanes, actions), for ``step_wait``."""
+        self.venv.step_async(added(self._actions, actions, self._share))
+
+    def step_wait(self) -> Any:
+        """Step all lanes: observations, rewards, dones and one info per lane."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        if dones.any():
+            self._base.begin(np.flatnonzero(dones))
+        self._actions = self._base.act(observations)
+        return observations, rewards, dones, infos
+
+
+class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
+    """Lanes that get an agent's actions minus their slow averages."""
+
+    def __init__(self, lanes: VecEnv, context: Context, settings: WashoutSettings) -> None:
+        """context: of any of the lanes."""
+        super().__init__(lanes)
+        self._limit = context.force_limit
+        shape = (lanes.num_envs, *lanes.action_space.shape)
+        self._washout = Washout(settings, context.control_interval, self._limit, shape)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start episodes in all lanes."""
+        self._washout.begin()
+        observations: NDArray[np.float32] = self.venv.reset()
+        return observations
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep these actions, (lanes, actions), minus their slow averages for ``step_wait``."""
+        self.venv.step_async(self._washout(actions.astype(np.float64) * self._limit) / self._limit)
+
+    def step_wait(self) -> Any:
+        """Step all lanes: observations, rewards, dones and one info per lane."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        self._washout.begin(dones)
+        return observations, rewards, dones, infos
+
+
+class SideBySide(VecEnv):  # type: ignore[misc]
+    """Lanes of several ``VecEnv`` with the same spaces, one after the other, stepped together."""
+
+    def __init__(self, parts: Sequence[VecEnv]) -> None:
+        """Raises InputError where their observations or actions differ in shape."""
+        first, self._parts = parts[0], list(parts)
+        for part in parts:
+            if (part.observation_space, part.action_space) != (first.observation_space, first.action_space):
+                sizes = [each.observation_space.shape[0] for each in (first, part)]
+                raise InputError(
+                    f"The variants of a training must have the same observations and actions, not {sizes[0]} "
+                    f"and {sizes[1]} entries; choose an observation that all have, such as measured."
+                )
+        self._ends = np.cumsum([part.num_envs for part in parts])[:-1]
+        super().__init__(sum(part.num_envs for part in parts), first.observation_space, first.action_space)
+
+    @property
+    def seconds(self) -> float:
+        """Time spent in the environments so far (s)."""
+        return float(sum(part.unwrapped.seconds for part in self._parts))
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Lane i begins with seed + i."""
+        seeds: list[int | None] = []
+        for part in self._parts:
+            seeds += part.seed(None if seed is None else seed + len(seeds))
+        return seeds
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start episodes in all lanes."""
+        return np.concatenate([part.reset() for part in self._parts])
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep the actions, (lanes, actions), for ``step_wait``."""
+        for part, own in zip(self._parts, np.split(actions, self._ends), strict=True):
+            part.step_async(own)
+
+    def step_wait(self) -> Any:
+        """Step all lanes: observations, rewards, dones and one info per lane."""
+        observations, rewards, dones, infos = zip(*(part.step_wait() for part in self._parts), strict=True)
+        arrays = (np.concatenate(each) for each in (observations, rewards, dones))
+        return *arrays, [info for each in infos for info in each]
+
+    def close(self) -> None:
+        """Close all of them."""
+        for part in self._parts:
+            part.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The attribute of each requested lane."""
+        every = [value for part in self._parts for value in part.get_attr(attr_name)]
+        return [every[lane] for lane in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused, as for each of them."""
+        self._parts[0].set_attr(attr_name, value, indices)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of all of them; the result for each requested lane."""
+        every = [value for part in self._parts for value in part.env_method(method_name, *args, **kwargs)]
+        return [every[lane] for lane in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """False for each lane: no lane has a wrapper of its own."""
+        return [False] * len(list(self._get_indices(indices)))
 
 
 def make_lanes(training: Training) -> Any:

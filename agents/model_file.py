@@ -19,9 +19,8 @@ from panto_env.base.settings import Positive, Settings
 from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
 
-from .actor import Actor
+from .actor import Actor, Cell, RecurrentActor
 from .learner import Arrays, learn_again, learnt
-from .recurrent_actor import Cell, RecurrentActor
 
 CELL = "actor/cell_"
 """How the names of a recurrent cell's arrays begin."""

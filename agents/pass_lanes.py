@@ -20,8 +20,8 @@ from panto_env.policies import Policy, find_policy
 from .actor import Actor
 from .linear_pass import Base, LinearPass, Pulsing, columns_of, measure
 from .linear_rollout import Group, Rollout, Terms, grouped
+from .policy import WashedOut
 from .settings import Training
-from .washout_policy import WashedOut
 
 MOST_FAILURES = 20
 """Passes in a row that may end early, under the policy or a pulse, before the training does."""

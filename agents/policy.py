@@ -1,13 +1,15 @@
-"""A trained model as a policy of the benchmark."""
+"""A base policy and an agent that adds to its action, as one policy."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_baselines.policies.washout import Washout, WashoutSettings
 from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 from panto_env.control.observation import OBSERVATION_SETTINGS
@@ -15,8 +17,48 @@ from panto_env.policies import Policy, check_named, find_policy
 
 from .actor import Actor
 from .model_file import Facts, Needs, Step, read_model
-from .residual_policy import Residual
-from .washout_policy import WashedOut
+
+
+def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
+    """Base policy's action plus a share of an agent's; all of them, the sum too, in -1..1."""
+    return np.clip(base + share * action.astype(np.float64), -1.0, 1.0)
+
+
+class Residual:
+    """A policy whose action is a base policy's plus a share of an agent's."""
+
+    def __init__(self, base: Policy, agent: Policy, share: float) -> None:
+        """share: part of the actuator's force limit that the agent may add."""
+        self._base, self._agent, self._share = base, agent, share
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._base.reset(context)
+        self._agent.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        base = np.clip(np.asarray(self._base.act(observation.copy()), dtype=np.float64), -1.0, 1.0)
+        return added(base, self._agent.act(observation), self._share)
+
+
+class WashedOut:
+    """A network as a policy; the slow average is subtracted from its action."""
+
+    def __init__(self, actor: Actor, settings: WashoutSettings) -> None:
+        self._actor, self._settings = actor, settings
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._actor.reset(context)
+        self._limit = context.force_limit
+        self._washout = Washout(self._settings, context.control_interval, self._limit, (context.actions,))
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        action: NDArray[np.float64] = self._washout(self._actor.act(observation) * self._limit) / self._limit
+        return action
+
 
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by the actuators that the actions drive."""
@@ -135,3 +177,26 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
 
 def _entries(needs: Needs) -> str:
     return ", ".join(f"{name} / {scale:g}" for name, _, scale in needs.entries)
+
+
+class Ensemble:
+    """Mean action of trained policies that need the same task, so that their errors cancel in part."""
+
+    def __init__(self, members: Sequence[TrainedPolicy]) -> None:
+        """Raises ValueError unless all of them have the same needs."""
+        self.facts = members[0].facts  # of the first: needs are those of all
+        if any(member.facts.needs != self.facts.needs for member in members):
+            raise ValueError("the members of an ensemble must need the same task")
+        self._members = members
+        for name in (*OBSERVATION_SETTINGS, "washout"):
+            setattr(self, name, getattr(self.facts.needs, name))
+
+    def reset(self, context: Context) -> None:
+        """Begin an episode. Raises InputError as each of them does."""
+        for member in self._members:
+            member.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Mean of their actions, (actions,), each in -1..1, for an observation, (entries,)."""
+        mean: NDArray[np.float64] = np.mean([member.act(observation) for member in self._members], axis=0)
+        return mean

@@ -20,12 +20,7 @@ from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
 from panto_env.policies import check_named, find_fitting_policy
 
-from .algorithm import Algorithm
-from .apg import APG
-from .cloning_settings import Cloning
-from .ppo import PPO
-from .ranges import Count, Share
-from .sac import SAC
+from .algorithm import APG, PPO, SAC, Algorithm, Cloning, Count, Share
 
 ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC, "apg": APG}
 

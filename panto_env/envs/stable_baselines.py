@@ -18,7 +18,7 @@ class NamedToStableBaselines(type):
         if sys._getframe(1).f_globals.get("__name__", "").startswith("stable_baselines3."):
             raise InputError(
                 "Stable-Baselines3 takes a vector environment of Gymnasium inside a VecEnv: "
-                "from panto_agents.vec_env import PantographVecEnv, and give it "
+                "from panto_agents.lanes import PantographVecEnv, and give it "
                 "PantographVecEnv(gymnasium.make_vec(...))."
             )
         return super().__repr__()

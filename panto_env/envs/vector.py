@@ -85,7 +85,7 @@ class PantographVectorEnv(
     "figures", each with its own mask, since a run may lack one; with "SameStep" these and all other final
     values are in "final_info", next to "final_obs".
 
-    For Stable-Baselines3, wrap it in `panto_agents.vec_env.PantographVecEnv`.
+    For Stable-Baselines3, wrap it in `panto_agents.lanes.PantographVecEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it

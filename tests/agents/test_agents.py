@@ -23,8 +23,9 @@ pytest.importorskip("stable_baselines3")
 
 from safetensors.numpy import load_file, save_file
 
-from panto_agents import command, packages, train
-from panto_agents.demonstrations import Demonstrations, returns
+from panto_agents import command, train
+from panto_agents import command as packages
+from panto_agents.cloning import Demonstrations, returns
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
 from panto_agents.lanes import lane_seeds
 from panto_agents.model_file import read_model, restore

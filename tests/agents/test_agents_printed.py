@@ -10,8 +10,10 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from panto_agents import ablation_command, callbacks, command, train
-from panto_agents.ablation_table import Variant, table
+from panto_agents import command, train
+from panto_agents import command as ablation_command
+from panto_agents import train as callbacks
+from panto_agents.ablation import Variant, table
 from panto_agents.evaluation import Pair
 from panto_env.metrics.figures import Figures
 from panto_env.terminal import PlainConsole

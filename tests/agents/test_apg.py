@@ -17,10 +17,9 @@ from panto_agents.apg_learner import APGLearner
 from panto_agents.linear_pass import LinearPass, Pulsing, measure
 from panto_agents.linear_rollout import grouped
 from panto_agents.pass_lanes import PassLanes
-from panto_agents.policy import load
+from panto_agents.policy import WashedOut, load
 from panto_agents.settings import Training, parse_training
 from panto_agents.train import train
-from panto_agents.washout_policy import WashedOut
 from panto_baselines.benchmark.seeds import TRAINING
 from panto_env import InputError, simulate
 from panto_env.metrics.low_pass import low_pass

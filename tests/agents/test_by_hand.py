@@ -12,18 +12,15 @@ pytest.importorskip("stable_baselines3")
 import gymnasium
 import stable_baselines3
 
-from panto_agents.ablation_table import _variant
-from panto_agents.actor import Actor
+from panto_agents.ablation import _variant
+from panto_agents.actor import Actor, RecurrentActor
+from panto_agents.algorithm import MOST_KEPT, PPO, SAC
+from panto_agents.command import _outcome_table
 from panto_agents.evaluation import Pair, in_words, pair, verdict
 from panto_agents.model_file import actor_of, read_model
-from panto_agents.ppo import PPO
-from panto_agents.ranges import MOST_KEPT
-from panto_agents.recurrent_actor import RecurrentActor
 from panto_agents.run_folder import RunFolder
-from panto_agents.sac import SAC
 from panto_agents.stable_baselines import save_policy
 from panto_agents.trainings import Outcome
-from panto_agents.trainings_command import _table
 from panto_env import InputError, simulate
 from panto_env.metrics.figures import Figures
 
@@ -72,7 +69,7 @@ def test_learning_starts_before_the_last_step():
 def test_the_table_of_trainings_cell_by_cell():
     one = Outcome("runs/a", "ppo", 3, 2000, "runs/a/best", 1500, 0.8, True)
     others = (replace(one, best="b", best_steps=64, ratio=1.05, qualified=False), replace(one, ratio=None))
-    made = _table([one, *others])
+    made = _outcome_table([one, *others])
     assert made.title == "best models"
     assert made.headings == ("model file", "step", "σ to passive", "disqualified")
     assert made.rows == (
@@ -209,7 +206,7 @@ def test_a_cell_that_does_not_fit_is_refused(change, message):
 
 def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
     torch = pytest.importorskip("torch")
-    from panto_agents.network import Network
+    from panto_agents.linear_rollout import Network
 
     from .rollout_in_torch import stepped
 

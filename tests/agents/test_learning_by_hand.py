@@ -7,11 +7,10 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from panto_agents.callbacks import EpisodeLog, EveryNSteps
-from panto_agents.cloning import _rms, _split
-from panto_agents.demonstrations import Demonstrations, demonstrate, returns
+from panto_agents.cloning import Demonstrations, _rms, _split, demonstrate, returns
 from panto_agents.policy import _first_difference
 from panto_agents.settings import arguments, speeds
+from panto_agents.train import EpisodeLog, EveryNSteps
 from panto_env import InputError
 from panto_env.envs import IDS
 

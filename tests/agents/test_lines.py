@@ -7,8 +7,7 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 from panto_agents import train
-from panto_agents.base_policy import PolicyLanes
-from panto_agents.lanes import lane_seeds, make_lanes
+from panto_agents.lanes import PolicyLanes, lane_seeds, make_lanes
 from panto_agents.model_file import read_model
 from panto_agents.settings import parse_training
 from panto_env import InputError, simulate

@@ -13,8 +13,7 @@ import torch
 from torch import nn
 
 from panto_agents.linear_pass import Columns, LinearPass
-from panto_agents.linear_rollout import Rollout, Terms, grouped
-from panto_agents.network import Network
+from panto_agents.linear_rollout import Network, Rollout, Terms, grouped
 from panto_baselines.policies.washout import Washout, WashoutSettings
 
 from .rollout_in_torch import Washout as InTorch

@@ -17,9 +17,9 @@ from stable_baselines3.common.vec_env import (
     VecNormalize,
 )
 
+from panto_agents.lanes import PantographVecEnv
 from panto_agents.model_file import Step, read_model, write_policy
 from panto_agents.stable_baselines import save_policy
-from panto_agents.vec_env import PantographVecEnv
 from panto_env import InputError, simulate
 from panto_env.policies import find_policy, wishes
 

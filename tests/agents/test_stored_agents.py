@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file
 
-from panto_agents.ensemble import Ensemble
 from panto_agents.model_file import read_model
+from panto_agents.policy import Ensemble
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER, further_trainings
 from panto_env import InputError, simulate

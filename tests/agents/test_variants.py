@@ -10,10 +10,9 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from panto_agents.lanes import make_lanes
+from panto_agents.lanes import SideBySide, make_lanes
 from panto_agents.policy import load
 from panto_agents.settings import Training, parse_training
-from panto_agents.side_by_side import SideBySide
 from panto_agents.train import train
 from panto_env import InputError
 

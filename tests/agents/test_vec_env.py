@@ -7,7 +7,7 @@ from gymnasium.wrappers.vector import NormalizeObservation
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import VecMonitor, VecVideoRecorder
 
-from panto_agents.vec_env import PantographVecEnv
+from panto_agents.lanes import PantographVecEnv
 from panto_env import InputError
 
 NAME = "panto_env:PantographStiffness-v0"
@@ -20,7 +20,7 @@ def make(lanes=3, mode="SameStep", **settings):
 @pytest.mark.parametrize("make_model", [PPO, SAC])
 def test_stable_baselines_given_a_vector_environment_itself_names_its_wrapper(make_model):
     native = gymnasium.make_vec(NAME, num_envs=3)
-    with pytest.raises(InputError, match=r"from panto_agents.vec_env import PantographVecEnv"):
+    with pytest.raises(InputError, match=r"from panto_agents.lanes import PantographVecEnv"):
         make_model("MlpPolicy", native)
     assert repr(type(native)) == "<class 'panto_env.envs.vector.PantographVectorEnv'>"
 

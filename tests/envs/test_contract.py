@@ -13,7 +13,7 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("pettingzoo")
-from panto_agents.vec_env import PantographVecEnv  # noqa: E402
+from panto_agents.lanes import PantographVecEnv  # noqa: E402
 from panto_env import InputError, parallel_env  # noqa: E402
 from panto_env.envs import IDS  # noqa: E402
 
