@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from panto_baselines.benchmark.intervals import Clusters, interquartile_mean, interval_of_mean
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.statistics import Clusters, interquartile_mean, interval_of_mean
 from panto_configs import find
 from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError

@@ -154,7 +154,7 @@ def evaluate(
 
     Options that are left out are as in the model's training.
     """
-    from panto_baselines.benchmark.seeds import TEST, check_seeds
+    from panto_baselines.benchmark.settings import TEST, check_seeds
     from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy, wishes
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from panto_baselines.benchmark.seeds import TRAINING
+from panto_baselines.benchmark.settings import TRAINING
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_env.analysis.pool import in_threads
 from panto_env.base.errors import InputError

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 
-from panto_baselines.benchmark.seeds import SELECTION, check_seeds
+from panto_baselines.benchmark.settings import SELECTION, check_seeds
 from panto_env.base.checksums import commit
 from panto_env.control import Task
 from panto_env.control.lines import on_example

@@ -11,21 +11,24 @@ from typing import Protocol
 
 import numpy as np
 
-from .controls import TAPE, control_of
-from .intervals import (
+from .settings import REFERENCE, TAPE, control_of
+from .single_pass import Row
+from .statistics import (
+    ADVICE,
+    MOVED,
     Array,
+    Cell,
     Clusters,
     Interval,
+    LineAtSpeed,
     Share,
     interquartile_mean,
     interval_for_lines,
     interval_of_mean,
+    relative_changes,
     share_of,
     worst_quarter,
 )
-from .settings import REFERENCE
-from .single_pass import Row
-from .statistics import ADVICE, MOVED, Cell, LineAtSpeed, relative_changes
 
 MOVED_PASSES = 1 / 3
 """Share of a track's passes from which on a policy is disqualified for moving the mean by over ``MOVED``.

@@ -24,14 +24,11 @@ from panto_env.plant.catenary.schema import CLEAR
 
 from ..oracle.stored import stored_changes
 from . import actions, apart
-from .actions import Played
-from .controls import ORACLE_TAPE, control_of, policy_of
+from .actions import Played, Trace
 from .overall import Standing, standings
-from .seeds import salt_hash
-from .settings import BenchmarkSettings, Line
+from .settings import ORACLE_TAPE, BenchmarkSettings, Line, control_of, policy_of, salt_hash
 from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
 from .statistics import Cell, LineAtSpeed, compare
-from .trace import Trace
 
 SUFFIXES = (".json", *TABLES)
 """Suffixes of the files that an outcome can be saved to."""

@@ -1,4 +1,4 @@
-"""One pass of a benchmark: a policy on a line at a speed under a seed."""
+"""The passive pantograph that a policy is compared with: one at the policy's own mean contact force."""
 
 from __future__ import annotations
 
@@ -22,12 +22,53 @@ from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
 from ..oracle.stored import stored_actions
-from .actions import Played
+from .actions import Played, Trace, trace
 from .apart import find_apart
-from .controls import BLIND, ORACLE_TAPE, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
-from .same_mean import NONE, PassiveFigures, passive_at_mean_of
-from .settings import REFERENCE, BenchmarkSettings, Line
-from .trace import Trace, trace
+from .settings import (
+    BLIND,
+    ORACLE_TAPE,
+    OTHER_SEED,
+    REFERENCE,
+    TAPE,
+    BenchmarkSettings,
+    Blind,
+    Line,
+    Tape,
+    control_of,
+    policy_of,
+)
+
+
+class PassiveFigures(NamedTuple):
+    """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
+
+    std: float  # sigma (N)
+    cost_function: float  # CF (N m)
+
+
+NONE = PassiveFigures(float("nan"), float("nan"))
+
+
+def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
+    """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
+
+    Of a train each has the mean force that it had, and the figures are those of the controlled one
+    whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
+    policy.
+    """
+    means = [own.summary(spans).mean for own in run.train]
+    if not min(means) > 0:
+        return NONE
+    try:
+        mean = means if len(means) > 1 else means[0]
+        passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
+    except InputError:  # no static force gives this mean
+        return NONE
+    if passive.terminated:
+        return NONE
+    worst = passive.worst_controlled(spans).summary(spans)
+    return PassiveFigures(worst.std, worst.cost_function)
+
 
 Array = NDArray[np.float64]
 

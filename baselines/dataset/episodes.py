@@ -16,7 +16,7 @@ from panto_env.base.errors import InputError
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
-from ..benchmark.seeds import DATA
+from ..benchmark.settings import DATA
 from .settings import ENVIRONMENT, EpisodesSettings, Plan
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")

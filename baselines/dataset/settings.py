@@ -17,7 +17,7 @@ from panto_env.base.settings import Between, NonNegative, Settings, parse
 from panto_env.control.settings import description
 from panto_env.policies import check_named
 
-from ..benchmark.seeds import DATA
+from ..benchmark.settings import DATA
 
 ENVIRONMENT = "Pantograph-v0"
 """Id of the environment that episodes are recorded in."""

@@ -18,7 +18,7 @@ from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.low_pass import low_pass_from, settled_at
 from panto_env.metrics.spans import SpanChoice
 
-from ..benchmark.controls import Tape
+from ..benchmark.settings import Tape
 from .knots import Knots, without_limits
 from .lanes import Stretch
 

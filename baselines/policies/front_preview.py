@@ -17,7 +17,7 @@ from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.state import Place
 from panto_env.policies import Policy, find_policy, wishes
 
-from ..benchmark.seeds import TRAINING
+from ..benchmark.settings import TRAINING
 
 Array = NDArray[np.float64]
 PLACES = tuple(range(0, 31, 2))

@@ -9,7 +9,7 @@ from panto_env.base import plugins
 from panto_env.base.errors import InputError
 from panto_env.policies import maker_of
 
-from ..benchmark.controls import BLIND, TAPE, control_of, policy_of
+from ..benchmark.settings import BLIND, TAPE, control_of, policy_of
 
 CONTROLS = {
     BLIND: "A control: {}, given its first observation at every step.",

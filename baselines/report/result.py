@@ -21,9 +21,8 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
 from panto_env.base.settings import dotted
 
-from ..benchmark.intervals import Share
 from ..benchmark.overall import with_feedback
-from ..benchmark.statistics import LineAtSpeed
+from ..benchmark.statistics import LineAtSpeed, Share
 
 Number = Annotated[
     float,

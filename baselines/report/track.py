@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
 
-from ..benchmark.intervals import Share
 from ..benchmark.settings import REFERENCE
-from ..benchmark.statistics import LineAtSpeed
+from ..benchmark.statistics import LineAtSpeed, Share
 from .charts import Chart, Line, Point, curves, dots
 from .descriptions import what_is
 from .result import Result, StoredCell, Trace

@@ -58,7 +58,7 @@ def tune(
     from panto_env.cluster.parts import remove_parts
     from panto_env.control.settings import run_settings
 
-    from ..benchmark.seeds import TRAINING
+    from ..benchmark.settings import TRAINING
     from ..policies.gains import gain_file
     from .parts import parts_of
     from .parts import tune as run

@@ -13,7 +13,7 @@ from panto_env.base.errors import InputError
 from panto_env.control.settings import RunSettings
 from panto_env.policies import maker_of, parameters_of, policy_names
 
-from ..benchmark.seeds import SELECTION, TRAINING
+from ..benchmark.settings import SELECTION, TRAINING
 from ..policies.lanes_law import TunableLaw
 from .batch import Forces, Still, run_batch
 from .gauss_newton import DAMPINGS, fit

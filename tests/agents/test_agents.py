@@ -32,7 +32,7 @@ from panto_agents.model_file import read_model, restore
 from panto_agents.policy import TrainedPolicy, load
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, load_training, parse_training
-from panto_baselines.benchmark.seeds import TRAINING, check_seeds
+from panto_baselines.benchmark.settings import TRAINING, check_seeds
 from panto_env import InputError, simulate
 from panto_env.base.checksums import write_arrays
 from panto_env.control import Task

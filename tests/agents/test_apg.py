@@ -20,7 +20,7 @@ from panto_agents.pass_lanes import PassLanes
 from panto_agents.policy import WashedOut, load
 from panto_agents.settings import Training, parse_training
 from panto_agents.train import train
-from panto_baselines.benchmark.seeds import TRAINING
+from panto_baselines.benchmark.settings import TRAINING
 from panto_env import InputError, simulate
 from panto_env.metrics.low_pass import low_pass
 

@@ -13,9 +13,8 @@ from panto_agents.ablation import load_ablation
 from panto_agents.model_file import read_model
 from panto_agents.policy import load as load_model
 from panto_agents.settings import load_training
-from panto_baselines.benchmark.replay import replay
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.benchmark.submission import read_submission
+from panto_baselines.benchmark.submission import read_submission, replay
 from panto_baselines.dataset.designs_settings import load_designs
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle.settings import oracle_settings

@@ -10,9 +10,9 @@ from panto_agents.policy import load
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import load_training, parse_training
 from panto_agents.stored import FOLDER
-from panto_baselines.benchmark.replay import replay
 from panto_baselines.benchmark.run import run as benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.submission import replay
 from panto_baselines.dataset.settings import load_episodes
 from panto_env import InputError, policies, simulate
 from panto_env.analysis.saved_run import check_made_anew, load_with_settings

@@ -18,9 +18,8 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command, plot
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.controls import ORACLE_TAPE, policy_of
 from panto_baselines.benchmark.run import Benchmark
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.benchmark.settings import ORACLE_TAPE, BenchmarkSettings, Line, load_benchmark, policy_of
 from panto_baselines.benchmark.statistics import MOVED, MOVED_AT_MOST
 from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from panto_baselines.benchmark.intervals import (
+from panto_baselines.benchmark.statistics import (
     Clusters,
     interquartile_mean,
     interval_of_mean,

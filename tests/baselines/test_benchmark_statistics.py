@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from panto_baselines.benchmark import statistics
-from panto_baselines.benchmark.intervals import Clusters, interval_for_lines, interval_of_mean
 from panto_baselines.benchmark.overall import standings, without_feedback
 from panto_baselines.benchmark.single_pass import Row
+from panto_baselines.benchmark.statistics import Clusters, interval_for_lines, interval_of_mean
 from panto_env.metrics.figures import Figures
 
 ONES = Figures(*[1.0] * len(fields(Figures)))

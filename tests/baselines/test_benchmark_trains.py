@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import apart
-from panto_baselines.benchmark.controls import policy_of
 from panto_baselines.benchmark.run import evaluated_spans
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark, policy_of
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.benchmark.statistics import compare
 from panto_baselines.oracle.stored import fingerprint

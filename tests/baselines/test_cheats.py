@@ -10,9 +10,8 @@ import json
 import pytest
 
 from panto_baselines.benchmark import apart
-from panto_baselines.benchmark.controls import ORACLE_TAPE
 from panto_baselines.benchmark.run import passes_of, run
-from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.settings import ORACLE_TAPE, BenchmarkSettings, load_benchmark
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.oracle import stored
 from panto_env import InputError

@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 from huggingface_hub import DatasetCard
 
-from panto_baselines.benchmark import seeds
-from panto_baselines.benchmark.controls import OTHER_SEED
+from panto_baselines.benchmark import settings as seeds
+from panto_baselines.benchmark.settings import OTHER_SEED
 from panto_baselines.dataset import designs, make_designs, make_episodes
 from panto_baselines.dataset.checksums import LIST, verify
 from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs

@@ -18,9 +18,8 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark.controls import Tape
 from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
-from panto_baselines.benchmark.settings import load_benchmark
+from panto_baselines.benchmark.settings import Tape, load_benchmark
 from panto_baselines.benchmark.single_pass import along
 from panto_baselines.oracle import command, problem, report, search, solver, stored
 from panto_baselines.oracle.knots import Knots

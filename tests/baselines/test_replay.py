@@ -10,12 +10,13 @@ import pytest
 from typer import Typer
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark import actions, replay_command
+from panto_baselines.benchmark import actions
+from panto_baselines.benchmark import command as replay_command
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.actions import Played
-from panto_baselines.benchmark.replay import replay
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import drive, run_pass
+from panto_baselines.benchmark.submission import replay
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.settings import parse

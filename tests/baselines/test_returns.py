@@ -9,8 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.command import returns as command
 from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return, rank_correlation, returns
-from panto_baselines.benchmark.returns_command import returns as command
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.report.result import parse_result

@@ -5,9 +5,15 @@ import itertools
 
 import pytest
 
-from panto_baselines.benchmark.controls import OTHER_SEED
-from panto_baselines.benchmark.seeds import SALTED, SEEDS, TEST, salt_hash, salted_seed
-from panto_baselines.benchmark.settings import BenchmarkSettings
+from panto_baselines.benchmark.settings import (
+    OTHER_SEED,
+    SALTED,
+    SEEDS,
+    TEST,
+    BenchmarkSettings,
+    salt_hash,
+    salted_seed,
+)
 from panto_env import InputError
 from panto_env.base.settings import parse
 

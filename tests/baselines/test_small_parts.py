@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import returns as returns_of
-from panto_baselines.benchmark.controls import BLIND, TAPE, control_of, policy_of
-from panto_baselines.benchmark.replay import _difference
-from panto_baselines.benchmark.submission import Card, read_submission
-from panto_baselines.benchmark.submission_command import _report
+from panto_baselines.benchmark.command import _report
+from panto_baselines.benchmark.settings import BLIND, TAPE, control_of, policy_of
+from panto_baselines.benchmark.submission import Card, _difference, read_submission
 from panto_baselines.oracle.solver import MEAN_TOLERANCE, MEAN_WEIGHT, _mean_met, merit
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
 from panto_baselines.report.charts import Scale

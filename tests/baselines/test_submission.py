@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.command import submission
 from panto_baselines.benchmark.submission import place_among, read_submission
-from panto_baselines.benchmark.submission_command import submission
 from panto_env import InputError
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "submission"

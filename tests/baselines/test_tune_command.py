@@ -13,7 +13,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark import seeds
+from panto_baselines.benchmark import settings as seeds
 from panto_baselines.policies.gains import load_gains
 from panto_baselines.tuning import parts
 from panto_baselines.tuning.command import tune

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from panto_baselines.benchmark import seeds
+from panto_baselines.benchmark import settings as seeds
 from panto_baselines.policies.fitted_fb_ff import FittedFeedback
 from panto_baselines.policies.gains import GAINS_FOLDER, find_gains, gain_file, load_gains
 from panto_baselines.policies.lanes_law import LanesLaw, Observations

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_baselines.benchmark import controls
+from panto_baselines.benchmark import settings as controls
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import drive
 from panto_env import InputError, simulate
