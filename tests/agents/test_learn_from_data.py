@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from panto_baselines.dataset.designs_settings import load_designs
-from panto_baselines.dataset.make_designs import make_designs
-from panto_baselines.dataset.make_episodes import make_episodes
+from panto_baselines.dataset.designs import load_designs
+from panto_baselines.dataset.make import make_designs, make_episodes
 from panto_baselines.dataset.settings import chosen, load_episodes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -7,7 +7,7 @@ import pytest
 
 from panto_agents.run_folder import RunFolder
 from panto_agents.settings import parse_training
-from panto_baselines.dataset.checksums import LIST, verify
+from panto_baselines.dataset.make import LIST, verify
 from panto_env import InputError
 from panto_env.cluster.parts import IDENTITY, open_parts
 from panto_env.estimation.motion_file import read_motion

@@ -15,7 +15,7 @@ from panto_agents.policy import load as load_model
 from panto_agents.settings import load_training
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.benchmark.submission import read_submission, replay
-from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle.settings import oracle_settings
 from panto_baselines.policies.gains import load_gains

@@ -135,8 +135,8 @@ def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path
 
         return made
 
-    monkeypatch.setattr("panto_baselines.dataset.make_episodes.make_episodes", make(True))
-    monkeypatch.setattr("panto_baselines.dataset.make_designs.make_designs", make(False))
+    monkeypatch.setattr("panto_baselines.dataset.make.make_episodes", make(True))
+    monkeypatch.setattr("panto_baselines.dataset.make.make_designs", make(False))
     output = tmp_path / "data"
     words = ("--output", output, "--workers", 3)
     shown = panto("dataset", "episodes", "dataset-known-line", *words, "--episodes", 2)

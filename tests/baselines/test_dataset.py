@@ -18,12 +18,13 @@ from huggingface_hub import DatasetCard
 
 from panto_baselines.benchmark import settings as seeds
 from panto_baselines.benchmark.settings import OTHER_SEED
-from panto_baselines.dataset import designs, make_designs, make_episodes
-from panto_baselines.dataset.checksums import LIST, verify
-from panto_baselines.dataset.designs_settings import DesignsSettings, load_designs
-from panto_baselines.dataset.episodes import Stage, read_part
+from panto_baselines.dataset import designs
+from panto_baselines.dataset import make as make_designs
+from panto_baselines.dataset import make as make_episodes
+from panto_baselines.dataset.designs import DesignsSettings, load_designs
+from panto_baselines.dataset.episodes import COLUMNS, Stage, read_part
+from panto_baselines.dataset.make import LIST, verify
 from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
-from panto_baselines.dataset.steps_table import COLUMNS
 from panto_configs import names
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked, write_arrays, write_checked

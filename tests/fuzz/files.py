@@ -11,7 +11,7 @@ import numpy as np
 from panto_agents.stored import FOLDER as MODELS
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.dataset.checksums import write_checksums
+from panto_baselines.dataset.make import write_checksums
 from panto_env import simulate
 from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of

@@ -18,7 +18,7 @@ from panto_agents.stored import FOLDER as MODELS
 from panto_baselines.benchmark import actions
 from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.episodes import Episode, read_episodes
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
