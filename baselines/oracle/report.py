@@ -15,8 +15,7 @@ from panto_env.metrics.spans import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
-from .search import STARTS, Oracle
-from .solver import Iteration
+from .search import STARTS, Iteration, Oracle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,7 +17,7 @@ from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.benchmark.submission import read_submission, replay
 from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.settings import load_episodes
-from panto_baselines.oracle.settings import oracle_settings
+from panto_baselines.oracle.stored import oracle_settings
 from panto_baselines.policies.gains import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate

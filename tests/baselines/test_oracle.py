@@ -21,12 +21,11 @@ from typer.testing import CliRunner
 from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
 from panto_baselines.benchmark.settings import Tape, load_benchmark
 from panto_baselines.benchmark.single_pass import along
-from panto_baselines.oracle import command, problem, report, search, solver, stored
-from panto_baselines.oracle.knots import Knots
-from panto_baselines.oracle.problem import Problem
-from panto_baselines.oracle.search import find, noise
-from panto_baselines.oracle.settings import oracle_settings
-from panto_baselines.oracle.solver import descend
+from panto_baselines.oracle import command, problem, report, search, stored
+from panto_baselines.oracle import search as solver
+from panto_baselines.oracle.problem import Knots, Problem
+from panto_baselines.oracle.search import descend, find, noise
+from panto_baselines.oracle.stored import oracle_settings
 from panto_configs import find as find_config
 from panto_env import InputError, simulate
 from panto_env.base.checksums import with_checksum

@@ -9,7 +9,7 @@ from panto_baselines.benchmark import returns as returns_of
 from panto_baselines.benchmark.command import _report
 from panto_baselines.benchmark.settings import BLIND, TAPE, control_of, policy_of
 from panto_baselines.benchmark.submission import Card, _difference, read_submission
-from panto_baselines.oracle.solver import MEAN_TOLERANCE, MEAN_WEIGHT, _mean_met, merit
+from panto_baselines.oracle.search import MEAN_TOLERANCE, MEAN_WEIGHT, _mean_met, merit
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
 from panto_baselines.report.charts import Scale
 from panto_env import InputError

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_baselines.oracle.settings import OracleSettings
+from panto_baselines.oracle.stored import OracleSettings
 from panto_env import InputError, simulate
 from panto_env.analysis.pool import in_processes, in_threads
 from panto_env.base.settings import parse
