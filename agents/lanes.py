@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.base.errors import InputError
 from panto_env.control.context import Context
 from panto_env.envs import IDS, PantographVectorEnv

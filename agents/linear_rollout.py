@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from panto_baselines.policies.washout import WashoutSettings
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.backend import WIDTH
 from panto_env.base.machine import cores
 from panto_env.control.entries import AVERAGED

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
-from panto_baselines.policies.washout import WashoutSettings
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.base.checksums import __version__, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.settings import Positive, Settings

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 from panto_env.control.observation import OBSERVATION_SETTINGS

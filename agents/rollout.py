@@ -49,7 +49,7 @@ class Weights(NamedTuple):
 
 
 class Washout(NamedTuple):
-    """Of actions, as in ``panto_baselines.policies.washout``; share 0: none."""
+    """Of actions, as in ``panto_baselines.policies.repetitive``; share 0: none."""
 
     share: float  # that the average takes of the force in a step
     rate: float  # of the actuator (1/s)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
-from panto_baselines.policies.washout import WashoutSettings
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_configs import find
 from panto_env.base.arrays import to_kmh
 from panto_env.base.errors import InputError, shown, suggest

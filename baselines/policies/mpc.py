@@ -10,8 +10,7 @@ import numpy as np
 from panto_env.base.errors import InputError, shown
 from panto_env.control.context import Context
 
-from .gains import Source
-from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 

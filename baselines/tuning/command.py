@@ -59,7 +59,7 @@ def tune(
     from panto_env.control.settings import run_settings
 
     from ..benchmark.settings import TRAINING
-    from ..policies.gains import gain_file
+    from ..policies.lanes_law import gain_file
     from .parts import parts_of
     from .parts import tune as run
     from .store import check_gain_file, make_tuning, store

@@ -15,7 +15,7 @@ from panto_env.catalog.content import content_unless_catalogue
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
 
-from ..policies.gains import GainFile, Tuning, load_gains
+from ..policies.lanes_law import GainFile, Tuning, load_gains
 from .tune import Tuned
 
 DIGITS = 5

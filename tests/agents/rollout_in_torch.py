@@ -54,7 +54,7 @@ def stepped(network: Any, seen: torch.Tensor, state: Any) -> tuple[torch.Tensor,
 
 
 class Washout:
-    """``panto_baselines.policies.washout.Washout`` of one action in torch."""
+    """``panto_baselines.policies.repetitive.Washout`` of one action in torch."""
 
     def __init__(self, terms: Any) -> None:
         self._settings, self._interval = terms.washout, terms.interval

@@ -14,7 +14,7 @@ from torch import nn
 
 from panto_agents.linear_pass import Columns, LinearPass
 from panto_agents.linear_rollout import Network, Rollout, Terms, grouped
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 
 from .rollout_in_torch import Washout as InTorch
 from .rollout_in_torch import driven

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from panto_baselines.oracle import stored
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_env import InputError
 from panto_env.base.checksums import with_checksum
 from panto_env.cli import make_app
@@ -63,7 +63,7 @@ def test_an_oracle_that_would_be_lost_is_kept(folder, monkeypatch):
 
 def test_gains_are_replaced_only_if_asked(folder):
     # Of the shipped file, whose gains for this line and place took minutes.
-    from panto_baselines.policies.gains import gain_file
+    from panto_baselines.policies.lanes_law import gain_file
 
     mine = folder / "skyhook.toml"
     mine.write_bytes(gain_file("skyhook").read_bytes())

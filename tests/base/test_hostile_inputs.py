@@ -18,7 +18,7 @@ from panto_baselines.benchmark.submission import read_submission, replay
 from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle.stored import oracle_settings
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate
 from panto_env.base.checksums import checksum, read_checked

@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from panto_baselines.policies.adaptive import Adaptive
-from panto_baselines.policies.adaptive_fb_ff import AdaptiveFeedforward
-from panto_baselines.policies.fb_ff import FeedbackFeedforward
-from panto_baselines.policies.fitted_fb_ff import FittedFeedback
+from panto_baselines.policies.adaptive import (
+    COUNT,
+    FEEDBACK_GAINS,
+    HARMONICS,
+    SIGNALS,
+    Adaptive,
+    AdaptiveFeedforward,
+    FittedFeedback,
+    LinearFeedback,
+)
+from panto_baselines.policies.fb_ff import FeedbackFeedforward, TunedFeedbackFeedforward
+from panto_baselines.policies.feedback import ProportionalDerivative, TunedProportionalDerivative
 from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
-from panto_baselines.policies.linear_feedback import COUNT, FEEDBACK_GAINS, SIGNALS, LinearFeedback
-from panto_baselines.policies.pd import ProportionalDerivative
-from panto_baselines.policies.periodic import HARMONICS
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import LISTENING, Pace
-from panto_baselines.policies.tuned_fb_ff import TunedFeedbackFeedforward
-from panto_baselines.policies.tuned_pd import TunedProportionalDerivative
+from panto_baselines.policies.repetitive import LISTENING, Pace, Repetitive
 from panto_baselines.tuning.batch import Still, run_batch
 from panto_baselines.tuning.tune import MEAN_TOLERANCE
 from panto_env import InputError

@@ -10,9 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
-from panto_baselines.policies.passive import Passive
-from panto_baselines.policies.pd import ProportionalDerivative
-from panto_baselines.policies.proportional import Proportional
+from panto_baselines.policies.feedback import Passive, Proportional, ProportionalDerivative
 from panto_env import InputError, simulate
 from panto_env.control.context import Context
 from panto_env.envs import PantographEnv

@@ -35,7 +35,7 @@ P = "p:gain=0.1"
 LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
 PLUGIN = """
 import numpy as np
-from panto_baselines.policies.force_law import ForceLaw
+from panto_baselines.policies.feedback import ForceLaw
 
 class Half(ForceLaw):
     "Presses with half of the nominal force."

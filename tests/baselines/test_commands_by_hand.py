@@ -16,8 +16,7 @@ from panto_baselines import policies
 from panto_baselines.benchmark import command
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.policies.lanes_law import Gain, TunableLaw
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import PACE
+from panto_baselines.policies.repetitive import PACE, Repetitive
 from panto_env.cli import make_app
 
 from ..command import panto, whole

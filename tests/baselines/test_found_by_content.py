@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from panto_baselines.oracle.stored import stored_actions, stored_cells
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store
 from panto_baselines.tuning.tune import Tuned
 from panto_env import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from panto_baselines.policies.front_preview import FrontPreview
+from panto_baselines.policies.preview import FrontPreview
 from panto_env import InputError, simulate
 
 TRAIN = {

@@ -11,15 +11,20 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from panto_baselines.policies.h_infinity import central, minimum_bound, weighted
+from panto_baselines.policies.adaptive import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
-from panto_baselines.policies.lqg import ROUNDING, Disturbed, regulator
+from panto_baselines.policies.model_based import (
+    ROUNDING,
+    Disturbed,
+    central,
+    minimum_bound,
+    regulator,
+    weighted,
+)
 from panto_baselines.policies.mpc import HORIZON, Programs
-from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.preview import Preview, preview
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import LISTENING
+from panto_baselines.policies.repetitive import LISTENING, Repetitive
 from panto_baselines.tuning.batch import Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task

@@ -14,7 +14,7 @@ import typer
 from typer.testing import CliRunner
 
 from panto_baselines.benchmark import settings as seeds
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.tuning import parts
 from panto_baselines.tuning.command import tune
 from panto_baselines.tuning.gauss_newton import DAMPINGS

@@ -11,12 +11,24 @@ import pytest
 from numpy.typing import NDArray
 
 from panto_baselines.benchmark import settings as seeds
-from panto_baselines.policies.fitted_fb_ff import FittedFeedback
-from panto_baselines.policies.gains import GAINS_FOLDER, find_gains, gain_file, load_gains
-from panto_baselines.policies.lanes_law import LanesLaw, Observations
-from panto_baselines.policies.linear_feedback import COMMANDS, HISTORY, SIGNALS
-from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
-from panto_baselines.policies.skyhook import Skyhook
+from panto_baselines.policies.adaptive import (
+    COMMANDS,
+    HARMONICS,
+    HISTORY,
+    LEAD,
+    SIGNALS,
+    FittedFeedback,
+    Periodic,
+)
+from panto_baselines.policies.feedback import Skyhook
+from panto_baselines.policies.lanes_law import (
+    GAINS_FOLDER,
+    LanesLaw,
+    Observations,
+    find_gains,
+    gain_file,
+    load_gains,
+)
 from panto_baselines.tuning.batch import Still, run_batch
 from panto_baselines.tuning.gauss_newton import fit
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store

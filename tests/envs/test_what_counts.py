@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.control.reward import REWARDS
 from panto_env.envs import BARE

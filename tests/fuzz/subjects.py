@@ -22,7 +22,7 @@ from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.episodes import Episode, read_episodes
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
 from panto_env.base.checksums import read_checked, write_arrays

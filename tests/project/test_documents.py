@@ -112,7 +112,7 @@ SHORTENED = {
 EPISODE = "panto dataset episodes dataset-known-line --only fitted-fb-ff --episodes 1 --workers 1"
 PREPARED = {"docs/datasets.md": EPISODE}
 """What the Python of a page takes for granted, made beforehand."""
-CONTROLLER = "from panto_baselines.policies.pd import ProportionalDerivative as Mine\n"
+CONTROLLER = "from panto_baselines.policies.feedback import ProportionalDerivative as Mine\n"
 
 
 def rule_of(command):

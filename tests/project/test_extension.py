@@ -39,7 +39,7 @@ class Copy:
         # What an installation makes of pyproject.toml; a policy's entry point is a line in it.
         points = folder / "panto_env-0.dist-info" / "entry_points.txt"
         points.parent.mkdir()
-        points.write_text("[panto_env.policies]\npassive = panto_baselines.policies.passive:Passive\n")
+        points.write_text("[panto_env.policies]\npassive = panto_baselines.policies.feedback:Passive\n")
         (points.parent / "METADATA").write_text("Metadata-Version: 2.1\nName: panto-env\nVersion: 0\n")
 
     def new_file(self, name, place):
@@ -83,7 +83,7 @@ def test_each_extension_is_at_most_one_new_file_and_one_line(tmp_path, plain):
     copy.new_file("steady.py", "panto_baselines/policies")
     copy.new_line(
         "panto_env-0.dist-info/entry_points.txt",
-        "passive = panto_baselines.policies.passive:Passive\n",
+        "passive = panto_baselines.policies.feedback:Passive\n",
         "steady = panto_baselines.policies.steady:Steady",
     )
     copy.new_line(
