@@ -1,19 +1,81 @@
-"""Contents of the page for one track: tables, heat map, pairs, charts, and a section for each policy."""
+"""A sentence or two on what a policy is, from its name in a result; no code of a user's is run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
+from pathlib import Path
+from typing import Any
 
-from ..benchmark.settings import REFERENCE
+from panto_env.base import plugins
+from panto_env.base.errors import InputError
+from panto_env.policies import maker_of
+
+from ..benchmark.settings import BLIND, REFERENCE, TAPE, control_of, policy_of
 from ..benchmark.statistics import LineAtSpeed, Share
 from .charts import Chart, Line, Point, curves, dots
-from .descriptions import what_is
 from .result import Result, StoredCell, Trace
-from .tables import FAR_OFF, Table, leaderboard, signed, table_of_cells
-from .toml import as_toml
+from .tables import FAR_OFF, PageTable, leaderboard, signed, table_of_cells
+
+CONTROLS = {
+    BLIND: "A control: {}, given its first observation at every step.",
+    TAPE: "A control: the actions that {} took on another line, under another seed, played back.",
+}
+
+
+def what_is(policy: str) -> str:
+    """First paragraph of an installed policy's docstring; for any other policy, what its name says."""
+    control = control_of(policy)
+    if control:
+        return CONTROLS[control].format(policy_of(policy))
+    name = policy.partition(":")[0]
+    if name in plugins.installed(plugins.POLICIES):
+        try:
+            text = inspect.getdoc(maker_of(name)) or "It has no description."
+        except InputError as error:  # a package that it needs is missing
+            return str(error)
+        return " ".join(text.partition("\n\n")[0].split())
+    if name.endswith(".py"):
+        return "A class in a Python file of the user's, which is not read for this page."
+    if Path(policy).suffix[1:] in plugins.installed(plugins.LOADERS):
+        return "A model from a file, which is not read for this page."
+    return "It is not installed where this page was made."
+
+
+def as_toml(settings: Mapping[str, Any]) -> str:
+    """Text of a file for `panto benchmark --config`, from plain data; settings that are null are left out."""
+    plain = {key: value for key, value in settings.items() if not _is_tables(value)}
+    tables = {key: value for key, value in settings.items() if _is_tables(value)}
+    parts = ["\n".join(_lines(plain))]
+    parts += ["\n".join([f"[[{_key(key)}]]", *_lines(row)]) for key, rows in tables.items() for row in rows]
+    return "\n\n".join(parts) + "\n"
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(_lines(value))} }}" if value else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML alone escapes it
+    return json.dumps(value)
+
+
+def _key(key: str) -> str:
+    return key if key.isidentifier() and key.isascii() else _value(key)
+
 
 STRONGEST = 0.6
 """Opacity of a heat map's strongest colour, so that text on it stays legible."""
@@ -45,7 +107,7 @@ class Section:
 
     place: LineAtSpeed
     title: str
-    table: Table
+    table: PageTable
     charts: list[Chart]
 
 
@@ -70,7 +132,7 @@ class Track:
     settings: str  # as TOML
     numbers: dict[str, int]  # of policies, for their colours
     shown_first: set[str]  # policies whose traces are shown when the page opens
-    leaderboard: Table
+    leaderboard: PageTable
     lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
     heat: dict[str, list[Shade | None]]  # by policy, over all places
     pairs: dict[str, list[Shade | None]]  # by policy, over all others

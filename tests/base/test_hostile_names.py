@@ -8,7 +8,7 @@ import unicodedata
 import pytest
 import rich.table
 
-from panto_baselines.report.command import report
+from panto_baselines.report.page import report
 from panto_env.base.checksums import read_checked, with_checksum
 from panto_env.base.errors import harmless, one_line
 from panto_env.terminal import PlainConsole, alert, say

@@ -10,7 +10,7 @@ import pytest
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report.result import read_result
-from panto_baselines.report.summary import summary
+from panto_baselines.report.tables import summary
 from panto_configs import names
 
 from ..pages import DOCS, tables_of

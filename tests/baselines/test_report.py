@@ -15,13 +15,10 @@ from typer.testing import CliRunner
 from panto_baselines.benchmark.report import OWN_LABELS
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.report import charts
-from panto_baselines.report.command import report
-from panto_baselines.report.descriptions import what_is
-from panto_baselines.report.page import page
+from panto_baselines.report.page import page, report
 from panto_baselines.report.result import parse_result
-from panto_baselines.report.summary import summary
-from panto_baselines.report.tables import signed
-from panto_baselines.report.toml import as_toml
+from panto_baselines.report.tables import signed, summary
+from panto_baselines.report.track import as_toml, what_is
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import with_checksum, write_checked

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from panto_baselines.report.command import report as report_command
+from panto_baselines.report.page import report as report_command
 from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
