@@ -60,10 +60,8 @@ def tune(
 
     from ..benchmark.settings import TRAINING
     from ..policies.lanes_law import gain_file
-    from .parts import parts_of
-    from .parts import tune as run
-    from .store import check_gain_file, make_tuning, store
-    from .tables import table
+    from .store import check_gain_file, make_tuning, parts_of, store, table
+    from .store import tune as run
     from .tune import PASSES, SEEDS, SPEEDS_KMH, tunable
 
     settings = run_settings(

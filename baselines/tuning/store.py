@@ -1,22 +1,80 @@
-"""Writes gains to a TOML file, which may hold gains for several lines."""
+"""A tuning stored speed by speed beside its file of gains, so that an interrupted one can continue."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from panto_env.base.checksums import __version__
+from panto_env.analysis.pool import Progress
+from panto_env.base.checksums import __version__, read_checked, write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import check_output, write_whole
+from panto_env.base.files import alone_in, check_output, write_whole
+from panto_env.base.table import Table
 from panto_env.catalog.content import content_unless_catalogue
+from panto_env.cluster import spread
+from panto_env.cluster.parts import identity, open_parts
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
+from panto_env.terminal import number
 
 from ..policies.lanes_law import GainFile, Tuning, load_gains
-from .tune import Tuned
+from .tune import PASSES, SEEDS, SPEEDS_KMH, Tuned, tunable, tune_at
+
+
+def parts_of(gains: Path) -> Path:
+    """Hidden folder that holds the tuned speeds until they are stored in the file of gains."""
+    return gains.with_name(f".{gains.stem}-parts")
+
+
+def tune(
+    folder: Path,
+    policy: str,
+    settings: RunSettings,
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    seeds: int = SEEDS,
+    passes: int = PASSES,
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> list[Tuned]:
+    """Tune a policy for the settings' line, pantograph, actuator and sensors, at each speed.
+
+    Each speed is written to the folder once it is done; speeds that are there already are not tuned again.
+    seeds, passes: see ``tune_at``. workers, ray: see ``spread``; the gains do not depend on them. Raises
+    InputError for a policy without gains, if the folder holds parts of another tuning or a damaged one, and
+    if another process is tuning into it.
+    """
+    tunable(policy)
+    made_of = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
+    with alone_in(folder, "tunes into"):
+        open_parts(folder, identity("tuning", made_of))
+        parts = {speed: folder / f"{speed!r}.json" for speed in speeds_kmh}
+        missing = [speed for speed, path in parts.items() if not path.is_file()]
+        kept = len(parts) - len(missing)
+        if progress is not None:
+            progress(kept, len(parts))
+        spread(
+            [partial(tune_at, policy, settings, speed, seeds, passes) for speed in missing],
+            workers=workers,
+            ray=ray,
+            progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
+            take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
+        )
+        return [_read(path) for path in parts.values()]
+
+
+def _read(path: Path) -> Tuned:
+    values: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in read_checked(path).items()
+    }
+    return Tuned(**values)
+
 
 DIGITS = 5
 """Significant digits of a gain: far more than a tuning can resolve."""
@@ -111,3 +169,29 @@ def _value(value: Any) -> str:
     if isinstance(value, tuple | list):
         return "[" + ", ".join(map(_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False)
+
+
+def table(policy: str, tuned: Sequence[Tuned]) -> Table:
+    """Table with a row per speed: objective before and after, sigma and mean force relative to passive."""
+    headings = (
+        "speed (km/h)",
+        "passes",
+        "iterations",
+        "objective before",
+        "after",
+        "σ to passive (%)",
+        "mean force (%)",
+    )
+    rows = [
+        (
+            f"{each.speed_kmh:g}",
+            str(each.passes),
+            str(len(each.history) - 1),
+            number(each.history[0], 3),
+            number(each.history[-1], 3),
+            f"{100 * each.std_change:+.1f}",
+            f"{100 * each.mean_change:+.2f}",
+        )
+        for each in tuned
+    ]
+    return Table(f"{policy}, tuned: σ and mean on selection seeds", headings, rows)

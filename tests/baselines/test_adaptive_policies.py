@@ -22,8 +22,7 @@ from panto_baselines.policies.fb_ff import FeedbackFeedforward, TunedFeedbackFee
 from panto_baselines.policies.feedback import ProportionalDerivative, TunedProportionalDerivative
 from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
 from panto_baselines.policies.repetitive import LISTENING, Pace, Repetitive
-from panto_baselines.tuning.batch import Still, run_batch
-from panto_baselines.tuning.tune import MEAN_TOLERANCE
+from panto_baselines.tuning.tune import MEAN_TOLERANCE, Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context

@@ -25,7 +25,7 @@ from panto_baselines.policies.model_based import (
 from panto_baselines.policies.mpc import HORIZON, Programs
 from panto_baselines.policies.preview import Preview, preview
 from panto_baselines.policies.repetitive import LISTENING, Repetitive
-from panto_baselines.tuning.batch import Still, run_batch
+from panto_baselines.tuning.tune import Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task
 from panto_env.control.context import Context

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark import settings as seeds
 from panto_baselines.policies.lanes_law import load_gains
-from panto_baselines.tuning import parts
+from panto_baselines.tuning import store as parts
 from panto_baselines.tuning.command import tune
-from panto_baselines.tuning.gauss_newton import DAMPINGS
+from panto_baselines.tuning.tune import DAMPINGS
 from panto_env import InputError, simulate
 from panto_env.control.settings import run_settings
 

@@ -29,10 +29,18 @@ from panto_baselines.policies.lanes_law import (
     gain_file,
     load_gains,
 )
-from panto_baselines.tuning.batch import Still, run_batch
-from panto_baselines.tuning.gauss_newton import fit
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store
-from panto_baselines.tuning.tune import MEAN_TOLERANCE, MEAN_WEIGHT, Tuned, residuals_of, tunable, tune_at
+from panto_baselines.tuning.tune import (
+    MEAN_TOLERANCE,
+    MEAN_WEIGHT,
+    Still,
+    Tuned,
+    fit,
+    residuals_of,
+    run_batch,
+    tunable,
+    tune_at,
+)
 from panto_env import InputError, simulate
 from panto_env.control import Task
 from panto_env.control.context import Context

@@ -25,7 +25,7 @@ from panto_agents.settings import Training, parse_training
 from panto_agents.trainings import train_all
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_baselines.tuning.parts import tune
+from panto_baselines.tuning.store import tune
 from panto_env import InputError
 from panto_env.cluster import spread, tasks
 from panto_env.control.settings import run_settings

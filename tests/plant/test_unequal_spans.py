@@ -14,7 +14,7 @@ from rich.console import Console
 from panto_baselines.oracle.problem import Problem
 from panto_baselines.oracle.search import span_periodic
 from panto_baselines.policies.feedback import Skyhook
-from panto_baselines.tuning.batch import Still, run_batch
+from panto_baselines.tuning.tune import Still, run_batch
 from panto_env import Trajectory, simulate
 from panto_env.analysis.plots import plot_run
 from panto_env.analysis.sweep import sweep
