@@ -90,25 +90,17 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
-    from . import (
-        catalogue,
-        compare,
-        diagnose,
-        drift,
-        estimate,
-        family,
-        film,
-        fit,
-        identify,
-        line,
-        record,
-        reproduce,
-        rig,
-        simulate,
-        speed,
-        sweep,
-        validate,
-    )
+    from . import catalogue, diagnose, estimate, fit, identify, simulate, sweep
+    from . import fit as drift
+    from . import lines as family
+    from . import lines as line
+    from . import records as compare
+    from . import records as record
+    from . import simulate as film
+    from . import studies as reproduce
+    from . import studies as rig
+    from . import studies as speed
+    from . import studies as validate
 
     app = typer.Typer(
         name="panto",

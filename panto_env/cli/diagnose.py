@@ -11,7 +11,7 @@ import typer
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
-from .record import Filtered, Heading, Mass, Unit, reading
+from .records import Filtered, Heading, Mass, Unit, reading
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis

@@ -12,7 +12,7 @@ import panto_env
 from panto_env.base import machine
 from panto_env.base.checksums import with_checksum
 from panto_env.base.errors import InputError
-from panto_env.cli import speed
+from panto_env.cli import studies as speed
 from panto_env.envs import IDS
 from panto_env.studies.throughput import environments, study, tables
 from panto_env.studies.throughput.plots import plot_speed

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from panto_env import InputError, studies
 from panto_env.analysis import simulation
 from panto_env.base import files
-from panto_env.cli import make_app, reproduce
+from panto_env.cli import make_app
+from panto_env.cli import studies as reproduce
 
 from ..command import panto
 from ..full_disk import largest_file

@@ -26,7 +26,7 @@ from panto_env.base.files import DEEPEST, MOST_KEYS, read_toml
 from panto_env.base.settings import Settings, parse, parse_inline
 from panto_env.catalog import load_catenary, load_family, load_pantograph, load_section
 from panto_env.catalog.loader import text_of
-from panto_env.cli.descriptions import described
+from panto_env.cli.catalogue import described
 from panto_env.control.settings import run_settings
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification.record_file import read_record

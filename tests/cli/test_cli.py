@@ -11,7 +11,7 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.errors import AccuracyWarning, PlugInWarning, UnusualWarning
 from panto_env.catalog.loader import text_of
 from panto_env.cli import _show_warning
-from panto_env.cli.descriptions import PRESETS
+from panto_env.cli.catalogue import PRESETS
 from panto_env.cli.identify import pairs
 from panto_env.studies.en50318 import reference
 from panto_env.terminal import PlainConsole, bars, counting
@@ -39,7 +39,7 @@ def test_validate_prints_the_table_and_passes():
 
 def test_validate_prints_every_table_that_it_made(monkeypatch, capsys):
     from panto_env.base.table import Table
-    from panto_env.cli import validate
+    from panto_env.cli import studies as validate
 
     kind, more = validate.study.Validation, [Table(name, ("x",), (("1",),)) for name in ("lines", "wear")]
     usual = kind.tables.fget
@@ -53,7 +53,7 @@ def test_validate_prints_every_table_that_it_made(monkeypatch, capsys):
 def test_validate_fails_where_a_figure_lies_outside(monkeypatch, capsys):
     import typer
 
-    from panto_env.cli import validate
+    from panto_env.cli import studies as validate
 
     monkeypatch.setitem(reference.ACCEPTED, "std", ((0, 1), (0, 1)))
     with pytest.raises(typer.Exit) as caught:
@@ -123,7 +123,7 @@ def test_bad_input_is_one_line_and_status_2(arguments, message, tmp_path):
 
 
 def test_reproduce_prints_what_it_writes_as_json(monkeypatch, capsys, tmp_path):
-    from panto_env.cli import reproduce
+    from panto_env.cli import studies as reproduce
     from panto_env.studies import Comparison, Outcome
 
     found = Outcome("A study", (Comparison("mass", "kg", 2.0, 2.1, 1.9, float("inf")),), numbers={"k": 3})
@@ -215,7 +215,7 @@ def test_a_film_is_as_large_as_its_help_says(count, size, monkeypatch, tmp_path)
     pytest.importorskip("cv2")
     pytest.importorskip("moviepy")
     seen = []
-    monkeypatch.setattr("panto_env.cli.film.write_film", lambda *given: seen.append(given))
+    monkeypatch.setattr("panto_env.cli.simulate.write_film", lambda *given: seen.append(given))
     words = ["film", *["passive"] * count, "--catenary", "periodic-stiffness", "--pantograph", "three-mass"]
     done = panto(*words, "--distance", "550", "--seconds", "0.1", "--output", tmp_path / "it.mp4")
     assert done.returncode == 0, done.stderr

@@ -80,7 +80,7 @@ def test_a_rig_is_compared_with_its_own_line_or_the_one_that_is_named(monkeypatc
 
     own = SimpleNamespace(kind="flexible", name="it")
     rigs = {"one": SimpleNamespace(kind="stiffness"), "two": own}
-    monkeypatch.setattr("panto_env.cli.rig.REFERENCE", "re250")
+    monkeypatch.setattr("panto_env.cli.studies.REFERENCE", "re250")
     monkeypatch.setattr(
         "panto_env.rig.computer.load_rig", lambda name: SimpleNamespace(name=name, line=rigs[name])
     )

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from panto_env import simulate
-from panto_env.cli import validate
+from panto_env.cli import studies as validate
 from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318 import convergence, reference, tables, wear
 from panto_env.studies.en50318.lines import LineCheck
