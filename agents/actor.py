@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 
 Weights = NDArray[np.float32]
 

@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.envs import IDS, PantographVectorEnv
 from panto_env.envs.settings import Whole
 from panto_env.policies import errors_name, find_policy

@@ -16,8 +16,8 @@ from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.base.checksums import __version__, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.settings import Positive, Settings
-from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
+from panto_env.control.observation import Context
 
 from .actor import Actor, Cell, RecurrentActor
 from .learner import Arrays, learn_again, learnt

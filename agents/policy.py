@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.base.errors import InputError, shown
-from panto_env.control.context import Context
-from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_env.control.observation import OBSERVATION_SETTINGS, Context
 from panto_env.policies import Policy, check_named, find_policy
 
 from .actor import Actor

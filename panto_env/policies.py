@@ -19,9 +19,8 @@ from .base import plugins
 from .base.arrays import Array
 from .base.errors import InputError, shortly, shown, suggest
 from .base.settings import parse_inline
-from .control.action import numbers
-from .control.context import Context
-from .control.observation import OBSERVATION_SETTINGS
+from .control.arguments import numbers
+from .control.observation import OBSERVATION_SETTINGS, Context
 from .control.settings import RunSettings
 
 MODELS = ".safetensors"

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 
 from panto_env.analysis.pool import LINEAR_ALGEBRA_THREADS
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
-from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_env.control.observation import OBSERVATION_SETTINGS, Context
 from panto_env.control.settings import run_settings
 from panto_env.policies import PolicyError, find_policy, policy_names
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
 BEGIN, OBSERVATION, END = b"b", b"o", b"e"

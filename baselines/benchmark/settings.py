@@ -23,7 +23,7 @@ from panto_configs import find
 from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Between, Positive, Settings, parse
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,

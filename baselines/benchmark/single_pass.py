@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from panto_env import Trajectory, simulate
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
 from panto_env.control.entries import FULL as NOT_MEASURED
+from panto_env.control.observation import Context
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
 from panto_env.plant.train import MOST_COLLECTORS

@@ -20,8 +20,7 @@ from panto_env.analysis.pool import in_threads, workers_for
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task, passive_mean, trim_of_pass
-from panto_env.control.cost import arrays_of, check_record
-from panto_env.control.extent import whole_steps
+from panto_env.control.length import arrays_of, check_record, whole_steps
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.mean_force import Trim
 from panto_env.control.settings import RunSettings, far_enough, run_settings

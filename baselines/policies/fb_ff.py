@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.arrays import METRES_PER_SECOND, to_kmh
 from panto_env.base.errors import InputError, shown
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 
 from .feedback import ForceLaw, number, time_constant
 from .lanes_law import Array, Gain, Observations, Source, TunableLaw

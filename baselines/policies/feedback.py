@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import shown
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 
 from .lanes_law import Array, Gain, Observations, Source, TunableLaw
 

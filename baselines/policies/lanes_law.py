@@ -20,7 +20,7 @@ from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
 from panto_env.catalog.content import is_entry
 from panto_env.catalog.drawn_lines import DRAWN
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.plant.catenary.schema import CatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.state import Place

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.build import STRIP_STIFFNESS, matrices
 

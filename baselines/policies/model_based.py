@@ -9,7 +9,7 @@ import numpy as np
 
 from panto_env.base.arrays import one_thread
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.estimation.kalman import steady_gain
 
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw

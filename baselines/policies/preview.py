@@ -15,7 +15,7 @@ from panto_env.base.arrays import to_kmh
 from panto_env.base.checksums import remembered
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings, run_settings
 from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.actuators.lagged import LaggedActuator

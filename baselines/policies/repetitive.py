@@ -12,7 +12,7 @@ from pydantic import Field
 
 from panto_env.base.errors import shown
 from panto_env.base.settings import NonNegative, Positive, Settings
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 
 from .lanes_law import Array, FromAverage, Gain, LanesLaw, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, RATE, LineModel, line_model, mean_line

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
 from panto_env.control.lines import draws_line, on_drawn_line
+from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings, far_enough
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.spans import chosen_spans

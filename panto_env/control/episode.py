@@ -16,10 +16,8 @@ from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.state import PerCollector, per_collector
 from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
-from .entries import AVERAGED, DEVIATIONS
-from .front import FrontArrays, front_arrays
-from .line_values import line_values
-from .memory import MemoryArrays, memory_arrays
+from .entries import AVERAGED, DEVIATIONS, line_values
+from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings

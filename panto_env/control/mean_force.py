@@ -18,9 +18,8 @@ from ..base.errors import AccuracyWarning, InputError
 from ..metrics.en50367 import largest_mean
 from ..metrics.spans import SpanChoice
 from ..plant.pantograph.schema import PantographData
-from .by_speed import BySpeed
 from .identity import NOT_OF_A_RUN
-from .kept import kept
+from .passive_run import BySpeed, kept
 from .settings import RunSettings, as_designed
 
 TOLERANCE = 0.05

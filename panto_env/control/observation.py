@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
 from ..base.errors import InputError, suggest
-from ..plant.alignment import in_spans
+from ..plant.alignment import Alignment, in_spans
+from ..plant.catenary.schema import CatenaryData
+from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
-from ..plant.train import place_on_line, stride
+from ..plant.train import Train, place_on_line, stride
 from .entries import (
     CENTRED,
     DEVIATIONS,
@@ -28,8 +30,7 @@ from .entries import (
     earlier,
     entries_of,
 )
-from .front import force_in_front
-from .memory import keep_and_recall
+from .memory import force_in_front, keep_and_recall
 from .state import NOW, NOW_ROWS, TASK_ROW
 
 READINGS = len(Reading)
@@ -225,3 +226,22 @@ def entry_of(episode, own, task, now, k):
     value = _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1])
     centre = episode.centre[k] + episode.slope[k] * now[NOW.STRIDE]
     return min(BOUND, max(-BOUND, (value - centre) * episode.per_unit[k]))
+
+
+@dataclass(frozen=True)
+class Context:
+    """Information about an episode that a policy may use, known at its start."""
+
+    layout: Layout  # of the observation
+    actions: int  # length of an action, each in -1..1
+    channels: tuple[int, ...]  # place where each action acts: 0 frame, 1 head
+    force_limit: float  # force of an action of 1 (N)
+    control_interval: float  # s
+    washout: float  # time constant (s) of what is subtracted from the actions, 0 for nothing
+    speed: float  # of the train, its mean where it drifts (m/s)
+    alignment: Alignment  # of the line
+    nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
+    catenary: CatenaryData
+    pantograph: PantographData
+    train: Train  # of which this is the pantograph ``collector``
+    collector: int  # counted from 0 in front

@@ -15,8 +15,8 @@ import torch
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
 from ..backend.columns import Columns, map_arrays
 from ..base.arrays import Array
-from .context import Context
 from .episode import Flags, Results
+from .observation import Context
 from .settings import RunSettings
 from .step import control_lane, control_steps
 from .task import Task

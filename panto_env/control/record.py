@@ -21,7 +21,7 @@ from ..plant.valid_range import LARGEST_HEIGHT, LARGEST_SPEED, Ending, reason
 from .identity import identity
 from .mean_force import named
 from .state import TaskRow
-from .task_state import TaskState
+from .stepping import TaskState
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force from its static value (N), ten times any real one: it has diverged."""

@@ -31,8 +31,7 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
 from ..plant.train import MOST_COLLECTORS, Train
 from .observation import OBSERVATIONS
-from .reward import REWARDS, Reward
-from .safety import CostWeights
+from .reward import REWARDS, CostWeights, Reward
 
 R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9

@@ -15,23 +15,18 @@ from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
-from .context import Context
-from .cost import Cost, arrays_of, run_cost
 from .entries import DEVIATIONS, ESTIMATED, EntryOptions
 from .episode import Flags, Results, new_episode
-from .extent import new_plant
-from .length import EpisodeLength
+from .length import Cost, EpisodeLength, arrays_of, new_plant, run_cost
 from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
-from .normalise import normalised
-from .observation import layout
-from .passive_run import ADVICE, PassiveRun
+from .observation import Context, layout
+from .passive_run import ADVICE, PassiveRun, normalised
 from .record import diverged, divergence, ending, trajectory
-from .reset import reset
-from .running_figures import figures_so_far, running_figures
+from .reset import LaneGenerators, reset
 from .settings import RunSettings
-from .start import LaneGenerators
 from .state import TaskRow
-from .task_state import TaskState
+from .step import figures_so_far, running_figures
+from .stepping import TaskState
 
 
 class Task(TaskState):

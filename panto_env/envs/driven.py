@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..analysis.simulation import let_act
 from ..base.errors import InputError
-from ..control.action import checked
+from ..control.arguments import checked
 from ..control.observation import BOUND
 from ..policies import errors_name, find_fitting_policy
 from .infos import REWARD

@@ -14,7 +14,7 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.machine import cores
 from ..control import Task
-from ..control.action import not_finite
+from ..control.arguments import not_finite
 from ..control.episode import Flags, Results
 from ..control.lines import draws_line
 from .episodes import Episodes

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
-from ..control.action import checked
+from ..control.arguments import checked
 from ..control.observation import BOUND
 from .infos import REWARD
 from .reset_arguments import checked_options

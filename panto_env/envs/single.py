@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ..base.arrays import to_kmh
 from ..base.errors import InputError
 from ..control import Context, Task
-from ..control.action import checked
-from ..control.arguments import takes
+from ..control.arguments import checked, takes
 from ..control.observation import BOUND
 from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory

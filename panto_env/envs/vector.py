@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..control import Context
-from ..control.action import checked
-from ..control.arguments import takes
+from ..control.arguments import checked, takes
 from ..control.episode import Flags
 from ..control.lines import draws_line
 from ..control.observation import BOUND

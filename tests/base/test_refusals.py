@@ -16,7 +16,7 @@ from panto_env.base.settings import parse
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.control import Task
-from panto_env.control.cost import SHARE
+from panto_env.control.length import SHARE
 from panto_env.control.settings import run_settings
 from panto_env.envs import BARE
 from panto_env.plant.catenary.flexible.model import FlexibleCatenary

@@ -25,7 +25,7 @@ from panto_baselines.policies.repetitive import LISTENING, Pace, Repetitive
 from panto_baselines.tuning.tune import MEAN_TOLERANCE, Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
 from panto_baselines.policies.feedback import Passive, Proportional, ProportionalDerivative
 from panto_env import InputError, simulate
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.envs import PantographEnv
 from panto_env.policies import Policy, find_policy, wishes
 

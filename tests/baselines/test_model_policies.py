@@ -28,7 +28,7 @@ from panto_baselines.policies.repetitive import LISTENING, Repetitive
 from panto_baselines.tuning.tune import Still, run_batch
 from panto_env import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
 from panto_env.estimation.kalman import steady_gain
 

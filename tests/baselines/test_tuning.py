@@ -43,7 +43,7 @@ from panto_baselines.tuning.tune import (
 )
 from panto_env import InputError, simulate
 from panto_env.control import Task
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
 
 Array = NDArray[np.float64]

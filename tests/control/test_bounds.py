@@ -14,7 +14,7 @@ from panto_env.analysis.pool import in_processes, in_threads
 from panto_env.base.settings import parse
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
-from panto_env.control.cost import LONGEST, Cost, in_words
+from panto_env.control.length import LONGEST, Cost, in_words
 from panto_env.control.settings import run_settings
 from panto_env.estimation.motion_file import read_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of

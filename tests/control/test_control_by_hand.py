@@ -10,7 +10,7 @@ from panto_env.catalog import load_catenary
 from panto_env.control import Task, passive_run
 from panto_env.control.lines import on_drawn_line, on_example
 from panto_env.control.record import LARGEST_DEVIATION, diverged, trajectory
-from panto_env.control.safety import add_to_limits
+from panto_env.control.reward import add_to_limits
 from panto_env.control.settings import run_settings
 from panto_env.control.state import NOW, Now, TaskRow
 from panto_env.plant.contact import shared_forces

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.control import kept
+from panto_env.control import passive_run as kept
 from panto_env.control.task import Task
 from panto_env.envs import BARE
 

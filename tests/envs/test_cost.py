@@ -6,7 +6,7 @@ import pytest
 
 from panto_env import InputError
 from panto_env.catalog import load_catenary
-from panto_env.control.safety import limits
+from panto_env.control.reward import limits
 from panto_env.envs import BARE
 from panto_env.metrics.low_pass import low_pass
 

@@ -21,7 +21,7 @@ from ...base.arrays import Array
 from ...base.errors import InputError
 from ...base.table import Table
 from ...control import Task
-from ...control.context import Context
+from ...control.observation import Context
 from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
 from ...metrics.spectrum import band_rms
