@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..control.arguments import checked
 from ..control.observation import BOUND
+from .episodes import checked_options
 from .infos import REWARD
-from .reset_arguments import checked_options
 from .settings import Whole
 from .single import PantographEnv
 

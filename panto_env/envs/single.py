@@ -16,12 +16,18 @@ from ..control.arguments import checked, takes
 from ..control.observation import BOUND
 from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
-from .description import described
-from .episodes import Episodes, with_longest_episode
+from .episodes import (
+    CopiedAlone,
+    Episodes,
+    InUse,
+    checked_options,
+    checked_seed,
+    one_at_a_time,
+    refuse,
+    with_longest_episode,
+)
 from .infos import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
-from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
-from .reset_arguments import checked_options, checked_seed
-from .settings import OF_VECTORS, EnvironmentSettings, Whole, render_metadata
+from .settings import OF_VECTORS, EnvironmentSettings, Whole, described, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer

@@ -20,11 +20,17 @@ from ..control.lines import draws_line
 from ..control.observation import BOUND
 from ..control.on_device import TensorLanes
 from ..control.settings import read_settings
-from .episodes import with_longest_episode
+from .episodes import (
+    CopiedAlone,
+    InUse,
+    check_whole_trains,
+    checked_options,
+    checked_seed,
+    one_at_a_time,
+    with_longest_episode,
+)
 from .infos import REWARD, lane_figures, lane_infos
 from .lanes import Answer
-from .one_thread import CopiedAlone, InUse, one_at_a_time
-from .reset_arguments import check_whole_trains, checked_options, checked_seed
 from .settings import TensorSettings, render_metadata
 from .vector import SharedByLanes
 

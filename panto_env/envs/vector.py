@@ -1,7 +1,8 @@
-"""The native vector environment: many lanes in one kernel call."""
+"""A clear error for a vector environment that is passed directly to Stable-Baselines3."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -21,17 +22,38 @@ from ..control.episode import Flags
 from ..control.lines import draws_line
 from ..control.observation import BOUND
 from ..control.settings import read_settings
-from .episodes import with_longest_episode
-from .groups import lanes_of
+from .episodes import (
+    CopiedAlone,
+    InUse,
+    check_whole_trains,
+    checked_options,
+    checked_seeds,
+    one_at_a_time,
+    with_longest_episode,
+)
 from .infos import REWARD, lane_figures, lane_infos
-from .lanes import Answer
-from .one_thread import CopiedAlone, InUse, one_at_a_time
-from .reset_arguments import check_whole_trains, checked_options, checked_seeds
+from .lanes import Answer, lanes_of
 from .settings import VectorSettings, Whole, render_metadata
-from .stable_baselines import NamedToStableBaselines
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
+
+
+class NamedToStableBaselines(type):
+    """Class of the vector environment.
+
+    Stable-Baselines3 has its own kind of vector environment and refuses all others with a message about
+    OpenAI Gym. Before that it only prints the environment's class.
+    """
+
+    def __repr__(cls) -> str:
+        if sys._getframe(1).f_globals.get("__name__", "").startswith("stable_baselines3."):
+            raise InputError(
+                "Stable-Baselines3 takes a vector environment of Gymnasium inside a VecEnv: "
+                "from panto_agents.lanes import PantographVecEnv, and give it "
+                "PantographVecEnv(gymnasium.make_vec(...))."
+            )
+        return super().__repr__()
 
 
 class SharedByLanes(Whole):

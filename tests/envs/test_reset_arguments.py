@@ -8,7 +8,7 @@ import pytest
 
 from panto_env import InputError
 from panto_env.envs import PantographEnv, PantographVectorEnv
-from panto_env.envs.reset_arguments import checked_options, checked_seed, checked_seeds
+from panto_env.envs.episodes import checked_options, checked_seed, checked_seeds
 
 SEEDS = [0, 1, np.int64(3), np.uint8(7), 2**70]
 WRONG = [-1, np.int32(-2), 1.5, 1.0, np.float64(2), "1", "many", b"1", True, False, np.bool_(True), 1j, (1,)]

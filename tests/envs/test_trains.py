@@ -12,7 +12,7 @@ import panto_env
 from panto_env import InputError
 from panto_env.analysis.simulation import OFF_LINE
 from panto_env.envs import DrivenByPolicies
-from panto_env.envs.ids import IDS
+from panto_env.envs.settings import IDS
 from panto_env.plant.state import Row
 from panto_env.policies import find_policy
 
