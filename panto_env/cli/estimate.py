@@ -25,10 +25,9 @@ from ..terminal import (
 from .identify import pairs
 
 if TYPE_CHECKING:
-    from ..estimation.estimate import Estimate
+    from ..estimation.estimate import Estimate, Score
+    from ..estimation.model import EstimatorSettings
     from ..estimation.motion import Motion
-    from ..estimation.score import Score
-    from ..estimation.settings import EstimatorSettings
     from ..plant.pantograph.schema import PantographData
 
 TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
@@ -99,9 +98,9 @@ def estimate(
     from ..base.settings import parse
     from ..catalog import load_pantograph
     from ..estimation.estimate import estimate as run
-    from ..estimation.motion_file import read_motion
+    from ..estimation.model import EstimatorSettings
+    from ..estimation.motion import read_motion
     from ..estimation.plausibility import rezeroed
-    from ..estimation.settings import EstimatorSettings
 
     known = load_pantograph(pantograph)
     metres = None if speed is None else from_kmh(speed)
@@ -120,7 +119,7 @@ def estimate(
     given = {key: value for key, value in given.items() if value is not None}
     settings = parse(EstimatorSettings, given, "settings")
     if tune:
-        from ..estimation.tuning import tune as find
+        from ..estimation.estimate import tune as find
 
         names = TUNED if only else (*TUNED, "velocity_noise")
         with progress_console.status("tuning"):
@@ -190,7 +189,7 @@ def _figures(found: Estimate) -> dict[str, float]:
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:
     """Comparison with the record's contact force, if any, in bands for which the record is long enough."""
-    from ..estimation.score import BANDS, score
+    from ..estimation.estimate import BANDS, score
 
     if motion.contact_force is None:
         return []

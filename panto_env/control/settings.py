@@ -19,7 +19,7 @@ from ..base.errors import InputError, shown, suggest
 from ..base.settings import Between, parse, plain, sentence
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
-from ..estimation.settings import ESTIMATORS, EstimatorSettings
+from ..estimation.model import ESTIMATORS, EstimatorSettings
 from ..metrics.spans import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData

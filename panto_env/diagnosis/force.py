@@ -11,10 +11,10 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from ..estimation.estimate import filter_motion, gains_of, model_of
+from ..estimation.kalman import smooth_force
+from ..estimation.model import EstimatorSettings
 from ..estimation.motion import Motion, measure, on_frame, warn_of_wind
 from ..estimation.plausibility import check_motion
-from ..estimation.settings import EstimatorSettings
-from ..estimation.smoother import smooth_force
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData

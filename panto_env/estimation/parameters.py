@@ -18,10 +18,9 @@ from ..base.errors import InputError, suggest
 from ..plant.pantograph.schema import PantographData
 from .estimate import filter_motion, first_settled, model_of
 from .kalman import corrected, correction, steady_gains
-from .model import Model
+from .model import PAPER2, EstimatorSettings, Model
 from .motion import Motion
 from .plausibility import check_motion
-from .settings import PAPER2, EstimatorSettings
 
 HEAD_MASS = "masses.1"
 LIFT = "lift"

@@ -8,7 +8,7 @@ from ..base.arrays import Array
 from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
 from ..metrics.low_pass import zero_phase_low_pass
 from .estimate import Estimate
-from .verdict import window_bound
+from .innovations import window_bound
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,8 +18,7 @@ from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_re
 from ..plant.sensors.noise import AHEAD
 from ..plant.state import ROW, Row
 from .kalman import steady_gain
-from .model import build_model
-from .settings import EstimatorSettings
+from .model import EstimatorSettings, build_model
 
 LONGEST_INTERVAL = 1.25e-3
 """Between two samples of the filter (s)."""

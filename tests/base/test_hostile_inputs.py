@@ -28,7 +28,7 @@ from panto_env.catalog import load_catenary, load_family, load_pantograph, load_
 from panto_env.catalog.loader import text_of
 from panto_env.cli.catalogue import described
 from panto_env.control.settings import run_settings
-from panto_env.estimation.motion_file import read_motion
+from panto_env.estimation.motion import read_motion
 from panto_env.identification.record_file import read_record
 
 TOML = {

@@ -13,7 +13,7 @@ from panto_env import InputError, simulate
 from panto_env.base.settings import Between, dotted, parse, ranges_of
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.estimation.force import FORCE_MODELS, as_force_model
-from panto_env.estimation.settings import EstimatorSettings
+from panto_env.estimation.model import EstimatorSettings
 from panto_env.plant.actuators import ACTUATORS, actuator_settings
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.line_condition import LineCondition

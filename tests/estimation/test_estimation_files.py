@@ -10,9 +10,8 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.cli.estimate import _scores_table
-from panto_env.estimation.motion import measure
-from panto_env.estimation.motion_file import read_motion, write_motion
-from panto_env.estimation.score import Score
+from panto_env.estimation.estimate import Score
+from panto_env.estimation.motion import measure, read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
 from ..command import panto

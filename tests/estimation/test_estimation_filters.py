@@ -13,14 +13,14 @@ from panto_env.estimation.kalman import (
     Gains,
     force_variance,
     run_filter,
+    smooth_force,
+    smoothed_variance,
     steady_covariance,
     steady_gain,
     steady_gains,
     time_varying_gains,
 )
-from panto_env.estimation.model import build_model
-from panto_env.estimation.settings import EstimatorSettings
-from panto_env.estimation.smoother import smooth_force, smoothed_variance
+from panto_env.estimation.model import EstimatorSettings, build_model
 
 PANTOGRAPH = load_pantograph("own-two-mass")
 N = 14

@@ -9,8 +9,7 @@ from scipy.signal import welch
 from panto_env.base.errors import InputError
 from panto_env.catalog import available, load_pantograph
 from panto_env.estimation.force import FORCE_MODELS, Periodic, RandomWalk, Shaped, as_force_model
-from panto_env.estimation.model import build_model
-from panto_env.estimation.settings import PAPER2, EstimatorSettings
+from panto_env.estimation.model import PAPER2, EstimatorSettings, build_model
 
 from ..pantograph_alone import equations
 

@@ -10,12 +10,11 @@ from panto_env import simulate
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
 from panto_env.estimation.estimate import estimate
-from panto_env.estimation.innovations import Consistency, Whiteness
+from panto_env.estimation.innovations import Consistency, Whiteness, judge
+from panto_env.estimation.model import EstimatorSettings
 from panto_env.estimation.motion import measure
 from panto_env.estimation.parameters import changed
 from panto_env.estimation.plausibility import check_motion, rezeroed, suspension_offset
-from panto_env.estimation.settings import EstimatorSettings
-from panto_env.estimation.verdict import judge
 
 TRUE = load_pantograph("own-two-mass")
 

@@ -9,13 +9,11 @@ from scipy.signal import butter, freqz_sos
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
-from panto_env.estimation.estimate import estimate, model_of
+from panto_env.estimation.estimate import estimate, model_of, phases, score
 from panto_env.estimation.force import RandomWalk
-from panto_env.estimation.inertia import CUTOFF, ORDER, inertia_corrected
+from panto_env.estimation.model import EstimatorSettings
 from panto_env.estimation.motion import Motion
-from panto_env.estimation.score import phases, score
-from panto_env.estimation.settings import EstimatorSettings
-from panto_env.estimation.unknown_input import _gain, _system, unknown_input
+from panto_env.estimation.unknown_input import CUTOFF, ORDER, _gain, _system, inertia_corrected, unknown_input
 from panto_env.metrics.low_pass import low_pass
 
 from ..pantograph_alone import equations

@@ -5,8 +5,8 @@ import pytest
 
 from panto_env import InputError
 from panto_env.base.record_columns import LENGTHS, TIME
-from panto_env.estimation.motion_file import COLUMNS, FORCES, SHORTEST, SPEEDS, read_motion
-from panto_env.estimation.score import phases
+from panto_env.estimation.estimate import phases
+from panto_env.estimation.motion import COLUMNS, FORCES, SHORTEST, SPEEDS, read_motion
 
 FACTORS = {"m": 1.0, "mm": 1e-3, "m/s": 1.0, "mm/s": 1e-3, "N": 1.0, "kN": 1e3}
 FACTORS |= dict.fromkeys(("um", "µm", "μm"), 1e-6)

@@ -15,8 +15,7 @@ from panto_baselines.dataset.make import write_checksums
 from panto_env import simulate
 from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of
-from panto_env.estimation.motion import measure
-from panto_env.estimation.motion_file import write_motion
+from panto_env.estimation.motion import measure, write_motion
 from panto_env.fitting.measured import BANDS
 from panto_env.fitting.stored import Stored, store
 from panto_env.fitting.values import Value

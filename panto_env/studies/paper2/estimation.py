@@ -17,9 +17,9 @@ from ...analysis.pool import Progress, in_processes
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...catalog import load_pantograph
-from ...estimation.estimate import estimate
+from ...estimation.estimate import BANDS, Score, estimate, score
 from ...estimation.force import FORCE_MODELS, RandomWalk, as_force_model
-from ...estimation.inertia import inertia_corrected
+from ...estimation.model import PAPER2, EstimatorSettings
 from ...estimation.motion import DISPLACEMENT_NOISE, VELOCITY_NOISE, Motion, measure
 from ...estimation.parameters import (
     LIFT,
@@ -29,9 +29,7 @@ from ...estimation.parameters import (
     information,
     parameter_names,
 )
-from ...estimation.score import BANDS, Score, score
-from ...estimation.settings import PAPER2, EstimatorSettings
-from ...estimation.unknown_input import unknown_input
+from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.build import with_scatter
 from ...plant.pantograph.schema import PantographData

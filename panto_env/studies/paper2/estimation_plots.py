@@ -9,8 +9,8 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.plotting import ORANGE, legend_above, series_colour
+from ...estimation.estimate import COHERENT, phases
 from ...estimation.motion import Motion
-from ...estimation.score import COHERENT, phases
 from .estimation import MISMATCH, OBSERVATIONS, SPEED_KMH, START
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ...base.table import Table
 from ...catalog import load_pantograph
-from ...estimation.score import BANDS, Score
+from ...estimation.estimate import BANDS, Score
 from ...terminal import number
 from ..study import Comparison
 from .estimation import MISMATCH, OBSERVATIONS, PANTOGRAPH, SEEDS, SPEED_KMH, Case, ParameterInformation
