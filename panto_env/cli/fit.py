@@ -88,8 +88,8 @@ def fit(
     from ..catalog import load_catenary, load_pantograph
     from ..fitting import fit as fits
     from ..fitting.fitted_line import check_design
-    from ..fitting.kept import SUFFIX, identity_of, kept
-    from ..fitting.kept import keep as keep_state
+    from ..fitting.stored import SUFFIX, identity_of, kept
+    from ..fitting.stored import keep as keep_state
     from ..fitting.values import USUAL
     from ..records.record_file import read_record
 

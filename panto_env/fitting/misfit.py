@@ -19,8 +19,7 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..base.machine import cores
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
-from .measured import BANDS, Measured, between
-from .passes import Passes, Variant
+from .passes import BANDS, Measured, Passes, Variant, between
 from .values import Values
 
 OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0}

@@ -1,7 +1,8 @@
-"""What a fit knows, in a file: its values and how uncertain they are, singly and together."""
+"""Why a fit is less sure than it says."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,10 +16,74 @@ from ..base.arrays import Array
 from ..base.checksums import read_arrays, write_arrays
 from ..base.errors import InputError
 from ..base.settings import Between, Settings, explain
-from .doubts import doubts
-from .fit import Fit
-from .measured import BANDS
+from ..records.record import Record
+from .fit import WHITE, Fit
+from .misfit import OWN, State
+from .passes import BANDS
 from .values import FREE, WAVES, Value
+
+STRANGE = 0.3
+"""Share of a force that is left, by standard deviation, from which on the fit is called wrong. Own choice."""
+
+
+def doubts(fit: Fit) -> list[str]:
+    """Sentences on what makes the values of a fit, or their intervals, wrong or less reliable."""
+    found = [*fit.problem.of_records, *fit.problem.notes]
+    strange = [
+        part.name
+        for part, (before, after) in zip(fit.parts, fit.left, strict=True)
+        if after > STRANGE * before
+    ]
+    if strange:
+        found.append(
+            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or "
+            "its positions may be wrong by half a span or more; the values mean nothing then."
+        )
+    unlike = [
+        part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
+    ]
+    if unlike:
+        found.append(
+            f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
+            "intervals are too narrow."
+        )
+    if not fit.solution.settled:
+        found.append("The fit has not settled; intervals are not to be relied on.")
+    return found
+
+
+KEPT_ARRAYS = ("x", "static_forces", "noise")
+SUFFIX = ".fit"
+"""Of the file, behind the name of the output."""
+
+
+def identity_of(records: Sequence[Record], settings: dict[str, Any]) -> dict[str, Any]:
+    """What a fit is of: records by their samples, and settings as plain data."""
+    digest = hashlib.sha256()
+    for record in records:
+        for piece in record.pieces:
+            for series in (piece.position, piece.force):
+                digest.update(np.ascontiguousarray(series).tobytes())
+    return {"records": digest.hexdigest(), "own": list(OWN), **settings}
+
+
+def keep(path: Path, state: State, identity: dict[str, Any]) -> None:
+    """Write where a fit is. Raises InputError where that cannot be written."""
+    arrays = {name: np.ascontiguousarray(getattr(state, name)) for name in KEPT_ARRAYS}
+    write_arrays(path, identity | {"steps": state.steps}, arrays)
+
+
+def kept(path: Path, identity: dict[str, Any]) -> State | None:
+    """Where the same fit was broken off; None where no file, or another fit's, is there."""
+    try:
+        table, arrays = read_arrays(path)
+    except (OSError, ValueError):
+        return None
+    steps = table.pop("steps", None)
+    if table != identity or set(arrays) != set(KEPT_ARRAYS) or not isinstance(steps, int):
+        return None
+    return State(**arrays, steps=steps)
+
 
 ARRAYS = ("difference", "covariance", "noise")
 Place = Annotated[float, Between(-1e7, 1e7, "m")]

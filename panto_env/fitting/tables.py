@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.table import Alarm, Table
 from ..terminal import number
-from .doubts import doubts
 from .fit import INTERVAL, WHITE, Fit, Found
+from .stored import doubts
 from .values import FREE
 
 NAMES = {

@@ -12,8 +12,8 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.diagnosis import diagnose_records
 from panto_env.diagnosis.measured_passes import HEALTHY, measured_passes
 from panto_env.fitting import problem as preparing
-from panto_env.fitting.measured import BANDS
 from panto_env.fitting.misfit import OWN
+from panto_env.fitting.passes import BANDS
 from panto_env.fitting.stored import Stored, store
 from panto_env.plant.numerics import Numerics
 from panto_env.records.measured import measured

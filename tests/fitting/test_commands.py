@@ -11,9 +11,9 @@ import pytest
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import text_of
 from panto_env.cli.fit import fit as command
-from panto_env.fitting.kept import identity_of, keep, kept
 from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import Fitting
+from panto_env.fitting.stored import identity_of, keep, kept
 from panto_env.fitting.values import USUAL
 from panto_env.records.record_file import read_record, write_record
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from panto_env.fitting.kept import identity_of, keep, kept
 from panto_env.fitting.misfit import State
+from panto_env.fitting.stored import identity_of, keep, kept
 from panto_env.records.record import Piece, Record
 
 SETTINGS = {"free": ["droppers"], "tolerances": {"droppers": 0.01}, "line": "{}"}

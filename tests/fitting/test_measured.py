@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.measured import BANDS, HIGHEST, PER_SECOND, Measured, between, measured
+from panto_env.fitting.passes import BANDS, HIGHEST, PER_SECOND, Measured, between, measured
 from panto_env.records.record import Piece
 
 SPEED, SPAN = 60.0, 60.0

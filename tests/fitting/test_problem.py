@@ -10,8 +10,7 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.fit import fit
-from panto_env.fitting.problem import END, problem
-from panto_env.fitting.start import LEAD
+from panto_env.fitting.problem import END, LEAD, problem
 from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES

@@ -7,10 +7,9 @@ import pytest
 
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.fit import WHITE
-from panto_env.fitting.measured import BANDS
-from panto_env.fitting.normal import normal
+from panto_env.fitting.passes import BANDS
 from panto_env.fitting.problem import problem
-from panto_env.fitting.solve import SURE, Solution
+from panto_env.fitting.solve import SURE, Solution, normal
 from panto_env.plant.numerics import Numerics
 
 LEFT = 0.7

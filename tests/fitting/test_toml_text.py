@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.toml_text import with_table, with_value
+from panto_env.fitting.fitted_line import with_table, with_value
 
 TEXT = """\
 # A line.

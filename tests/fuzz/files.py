@@ -16,7 +16,7 @@ from panto_env import simulate
 from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of
 from panto_env.estimation.motion import measure, write_motion
-from panto_env.fitting.measured import BANDS
+from panto_env.fitting.passes import BANDS
 from panto_env.fitting.stored import Stored, store
 from panto_env.fitting.values import Value
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
