@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..base.errors import InputError
-from ..identification.pantograph_file import SUFFIXES, check_possible
+from ..identification.performance import SUFFIXES, check_possible
 from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable, written_last
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _by_short_name(by_method: Mapping[str, T]) -> dict[str, T]:
 
 
 def _print(identified: Identification, matches: list[Match], method: str) -> None:
-    from ..identification.tables import matches_table, parameters_table
+    from ..identification.performance import matches_table, parameters_table
 
     print_table(parameters_table(_by_short_name(identified.fits), identified.band))
     for fit in identified.fits.values():

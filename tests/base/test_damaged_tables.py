@@ -11,7 +11,7 @@ from panto_baselines.dataset.make import LIST, verify
 from panto_env import InputError
 from panto_env.cluster.parts import IDENTITY, open_parts
 from panto_env.estimation.motion import read_motion
-from panto_env.identification.record_file import read_record
+from panto_env.identification.record import read_record
 
 TRAINING = {
     "algorithm": "ppo",

@@ -29,7 +29,7 @@ from panto_env.catalog.loader import text_of
 from panto_env.cli.catalogue import described
 from panto_env.control.settings import run_settings
 from panto_env.estimation.motion import read_motion
-from panto_env.identification.record_file import read_record
+from panto_env.identification.record import read_record
 
 TOML = {
     "catenary": load_catenary,

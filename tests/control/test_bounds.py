@@ -18,7 +18,7 @@ from panto_env.control.length import LONGEST, Cost, in_words
 from panto_env.control.settings import run_settings
 from panto_env.estimation.motion import read_motion
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of
-from panto_env.identification.band import band_limited
+from panto_env.identification.response import band_limited
 from panto_env.plant.catenary.flexible import static as static_shape
 
 

@@ -30,7 +30,7 @@ from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import load_family, load_section, text_of
 from panto_env.catalog.masts import line_from_masts
 from panto_env.estimation.motion import read_motion
-from panto_env.identification.record_file import read_record
+from panto_env.identification.record import read_record
 from panto_env.rig.computer import load_rig
 from panto_env.studies import Comparison, Outcome
 from panto_env.studies import write as write_study

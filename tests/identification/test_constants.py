@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from panto_env.identification.fit import CONFIDENCE, Fit, Z
-from panto_env.identification.model import IDENTIFIED, UNITS
+from panto_env.identification.model import CONFIDENCE, IDENTIFIED, UNITS, Fit, Z
 
 
 def fit(values, std):

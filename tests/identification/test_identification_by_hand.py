@@ -23,15 +23,14 @@ from panto_env.identification import (
     add_noise,
     band_limited,
     clean_record,
-    coverage,
     equations,
     fit_equation_error,
     parameters_of,
     run_trials,
     write_pantograph,
 )
-from panto_env.identification.equation_error import solve
-from panto_env.identification.output_error import Misfit
+from panto_env.identification import experiments as coverage
+from panto_env.identification.methods import Misfit, solve
 from panto_env.identification.plausibility import _check_time, check_record
 
 from ..command import panto

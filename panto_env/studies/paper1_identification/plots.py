@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
-from ...identification.equation_error import equations
+from ...identification.methods import equations
 from ...identification.plots import plot_matches, plot_record
 from .published import PUBLISHED
 
