@@ -73,8 +73,8 @@ def diagnose(
 
     With --fit, the force of a record is compared with that of runs simulated on the fitted line.
     """
-    from ..diagnosis.tables import findings_table, verdict
-    from ..diagnosis.threshold import FALSE_ALARMS
+    from ..diagnosis.diagnosis import findings_table, verdict
+    from ..diagnosis.features import FALSE_ALARMS
 
     if (healthy is None) == (fit is None):
         raise InputError(

@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 
 from ..base.arrays import Array
+from .features import Evidence
 from .passes import Passes
-from .places import Evidence
 
 WINDOW = 8.0
 """Length (m) over which the energy of the whitened remainder is taken: about a dropper interval."""

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..base import plotting as marks
 from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
-from .diagnosis import Diagnosis
-from .tables import place
+from .diagnosis import Diagnosis, place
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -30,7 +30,9 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         return found
 
     monkeypatch.setattr("panto_env.diagnosis.diagnose", judge)
-    monkeypatch.setattr("panto_env.diagnosis.tables.verdict", lambda found: ["It is healthy.", "So it is."])
+    monkeypatch.setattr(
+        "panto_env.diagnosis.diagnosis.verdict", lambda found: ["It is healthy.", "So it is."]
+    )
     words = ("diagnose", "run", "--healthy", "a", "b", "c", "--again", "d", "--seed", 4)
     done = panto(*words)
     assert done.returncode == 0
@@ -56,7 +58,7 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         assert (refused.returncode, sentence in refused.stderr) == (2, True)
 
     monkeypatch.setattr(
-        "panto_env.diagnosis.tables.findings_table", lambda found: Table("where", ("m",), (("93",),))
+        "panto_env.diagnosis.diagnosis.findings_table", lambda found: Table("where", ("m",), (("93",),))
     )
     titles = []
     monkeypatch.setattr("panto_env.diagnosis.plots.plot_diagnosis", lambda found, title: titles.append(title))

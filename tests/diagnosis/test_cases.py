@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from panto_env.diagnosis import training
-from panto_env.diagnosis.cases import (
+from panto_env.diagnosis.features import BROKEN, KINDS, LONG, OF_SORT, SHORT, TENSION, WORN, Sort
+from panto_env.diagnosis.training import (
     BEYOND,
     FIRST,
     SEVERITIES,
@@ -16,8 +17,6 @@ from panto_env.diagnosis.cases import (
     draw_defect,
     every_defect,
 )
-from panto_env.diagnosis.features import Sort
-from panto_env.diagnosis.kinds import BROKEN, KINDS, LONG, OF_SORT, SHORT, TENSION, WORN
 from panto_env.plant.line_condition import LineCondition
 
 TRACK = Track("en50318-2002", "dsa380", 200.0, 1, 0.0)

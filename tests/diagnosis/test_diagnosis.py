@@ -13,15 +13,35 @@ from typer.testing import CliRunner
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose
-from panto_env.diagnosis.cases import BROKEN, TENSION, Defect, Track, draw_defect, drive
 from panto_env.diagnosis.diagnosis import judge
-from panto_env.diagnosis.features import OFFSETS, Sort, candidates, features
+from panto_env.diagnosis.features import (
+    KINDS,
+    OFFSETS,
+    TRAINED,
+    Classifier,
+    Evidence,
+    Sort,
+    candidates,
+    cautious_threshold,
+    features,
+    regions,
+    threshold,
+    trained,
+)
 from panto_env.diagnosis.healthy import FLOOR, Healthy, _whiten
-from panto_env.diagnosis.kinds import KINDS, TRAINED, Classifier, trained
 from panto_env.diagnosis.passes import Passes, side_by_side
-from panto_env.diagnosis.places import Evidence, regions
-from panto_env.diagnosis.threshold import cautious_threshold, threshold
-from panto_env.diagnosis.training import NEAR, examples, fit, save
+from panto_env.diagnosis.training import (
+    BROKEN,
+    NEAR,
+    TENSION,
+    Defect,
+    Track,
+    draw_defect,
+    drive,
+    examples,
+    fit,
+    save,
+)
 from panto_env.plant.alignment import Alignment
 from panto_env.studies.paper2.diagnosis_cases import within_interval
 from panto_env.terminal import console
@@ -336,7 +356,7 @@ def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
     """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
     monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_EACH", 1)
     monkeypatch.setattr(
-        "panto_env.diagnosis.cases.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
+        "panto_env.diagnosis.training.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
     )
     shown, classes = examples(TRACK)
     assert set(classes) == {0, 1, KINDS.index("hard spot") + 1, KINDS.index("worn wire") + 1}

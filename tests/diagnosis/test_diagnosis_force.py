@@ -10,8 +10,8 @@ from panto_env import InputError, simulate
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose, estimated_force
-from panto_env.diagnosis.cases import Track, drive
-from panto_env.diagnosis.force import ESTIMATOR, RATE, known_pantograph
+from panto_env.diagnosis.passes import ESTIMATOR, RATE, known_pantograph
+from panto_env.diagnosis.training import Track, drive
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
 from panto_env.metrics.low_pass import zero_phase_low_pass

@@ -14,10 +14,9 @@ import pytest
 
 from panto_env.catalog import load_catenary
 from panto_env.diagnosis import diagnose
-from panto_env.diagnosis.cases import BROKEN, Defect, drive
-from panto_env.diagnosis.diagnosis import Diagnosis, Finding, judge
+from panto_env.diagnosis.diagnosis import Diagnosis, Finding, findings_table, judge, place, verdict
 from panto_env.diagnosis.healthy import Healthy
-from panto_env.diagnosis.tables import findings_table, place, verdict
+from panto_env.diagnosis.training import BROKEN, Defect, drive
 
 from .test_diagnosis import TRACK, made_up
 

@@ -20,8 +20,7 @@ from panto_env.analysis.plots import plot_run
 from panto_env.analysis.sweep import sweep
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.diagnosis.features import candidates
-from panto_env.diagnosis.places import Evidence, Region
+from panto_env.diagnosis.features import Evidence, Region, candidates
 from panto_env.plant.alignment import Alignment
 from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
 from panto_env.render.moment import moment_of

@@ -16,7 +16,7 @@ from panto_env.analysis.plots import plot_forces, plot_run
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_catenary
 from panto_env.diagnosis.diagnosis import Diagnosis, Finding
-from panto_env.diagnosis.places import Evidence
+from panto_env.diagnosis.features import Evidence
 from panto_env.diagnosis.plots import plot_diagnosis
 from panto_env.estimation.plots import plot_estimate
 from panto_env.identification.performance import Match

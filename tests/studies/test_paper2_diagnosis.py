@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from panto_env.diagnosis.cases import SEVERITIES, Track, draw_defect, every_defect
-from panto_env.diagnosis.kinds import BROKEN, TENSION
-from panto_env.diagnosis.training import LINES, PANTOGRAPH, SEEDS, SPEEDS_KMH
+from panto_env.diagnosis.features import BROKEN, TENSION
+from panto_env.diagnosis.training import (
+    LINES,
+    PANTOGRAPH,
+    SEEDS,
+    SEVERITIES,
+    SPEEDS_KMH,
+    Track,
+    draw_defect,
+    every_defect,
+)
 from panto_env.plant.line_condition import LineCondition
 from panto_env.studies.paper2 import diagnosis as study
 from panto_env.studies.paper2 import diagnosis_cases as judged

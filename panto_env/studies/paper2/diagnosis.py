@@ -17,10 +17,9 @@ from ...analysis.pool import Progress, in_processes
 from ...base.plotting import LIMIT, legend_above, series_colour
 from ...base.table import Table
 from ...diagnosis import diagnose
-from ...diagnosis.cases import Track, draw_defect, drive
-from ...diagnosis.kinds import BROKEN, RAISED, SPOT
+from ...diagnosis.features import BROKEN, FALSE_ALARMS, RAISED, SPOT
 from ...diagnosis.plots import plot_diagnosis
-from ...diagnosis.threshold import FALSE_ALARMS
+from ...diagnosis.training import Track, draw_defect, drive
 from ..study import Comparison, Outcome, Report
 from .diagnosis_cases import (
     HEALTHY,

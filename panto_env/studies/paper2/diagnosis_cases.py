@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...diagnosis.cases import Defect, Track, drive, every_defect
 from ...diagnosis.diagnosis import Diagnosis, judge
+from ...diagnosis.features import BROKEN, ECHOES, FALSE_ALARMS, TENSION
 from ...diagnosis.healthy import Healthy
-from ...diagnosis.kinds import BROKEN, TENSION
 from ...diagnosis.passes import Passes, side_by_side
-from ...diagnosis.places import ECHOES
-from ...diagnosis.threshold import FALSE_ALARMS
+from ...diagnosis.training import Defect, Track, drive, every_defect
 from ...metrics.trajectory import Trajectory
 
 LINES = ("en50318-2002", "benchmark-2015", "ln2")

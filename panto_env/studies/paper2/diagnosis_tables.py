@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...base.table import Table
-from ...diagnosis.cases import SEVERITIES
-from ...diagnosis.kinds import BROKEN, KINDS, TENSION
-from ...diagnosis.threshold import FALSE_ALARMS
+from ...diagnosis.features import BROKEN, FALSE_ALARMS, KINDS, TENSION
+from ...diagnosis.training import SEVERITIES
 from .diagnosis_cases import LINES, MEANS, SPEEDS_KMH, Case
 
 SURE = 0.9
