@@ -118,9 +118,8 @@ def record(
     the likely mistake.
     """
     from ..catalog import load_catenary
-    from ..records.judge import judge
+    from ..records.judge import FILE_HEADINGS, judge, plain, rows_of
     from ..records.record_file import read_record
-    from ..records.tables import FILE_HEADINGS, plain, rows_of
 
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
@@ -146,7 +145,7 @@ def record(
 
 
 def _print_record(found: Judgement, title: str) -> None:
-    from ..records.tables import part_tables, requirement_remarks, requirements_table, whole_table
+    from ..records.judge import part_tables, requirement_remarks, requirements_table, whole_table
 
     for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
         print_table(table)
@@ -203,7 +202,7 @@ def compare(
 
             later(partial(save_comparison_page, found, title), html)
         if json:
-            from ..records.compared import plain
+            from ..records.compare import plain
 
             print_json(plain(found))
         else:
@@ -213,7 +212,7 @@ def compare(
 
 
 def _print_comparison(found: Comparison, title: str) -> None:
-    from ..records.compared import (
+    from ..records.compare import (
         acceptance_table,
         criterion_notes,
         figures_table,

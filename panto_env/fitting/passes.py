@@ -29,8 +29,7 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from ..plant.state import SAMPLE_ROWS, Row, Samples
 from ..plant.train import Train
-from ..records.record import Piece
-from ..records.samples import local_speed
+from ..records.record import Piece, local_speed
 
 PER_SECOND = 50.0
 """Places at which forces are compared, per second of travel."""

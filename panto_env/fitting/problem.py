@@ -25,8 +25,7 @@ from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
 from ..plant.line_condition import DrawnLine, LineCondition, together
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
-from ..records.record import Piece, Record
-from ..records.samples import is_low_passed
+from ..records.record import Piece, Record, is_low_passed
 from .misfit import Part, forces_at
 from .passes import Measured, Passes, Variant, measured
 from .solve import Fitting

@@ -12,7 +12,9 @@ from ..base.table import Alarm, Table
 from ..report.charts import drawn
 from ..report.template import page_template
 from ..report.words import FILTER
-from . import compared, plots, tables
+from . import compare as compared
+from . import judge as tables
+from . import plots
 from .compare import Comparison
 from .judge import Judgement
 

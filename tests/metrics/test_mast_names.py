@@ -12,8 +12,7 @@ from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.dropper_table import dropper_table
 from panto_env.plant.line_condition import LINE_CONDITIONS
-from panto_env.records.compare import compare
-from panto_env.records.compared import spans_table
+from panto_env.records.compare import compare, spans_table
 from panto_env.records.judge import judge
 from panto_env.records.measured import measured
 from panto_env.report.findings import Findings

@@ -8,8 +8,7 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.metrics.low_pass import low_pass
-from panto_env.records.compare import compare
-from panto_env.records.compared import acceptance_table, shift_sentence, spans_table
+from panto_env.records.compare import acceptance_table, compare, shift_sentence, spans_table
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
 

@@ -10,13 +10,18 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
 from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.records.judge import force_spectrum, judge
+from panto_env.records.judge import (
+    force_spectrum,
+    judge,
+    part_tables,
+    requirement_remarks,
+    requirements_table,
+    whole_table,
+)
 from panto_env.records.measured import measured
 from panto_env.records.plots import draw_force
-from panto_env.records.record import Piece, Record
+from panto_env.records.record import SETTLING, Piece, Record, Samples
 from panto_env.records.record_file import read_record, write_record
-from panto_env.records.samples import SETTLING, Samples
-from panto_env.records.tables import part_tables, requirement_remarks, requirements_table, whole_table
 
 LINE = "en50318-2002"
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
+from panto_env.records.axes import BACK, runs_back
 from panto_env.records.judge import judge
-from panto_env.records.odometer import BACK, runs_back
 from panto_env.records.plausibility import check_speed
 from panto_env.records.record import Piece
 from panto_env.records.record_file import read_record
