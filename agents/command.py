@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich import table as rich_table
 
-from panto_env.analysis.options import with_settings
-from panto_env.analysis.requirements import print_criteria
+from panto_env.analysis.options import print_criteria, with_settings
 from panto_env.base.errors import InputError, listed
 from panto_env.base.files import make_folder
 from panto_env.base.table import Table

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports
+from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base import plotting as marks
 from panto_env.base.arrays import from_kmh
 from panto_env.base.plotting import LIMIT, series_colour
@@ -83,7 +83,7 @@ def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str])
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
     limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
     marks.fit_force_axis([axes], limit, en50367.maximum_source(run.line.system))
-    mark_supports(axes, run)
+    mark_supports_of_run(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
         xlabel=marks.POSITION,

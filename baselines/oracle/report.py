@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports
+from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base import plotting as marks
 from panto_env.base.plotting import BLUE, legend_above
 from panto_env.base.table import Table
@@ -144,7 +144,7 @@ def plot(oracle: Oracle) -> Figure:
             actuator.plot(position, values[inside], linewidth=0.9, label=label)
     actuator.set(ylabel="actuator force (N)", xlabel=marks.POSITION)
     for axis in (force, actuator):
-        mark_supports(axis, run)
+        mark_supports_of_run(axis, run)
         axis.set_xlim(position[0], position[-1])
     for each in oracle.searches:
         search.plot(

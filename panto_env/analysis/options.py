@@ -1,4 +1,4 @@
-"""The settings of a run as options of a command: names, defaults and help are stated only in the settings."""
+"""Printing of a run's requirements."""
 
 from __future__ import annotations
 
@@ -16,9 +16,20 @@ from typer.models import OptionInfo
 from ..base.errors import InputError
 from ..base.table import TABLES
 from ..control.settings import fields
+from ..metrics.criterion import Criterion, criteria_table, remarks
 from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
 from ..plant.numerics import Numerics
-from ..terminal import writable
+from ..terminal import console, print_table, writable
+
+
+def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
+    """Print the table of criteria with limits, then notes and values without limits."""
+    table = criteria_table(criteria, title)
+    if table.rows:
+        print_table(table)
+    for line in remarks(criteria):
+        console.print(line, soft_wrap=True)
+
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""

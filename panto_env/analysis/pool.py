@@ -1,18 +1,40 @@
-"""Many jobs on all cores, in processes or in threads, with results in the order of the jobs."""
+"""A worker process that ends with its parent."""
 
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 from typing import TypeVar
 
 from ..base.errors import InputError
 from ..base.machine import cores
-from .worker import end_with_parent
+
+ORPHANED = 1
+"""Exit status of a worker whose parent is gone."""
+
+
+def end_with_parent() -> None:
+    """End this worker as soon as its parent ends, for whatever reason: SIGKILL leaves no time for a message.
+
+    An interrupt from the keyboard, which every process of a command gets, is left to the parent.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_watch, name="panto-parent", daemon=True).start()
+
+
+def _watch() -> None:
+    parent = parent_process()
+    assert parent is not None  # a worker has one
+    wait([parent.sentinel])
+    os._exit(ORPHANED)  # in the middle of its work, for which nobody waits any more
+
 
 T = TypeVar("T")
 Job = Callable[[], T]

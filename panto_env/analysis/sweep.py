@@ -24,18 +24,21 @@ from ..metrics.labels import HEADINGS, LABELS, NUMBER
 from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..policies import find_policy, with_parameters
-from .parameters import change, check_name, parameter_label, parameter_names
-from .pool import Progress, check_passes, in_threads, workers_for
-from .simulation import simulate
-from .swept_train import (
+from .parameters import (
     DISTANCES,
+    change,
     changed_train,
+    check_name,
     distance_label,
     is_distance,
+    parameter_label,
+    parameter_names,
     placed,
     riding,
     with_distances,
 )
+from .pool import Progress, check_passes, in_threads, workers_for
+from .simulation import simulate
 
 SPEED = "speed_kmh"
 POLICY = "policy"

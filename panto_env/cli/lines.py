@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..analysis.requirements import print_criteria
+from ..analysis.options import print_criteria
 from ..base.errors import InputError
 from ..base.files import write_whole
 from ..base.settings import parse
@@ -83,8 +83,7 @@ def line(
         if output is not None and text is not None:
             later(_write, text, output)
         if plot is not None:
-            from ..analysis.line_plot import plot_line
-            from ..analysis.plots import save
+            from ..analysis.plots import plot_line, save
 
             later(save, plot_line(found), plot)
         if json:
@@ -153,7 +152,7 @@ def family(
     Each runs at the highest speed of its trains. Exits with 1 if a line is outside the family's or the
     section's own bands of what is plausible.
     """
-    from ..analysis.family import drawn_lines, facts, table
+    from ..analysis.line_check import drawn_lines, facts, table
 
     chosen = load_drawn(name)
     with counting("running") as progress:

@@ -10,8 +10,16 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from ..analysis.options import RENAMED, DroppersFile, FiguresFile, Seed, Spans, parse_spans, with_settings
-from ..analysis.requirements import print_criteria
+from ..analysis.options import (
+    RENAMED,
+    DroppersFile,
+    FiguresFile,
+    Seed,
+    Spans,
+    parse_spans,
+    print_criteria,
+    with_settings,
+)
 from ..metrics.labels import LABELS
 from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.spans import SpanChoice, in_words

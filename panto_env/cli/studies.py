@@ -13,8 +13,7 @@ from rich.markup import escape
 from rich.text import Text
 
 from .. import studies
-from ..analysis.options import Seed, Spans, parse_spans, with_settings
-from ..analysis.requirements import print_criteria
+from ..analysis.options import Seed, Spans, parse_spans, print_criteria, with_settings
 from ..base.checksums import with_checksum
 from ..base.errors import InputError
 from ..base.files import finite, make_folder

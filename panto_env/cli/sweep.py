@@ -12,12 +12,12 @@ import typer
 from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
+from ..analysis.parameters import with_distances
 from ..analysis.pool import MOST_PASSES
 from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
 from ..analysis.sweep_plots import pantographs_of
-from ..analysis.swept_train import with_distances
 from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.table import TABLES

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..analysis.saved_run import check_made_anew, is_saved_run, load_with_settings
-from ..analysis.simulation import simulate
+from ..analysis.simulation import check_made_anew, is_saved_run, load_with_settings, simulate
 from ..base.errors import InputError
 from ..control.settings import run_settings
 from ..metrics.trajectory import Trajectory

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..analysis.plots import mark_supports
+from ..analysis.plots import mark_supports_of_run
 from ..base import plotting as marks
 from ..base.plotting import legend_above, series_colour
 from ..metrics.low_pass import zero_phase_low_pass
@@ -48,7 +48,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
             axis.plot(run.position[shown], values[shown], label=who, **style)
         axis.set(ylabel=f"{label},\nwithout mean ({unit})", xlim=(begin, end))
         axis.grid(axis="y", color="0.92")
-        mark_supports(axis, first)
+        mark_supports_of_run(axis, first)
     legend_above(axes[0], 4)
     axes[2].set_xlabel(marks.POSITION)
     for k, (who, run) in enumerate(drawn.items()):

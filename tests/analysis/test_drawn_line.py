@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.family import drawn_line, table
-from panto_env.analysis.line_check import check
+from panto_env.analysis.line_check import check, drawn_line, table
 from panto_env.analysis.parameters import check_name
 from panto_env.analysis.sweep import sweep
 from panto_env.catalog import load_catenary, load_drawn

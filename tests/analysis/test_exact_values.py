@@ -7,9 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from panto_env.analysis import family
-from panto_env.analysis.family import LABELS, OF_SECTIONS, DrawnLine, drawn_line, facts, table
-from panto_env.analysis.line_check import LineCheck, SpanCheck, span_tables
+from panto_env.analysis import line_check as family
+from panto_env.analysis.line_check import (
+    LABELS,
+    OF_SECTIONS,
+    DrawnLine,
+    LineCheck,
+    SpanCheck,
+    drawn_line,
+    facts,
+    span_tables,
+    table,
+)
 from panto_env.base.table import Alarm
 from panto_env.catalog import load_catenary, load_drawn
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity

@@ -7,8 +7,8 @@ import pytest
 
 from panto_env import simulate
 from panto_env.analysis.line_check import check, elasticity_table, span_tables
-from panto_env.analysis.line_plot import plot_line
 from panto_env.analysis.parameters import parameter_names
+from panto_env.analysis.plots import plot_line
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.content import content_of
 from panto_env.catalog.en50119 import gradient_limits, highest_speed

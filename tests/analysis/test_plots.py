@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from panto_env import simulate
-from panto_env.analysis.plots import mark_supports, plot_forces, plot_run, say_what_is_hidden
+from panto_env.analysis.plots import mark_supports_of_run, plot_forces, plot_run, say_what_is_hidden
 from panto_env.analysis.sweep import sweep
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_pantograph
@@ -108,7 +108,7 @@ def test_a_panel_of_fixed_limits_says_what_it_hides():
 
 def test_supports_are_marked_up_to_the_end_of_the_last_span(run):
     axis = Figure().subplots()
-    mark_supports(axis, run)
+    mark_supports_of_run(axis, run)
     marked = [line.get_xdata()[0] for line in axis.lines]
     last = run.alignment.span_of(run.position[-1])
     assert marked == pytest.approx(run.alignment.support(np.arange(last + 1)))

@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import pytest
 
 from panto_env import InputError
-from panto_env.analysis import pool, worker
+from panto_env.analysis import pool
+from panto_env.analysis import pool as worker
 from panto_env.analysis.pool import collect, in_processes, in_threads, one_by_one, workers_for
 from panto_env.base.machine import cores
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
-from panto_env.analysis.saved_run import TOLERANCE, check_made_anew, is_saved_run, load_with_settings
+from panto_env.analysis.simulation import TOLERANCE, check_made_anew, is_saved_run, load_with_settings
 from panto_env.catalog.loader import text_of
 from panto_env.cli import make_app
 from panto_env.plant.alignment import Alignment

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from panto_env import InputError, simulate
-from panto_env.analysis import requirements
+from panto_env.analysis import options as requirements
+from panto_env.analysis.options import print_criteria
 from panto_env.analysis.plots import save
-from panto_env.analysis.requirements import print_criteria
 from panto_env.control.settings import fields
 from panto_env.metrics.criterion import Criterion
 

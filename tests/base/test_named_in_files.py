@@ -15,7 +15,7 @@ from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.benchmark.submission import replay
 from panto_baselines.dataset.settings import load_episodes
 from panto_env import InputError, policies, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.base.checksums import read_arrays, read_checked, write_arrays, write_checked
 from panto_env.base.settings import parse
 from panto_env.cli import make_app

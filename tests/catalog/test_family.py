@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.family import drawn_line
+from panto_env.analysis.line_check import drawn_line
 from panto_env.catalog import available, load_catenary, load_drawn, load_family, load_lines
 from panto_env.catalog.loader import text_of
 from panto_env.control.lines import on_drawn_line

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from panto_env import InputError, studies
-from panto_env.analysis import family as lines_of
+from panto_env.analysis import line_check as lines_of
 from panto_env.base.table import Table
 from panto_env.catalog import load_catenary, load_drawn
 from panto_env.studies import Comparison, Outcome

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.content import content_of
 from panto_env.catalog.loader import text_of

@@ -11,7 +11,8 @@ import numpy as np
 from panto_baselines.benchmark import plot as benchmark_plot
 from panto_baselines.benchmark.statistics import Cell
 from panto_baselines.oracle import report as oracle_report
-from panto_env.analysis import line_check, line_plot
+from panto_env.analysis import line_check
+from panto_env.analysis import plots as line_plot
 from panto_env.analysis.plots import plot_forces, plot_run
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_catenary

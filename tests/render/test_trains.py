@@ -9,7 +9,7 @@ import gymnasium
 
 import panto_env  # noqa: F401
 from panto_env import InputError, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.plant.state import Row

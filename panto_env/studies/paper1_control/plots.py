@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ...analysis.plots import mark_supports, say_what_is_hidden
+from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
 from ...base import plotting as marks
 from ...base.plotting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, legend_above, series_colour
 from ...metrics.labels import LABELS
@@ -90,7 +90,7 @@ def forces_along_line(speed: int) -> Figure:
     lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
     lower.set(ylabel="control force (N)", xlabel=marks.POSITION, ylim=(-110, 110))
     for axis in (upper, lower):
-        mark_supports(axis, active)
+        mark_supports_of_run(axis, active)
         legend_above(axis, 3)
     lower.set_xlim(active.alignment.limits(SHOWN_SPANS))
     for axis in (upper, lower):
