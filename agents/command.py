@@ -17,9 +17,8 @@ from panto_env.base.errors import InputError, listed
 from panto_env.base.files import make_folder
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
-from panto_env.metrics.criterion import worst
-from panto_env.metrics.labels import LABELS
-from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.metrics.compliance import worst
+from panto_env.metrics.figures import FIRST_SETTLED, LABELS
 from panto_env.terminal import (
     Json,
     Plot,

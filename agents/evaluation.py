@@ -11,8 +11,8 @@ import numpy as np
 
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
-from panto_env.metrics import spans
-from panto_env.metrics.criterion import Criterion
+from panto_env.metrics import figures as spans
+from panto_env.metrics.compliance import Criterion
 from panto_env.metrics.figures import Figures
 
 NOT_OF_A_PASS = ("speed_kmh", "reward", "cost", "distance", "spans", "run_in", "settle")

@@ -14,8 +14,7 @@ from panto_env import Trajectory
 from panto_env.base.arrays import Array
 from panto_env.base.checksums import checksum, read_arrays, write_arrays
 from panto_env.base.errors import InputError
-from panto_env.metrics.low_pass import CUTOFF, zero_phase_low_pass
-from panto_env.metrics.spectrum import amplitudes
+from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
 from panto_env.plant.alignment import Spans
 
 from .settings import Line

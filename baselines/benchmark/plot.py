@@ -10,10 +10,9 @@ from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base import plotting as marks
 from panto_env.base.arrays import from_kmh
 from panto_env.base.plotting import LIMIT, series_colour
-from panto_env.metrics import en50367
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics import compliance as en50367
+from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
-from panto_env.metrics.spans import in_words
 
 from .actions import Played
 from .run import Benchmark

@@ -18,8 +18,7 @@ from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.lines import fewest_spans, on_example
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.labels import HEADINGS
-from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.metrics.figures import FIRST_SETTLED, HEADINGS
 from panto_env.plant.catenary.schema import CLEAR
 
 from ..oracle.stored import stored_changes

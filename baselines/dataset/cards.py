@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from panto_env.control.observation import Layout
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.figures import LABELS
 
 from .designs import FIGURES, DesignsSettings
 from .episodes import COLUMNS, STEPS, Episode

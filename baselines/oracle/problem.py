@@ -24,8 +24,8 @@ from panto_env.control.length import arrays_of, check_record, whole_steps
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.mean_force import Trim
 from panto_env.control.settings import RunSettings, far_enough, run_settings
+from panto_env.metrics.figures import SpanChoice
 from panto_env.metrics.low_pass import low_pass_from, settled_at
-from panto_env.metrics.spans import SpanChoice
 from panto_env.plant.actuators import ActuatorSettings
 from panto_env.plant.actuators.lagged import LaggedActuator
 from panto_env.plant.state import SAMPLE_ROWS, Place, Row

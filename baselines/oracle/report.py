@@ -11,7 +11,7 @@ from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base import plotting as marks
 from panto_env.base.plotting import BLUE, legend_above
 from panto_env.base.table import Table
-from panto_env.metrics.spans import in_words
+from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 

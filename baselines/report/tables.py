@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 from panto_env.base.table import Table
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.figures import LABELS
 from panto_env.terminal import number
 
 from ..benchmark.overall import next_in_ranking, with_feedback

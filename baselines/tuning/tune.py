@@ -16,8 +16,8 @@ from panto_env.control import Task
 from panto_env.control.lines import draws_line, on_drawn_line
 from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings, far_enough
+from panto_env.metrics.figures import chosen_spans
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.spans import chosen_spans
 from panto_env.plant.state import Row
 from panto_env.policies import maker_of, parameters_of, policy_names
 

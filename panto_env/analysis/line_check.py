@@ -16,7 +16,7 @@ from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
 from ..catalog.family import LineFamily
 from ..catalog.section import LineSection
 from ..control.lines import line_generator, line_of_seed
-from ..metrics.criterion import Criterion
+from ..metrics.compliance import Criterion
 from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
 from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
 from ..plant.catenary.flexible.parts import index_at

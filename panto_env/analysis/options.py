@@ -16,8 +16,8 @@ from typer.models import OptionInfo
 from ..base.errors import InputError
 from ..base.table import TABLES
 from ..control.settings import fields
-from ..metrics.criterion import Criterion, criteria_table, remarks
-from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
+from ..metrics.compliance import Criterion, criteria_table, remarks
+from ..metrics.figures import FIRST_SETTLED, SpanChoice, check_spans
 from ..plant.numerics import Numerics
 from ..terminal import console, print_table, writable
 

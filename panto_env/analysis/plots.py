@@ -26,10 +26,9 @@ from ..base.plotting import (
     mark_supports,
     series_colour,
 )
-from ..metrics import en50367
-from ..metrics.figures import losses_of_contact
+from ..metrics import compliance as en50367
+from ..metrics.figures import SpanChoice, in_words, losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary.flexible.attached import dropper_positions

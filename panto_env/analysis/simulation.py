@@ -19,8 +19,8 @@ from ..control.identity import identity, settings_of
 from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..control.state import Result
+from ..metrics.figures import SpanChoice
 from ..metrics.low_pass import low_pass
-from ..metrics.spans import SpanChoice
 from ..metrics.trajectory import SUFFIXES, Trajectory
 from ..plant.catenary import CATENARIES
 from ..plant.state import Row

@@ -18,10 +18,8 @@ from ..base.table import write_rows
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
-from ..metrics.droppers import evaluated, near_train
-from ..metrics.figures import Figures
-from ..metrics.labels import HEADINGS, LABELS, NUMBER
-from ..metrics.spans import SpanChoice, in_words
+from ..metrics.by_span import evaluated, near_train
+from ..metrics.figures import HEADINGS, LABELS, NUMBER, Figures, SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..policies import find_policy, with_parameters
 from .parameters import (

@@ -11,8 +11,8 @@ from ..base import plotting as marks
 from ..base.arrays import from_kmh
 from ..base.errors import InputError
 from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
-from ..metrics import en50367
-from ..metrics.labels import LABELS, NUMBER
+from ..metrics import compliance as en50367
+from ..metrics.figures import LABELS, NUMBER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

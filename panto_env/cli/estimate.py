@@ -226,7 +226,7 @@ def _plain(
 def _print(
     found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
 ) -> None:
-    from ..metrics.labels import LABELS
+    from ..metrics.figures import LABELS
 
     rows: list[tuple[str, str, str]] = [
         (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()

@@ -20,9 +20,8 @@ from ..analysis.options import (
     print_criteria,
     with_settings,
 )
-from ..metrics.labels import LABELS
+from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
-from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import OUTPUTS, Trajectory
 from ..render.video import FILMS, write_film
 from ..terminal import (

@@ -23,7 +23,7 @@ from ..base.errors import InputError
 from ..base.table import TABLES
 from ..control.identity import plain
 from ..control.settings import run_settings
-from ..metrics.labels import LABELS, NUMBER
+from ..metrics.figures import LABELS, NUMBER
 from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")

@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 
 from ..base.errors import AccuracyWarning, InputError
-from ..metrics.en50367 import largest_mean
-from ..metrics.spans import SpanChoice
+from ..metrics.compliance import largest_mean
+from ..metrics.figures import SpanChoice
 from ..plant.pantograph.schema import PantographData
 from .identity import NOT_OF_A_RUN
 from .passive_run import BySpeed, kept

@@ -10,8 +10,7 @@ from pydantic import Field
 from ..backend import inlined
 from ..base.arrays import Array
 from ..base.settings import NonNegative, Settings
-from ..metrics.compliance import uplift_factor
-from ..metrics.en50367 import maximum_limit
+from ..metrics.compliance import maximum_limit, uplift_factor
 from ..plant.catenary.schema import CatenaryData
 from ..plant.state import ROW
 from .state import NOW, RESULT, TASK_ROW, TERM, TERMS

@@ -20,7 +20,7 @@ from ..base.settings import Between, parse, plain, sentence
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
 from ..estimation.model import ESTIMATORS, EstimatorSettings
-from ..metrics.spans import LAST_USUAL
+from ..metrics.figures import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError, shown
-from ..metrics.figures import Figures
-from ..metrics.spans import SpanChoice, settled_spans
+from ..metrics.figures import Figures, SpanChoice, settled_spans
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers

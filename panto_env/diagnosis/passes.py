@@ -18,8 +18,8 @@ from ..estimation.kalman import smooth_force
 from ..estimation.model import EstimatorSettings
 from ..estimation.motion import Motion, measure, on_frame, warn_of_wind
 from ..estimation.plausibility import check_motion
+from ..metrics.figures import FIRST_SETTLED
 from ..metrics.low_pass import CUTOFF, zero_phase_low_pass
-from ..metrics.spans import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Alignment
 from ..plant.pantograph.schema import PantographData

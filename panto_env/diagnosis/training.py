@@ -17,7 +17,7 @@ from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.files import write_whole
 from ..catalog import load_catenary, load_pantograph
-from ..metrics.spans import FIRST_SETTLED
+from ..metrics.figures import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition

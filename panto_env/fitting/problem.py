@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..metrics.spans import FIRST_SETTLED
+from ..metrics.figures import FIRST_SETTLED
 from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData

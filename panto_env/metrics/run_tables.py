@@ -14,15 +14,12 @@ from ..base.table import WORKBOOKS, Sheet, write_table, write_workbook
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
 from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
-from .by_span import HEADINGS as BY_SPAN
-from .by_span import by_span
-from .droppers import HEADINGS as MOVING
-from .droppers import moving_droppers
-from .labels import HEADINGS, LABELS, NUMBER
+from .by_span import DROPPER_HEADINGS as MOVING
+from .by_span import SPAN_HEADINGS as BY_SPAN
+from .by_span import STRETCH_HEADINGS as BY_STRETCH
+from .by_span import by_span, by_stretch, moving_droppers
+from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
-from .spans import SpanChoice, in_words
-from .stretches import HEADINGS as BY_STRETCH
-from .stretches import by_stretch
 from .trajectory import SERIES, Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"

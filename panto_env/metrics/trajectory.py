@@ -21,13 +21,10 @@ from ..base.errors import InputError
 from ..base.files import check_output, write_whole
 from ..plant.alignment import Alignment, Spans
 from ..plant.pantograph.schema import PantographData
-from .compliance import LineFacts, compliance
-from .criterion import Criterion
-from .droppers import evaluated, near_train
-from .en50367 import SLOW
-from .figures import Figures, arcing, contact_loss, cost_function
+from .by_span import evaluated, near_train
+from .compliance import SLOW, Criterion, LineFacts, compliance
+from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function
 from .low_pass import low_pass
-from .spans import SpanChoice, chosen_spans
 from .stored_run import check_stored
 
 FORMAT = 3

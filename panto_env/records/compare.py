@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..base.table import Table
-from ..metrics.criterion import Criterion, criteria_table
-from ..metrics.labels import LABELS
+from ..metrics.compliance import Criterion, criteria_table
+from ..metrics.figures import LABELS
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..terminal import number

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
 from ..base.table import Table
-from ..metrics.compliance import LineFacts, compliance
-from ..metrics.criterion import Criterion, criteria_table, remarks
-from ..metrics.figures import ARC, Figures, arcing, contact_loss
-from ..metrics.labels import HEADINGS, LABELS
-from ..metrics.spectrum import amplitudes
+from ..metrics.compliance import Criterion, LineFacts, compliance, criteria_table, remarks
+from ..metrics.figures import ARC, HEADINGS, LABELS, Figures, arcing, contact_loss
+from ..metrics.low_pass import amplitudes
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..metrics.low_pass import CUTOFF, low_pass, zero_phase_low_pass
-from ..metrics.spectrum import band_rms
+from ..metrics.low_pass import CUTOFF, band_rms, low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 
 

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from ..analysis.simulation import ready_pass, steps_of_policy
 from ..base.errors import InputError
-from ..metrics.figures import Figures
-from ..metrics.labels import LABELS
-from ..metrics.spans import in_words
+from ..metrics.figures import LABELS, Figures, in_words
 from ..metrics.trajectory import Trajectory
 from ..plant.state import Row
 from .filmed import Filmed, alike

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..control import Task
-from ..metrics import en50367
+from ..metrics import compliance as en50367
 from ..metrics.low_pass import low_pass
 from ..plant.alignment import Alignment
 from ..plant.catenary.view import LineView

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from ..base.arrays import Array, to_kmh
 from ..control import Task
-from ..metrics import en50367
+from ..metrics import compliance as en50367
 from ..plant.state import Row
 from .moment import Rider, felt, position_of, shown_collector, train_of
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..control import Task
 from ..control.state import TaskRow
-from ..metrics.labels import LABELS
+from ..metrics.figures import LABELS
 from .moment import moment_of
 from .picture import Picture
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..base import plotting as marks
 from ..base.plotting import BLUE, legend_above, series_colour
-from ..metrics import en50367
-from ..metrics.low_pass import zero_phase_low_pass
-from ..metrics.spectrum import amplitudes
+from ..metrics import compliance as en50367
+from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from .findings import Findings
 
 if TYPE_CHECKING:

@@ -12,13 +12,10 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.table import Table
 from ..catalog import unusual
-from ..metrics.by_span import SpanFigures, by_span
-from ..metrics.criterion import Criterion
-from ..metrics.droppers import MovingDropper, moving_droppers
-from ..metrics.figures import Figures, losses_of_contact
+from ..metrics.by_span import MovingDropper, SpanFigures, StretchFigures, by_span, by_stretch, moving_droppers
+from ..metrics.compliance import Criterion
+from ..metrics.figures import Figures, SpanChoice, losses_of_contact
 from ..metrics.low_pass import low_pass
-from ..metrics.spans import SpanChoice
-from ..metrics.stretches import StretchFigures, by_stretch
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES

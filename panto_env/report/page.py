@@ -11,9 +11,8 @@ from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.files import PAGES, check_output, write_whole
 from ..catalog.values import values_of
-from ..metrics.criterion import limits_in_words, margin_in_words, value_in_words
-from ..metrics.labels import LABELS
-from ..metrics.spans import in_words
+from ..metrics.compliance import limits_in_words, margin_in_words, value_in_words
+from ..metrics.figures import LABELS, in_words
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
 from . import charts

@@ -11,8 +11,8 @@ import numpy as np
 from ..analysis.simulation import simulate
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..metrics.spans import SpanChoice
-from ..metrics.spectrum import in_band
+from ..metrics.figures import SpanChoice
+from ..metrics.low_pass import in_band
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.rig import RigData
 

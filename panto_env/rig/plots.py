@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..analysis.plots import mark_supports_of_run
 from ..base import plotting as marks
 from ..base.plotting import legend_above, series_colour
-from ..metrics.low_pass import zero_phase_low_pass
-from ..metrics.spectrum import amplitudes
+from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from .comparison import Pair
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from ..analysis.plots import save
 from ..base.checksums import write_checked
 from ..base.files import check_output, finite, make_folder
 from ..base.table import Table, write_rows
-from ..metrics.labels import HEADINGS
+from ..metrics.figures import HEADINGS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from panto_env.analysis import options as requirements
 from panto_env.analysis.options import print_criteria
 from panto_env.analysis.plots import save
 from panto_env.control.settings import fields
-from panto_env.metrics.criterion import Criterion
+from panto_env.metrics.compliance import Criterion
 
 SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 40.0}
 

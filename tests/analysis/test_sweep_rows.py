@@ -10,7 +10,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis import sweep as module
 from panto_env.analysis.sweep import labels, save, sweep
 from panto_env.analysis.sweep_plots import plot_sweep
-from panto_env.metrics.droppers import evaluated, near_train
+from panto_env.metrics.by_span import evaluated, near_train
 
 from ..command import panto
 

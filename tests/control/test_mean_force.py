@@ -13,7 +13,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task, mean_force, passive_mean, trim_of_pass
 from panto_env.control import passive_run as kept
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.en50367 import largest_mean
+from panto_env.metrics.compliance import largest_mean
 from panto_env.plant.state import Row
 
 from ..command import panto

@@ -8,7 +8,7 @@ import pytest
 from panto_env.control.mean_force import target_mean
 from panto_env.control.settings import run_settings
 from panto_env.control.task import _required_more
-from panto_env.metrics.en50367 import largest_mean
+from panto_env.metrics.compliance import largest_mean
 
 SPEEDS = np.array([50.0, 60.0, 70.0, 80.0])
 INSIDE = np.array([False, True, True, False])

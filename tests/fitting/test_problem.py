@@ -14,8 +14,8 @@ from panto_env.fitting.problem import END, LEAD, problem
 from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
+from panto_env.metrics.figures import FIRST_SETTLED
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.line_condition import LineCondition
 from panto_env.records.measured import measured
 from panto_env.records.record import Record

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from panto_env import InputError
-from panto_env.metrics import en50367
-from panto_env.metrics.criterion import Criterion
+from panto_env.metrics import compliance as en50367
+from panto_env.metrics.compliance import Criterion
 from panto_env.metrics.run_tables import _figure, _with_figures
 
 from .test_summary import RUN

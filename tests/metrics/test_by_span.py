@@ -9,8 +9,7 @@ import pytest
 from panto_env import simulate
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
-from panto_env.metrics.by_span import by_span
-from panto_env.metrics.droppers import moving_droppers
+from panto_env.metrics.by_span import by_span, moving_droppers
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData

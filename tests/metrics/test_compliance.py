@@ -10,10 +10,11 @@ import pytest
 from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.loader import FOLDERS
-from panto_env.metrics import en50367
-from panto_env.metrics.compliance import LineFacts, compliance
-from panto_env.metrics.criterion import (
+from panto_env.metrics import compliance as en50367
+from panto_env.metrics.compliance import (
     Criterion,
+    LineFacts,
+    compliance,
     criteria_table,
     limits_in_words,
     margin_in_words,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.metrics.droppers import moving_droppers
+from panto_env.metrics.by_span import moving_droppers
 from panto_env.report.findings import Findings
 
 from .test_compliance import by_key

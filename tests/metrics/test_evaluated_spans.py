@@ -8,7 +8,7 @@ import pytest
 from panto_env import InputError, Trajectory, simulate
 from panto_env.analysis.options import parse_spans
 from panto_env.analysis.sweep import sweep
-from panto_env.metrics.spans import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
+from panto_env.metrics.figures import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
 from panto_env.plant.alignment import Alignment
 from panto_env.studies.en50318 import start
 

@@ -4,8 +4,7 @@ from dataclasses import fields
 
 import pytest
 
-from panto_env.metrics.figures import Figures
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.figures import LABELS, Figures
 
 PER_SI = {"N": 1.0, "N/s": 1.0, "N m": 1.0, "%": 1.0, "m": 1.0, "mm": 1e3}
 """Units in which tables show figures, and what a figure of 1 is in them."""

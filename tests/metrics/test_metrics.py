@@ -5,8 +5,7 @@ import pytest
 from scipy import signal
 
 from panto_env import InputError
-from panto_env.metrics.figures import Figures, contact_loss, cost_function
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.figures import LABELS, Figures, contact_loss, cost_function
 from panto_env.metrics.low_pass import low_pass, low_pass_sections
 from panto_env.plant.alignment import Alignment
 

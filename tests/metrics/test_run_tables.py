@@ -5,8 +5,8 @@ import pytest
 
 from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog.loader import FOLDERS
-from panto_env.metrics.droppers import moving_droppers
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.by_span import moving_droppers
+from panto_env.metrics.figures import LABELS
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import save_droppers, save_figures
 from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest

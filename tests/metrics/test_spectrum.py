@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from panto_env.metrics.spectrum import amplitudes, band_rms, in_band
+from panto_env.metrics.low_pass import amplitudes, band_rms, in_band
 
 STEP = 1e-3
 TIME = STEP * np.arange(4000)

@@ -5,9 +5,9 @@ import pytest
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary
+from panto_env.metrics.by_span import by_stretch
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import of_stretches
-from panto_env.metrics.stretches import by_stretch
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from panto_env.analysis.sweep import sweep
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import FOLDERS
-from panto_env.metrics.spans import LAST_USUAL
+from panto_env.metrics.figures import LAST_USUAL
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER
 from panto_env.plant.catenary.flexible.segments import places

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.metrics.spectrum import in_band
+from panto_env.metrics.low_pass import in_band
 
 from ..notebook import LEARNING, UNSEEN_LINE, changes, executed, told
 

@@ -14,7 +14,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 from panto_env import InputError
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.figures import LABELS
 from panto_env.plant.state import Row
 from panto_env.render.film import Excerpt, frames
 from panto_env.render.filmed import alike, policy_pass

@@ -12,7 +12,7 @@ from scipy.signal import butter, lsim
 from panto_env import InputError, simulate
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.metrics.spectrum import in_band
+from panto_env.metrics.low_pass import in_band
 from panto_env.plant.catenary.protocol import (
     advance_wire,
     apply_force,

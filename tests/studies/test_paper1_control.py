@@ -12,7 +12,7 @@ import pytest
 from panto_env import simulate
 from panto_env.control.settings import run_settings
 from panto_env.control.task import Task
-from panto_env.metrics.spectrum import band_rms
+from panto_env.metrics.low_pass import band_rms
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
 from panto_env.studies.paper1_control.angles import wrap

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...analysis.simulation import simulate
-from ...metrics.labels import LABELS
+from ...metrics.figures import LABELS
 from ...metrics.trajectory import Trajectory
 
 REFERENCE_MODEL = "en50318-2002"

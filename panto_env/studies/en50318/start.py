@@ -10,7 +10,7 @@ import numpy as np
 from ...analysis.simulation import simulate
 from ...base.arrays import Array, from_kmh
 from ...catalog import available, load_catenary
-from ...metrics.spans import FIRST_SETTLED, LAST_USUAL
+from ...metrics.figures import FIRST_SETTLED, LAST_USUAL
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
 from .reference import REFERENCE_MODEL
 

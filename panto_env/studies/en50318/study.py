@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...base.table import Table
-from ...metrics.criterion import Criterion
+from ...metrics.compliance import Criterion
 from ...metrics.trajectory import Trajectory
 from . import conditions, convergence, kinds, lines, reference, start, tables, wear, window
 from .conditions import ConditionCheck

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...base.table import Alarm, Table
-from ...metrics.labels import LABELS
+from ...metrics.figures import LABELS
 from ...terminal import number
 from . import conditions, convergence, kinds, lines, reference, start, wear, window
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...base.arrays import to_kmh
+from ...metrics.figures import FIRST_SETTLED, LAST_USUAL
 from ...metrics.low_pass import low_pass
-from ...metrics.spans import FIRST_SETTLED, LAST_USUAL
 from ...metrics.trajectory import Trajectory
 from .convergence import WHOLE_LINE
 from .lines import HIGHEST, LineCase, catalogue_lines

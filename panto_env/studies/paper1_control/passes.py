@@ -18,7 +18,7 @@ from ...catalog import load_catenary, load_pantograph
 from ...control import Task
 from ...control.settings import RunSettings, run_settings
 from ...metrics.figures import Figures
-from ...metrics.spectrum import band_rms
+from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData
 from ...policies import find_policy

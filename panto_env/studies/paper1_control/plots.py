@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
 from ...base import plotting as marks
 from ...base.plotting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, legend_above, series_colour
-from ...metrics.labels import LABELS
+from ...metrics.figures import LABELS
 from .angles import cost_over_angle
 from .cases import (
     ANGLE_SPEEDS,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import product
 
 from ...base.table import Table
-from ...metrics.labels import LABELS
+from ...metrics.figures import LABELS
 from .angles import cost_over_angle
 from .cases import (
     ACTUATORS,

@@ -24,7 +24,7 @@ from ...control import Task
 from ...control.observation import Context
 from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
-from ...metrics.spectrum import band_rms
+from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
 from ...plant.actuators.motor import MotorActuator

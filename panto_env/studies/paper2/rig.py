@@ -16,7 +16,7 @@ from ...base.arrays import from_kmh
 from ...base.errors import InputError
 from ...base.table import Table
 from ...catalog import load_pantograph
-from ...metrics.spectrum import amplitudes
+from ...metrics.low_pass import amplitudes
 from ...rig.comparison import Pair, compare, rms
 from ...rig.computer import load_rig
 from ...rig.growth import with_values

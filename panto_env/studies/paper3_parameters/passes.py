@@ -12,8 +12,8 @@ from ...analysis.parameters import change
 from ...analysis.simulation import simulate
 from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary, load_pantograph
-from ...metrics import en50367
-from ...metrics.criterion import Criterion
+from ...metrics import compliance as en50367
+from ...metrics.compliance import Criterion
 from ...metrics.figures import Figures, arcing, contact_loss
 from ...plant.catenary.schema import PowerSystem
 

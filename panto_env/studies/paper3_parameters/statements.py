@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array, from_kmh
-from ...metrics import en50367
+from ...metrics import compliance as en50367
 from ..study import Comparison
 from .passes import FACTORS, SPEED_KMH, SPEEDS_KMH, SYSTEM, Pass, Passes, largest_static_force
 from .sensitivity import Sensitivity

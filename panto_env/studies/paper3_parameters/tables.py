@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.arrays import from_kmh, to_kmh
 from ...base.table import Table
-from ...metrics import en50367
+from ...metrics import compliance as en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison
 from .equations import RUN_TIME, Equations

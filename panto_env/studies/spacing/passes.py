@@ -13,7 +13,7 @@ from ...analysis.sweep import Row, sweep
 from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary
 from ...control import Task
-from ...metrics.labels import NUMBER
+from ...metrics.figures import NUMBER
 from ...plant.state import Row as StateRow
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import from_kmh
 from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, series_colour
 from ...catalog import load_catenary
-from ...metrics.en50367 import STD_OF_MEAN
+from ...metrics.compliance import STD_OF_MEAN
 from .passes import Case, Curve
 from .theories import Fit
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.arrays import from_kmh
 from ...base.table import Table
-from ...metrics.en50367 import STD_OF_MEAN
+from ...metrics.compliance import STD_OF_MEAN
 from ..study import Comparison
 from .passes import SPEEDS_KMH, Case, Curve
 from .theories import BEST, THEORIES, Fit
