@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
-from ..backend.columns import Columns, map_arrays
+from ..backend.cuda import Columns, map_arrays
 from ..base.arrays import Array
 from .episode import Flags, Results
 from .observation import Context

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import panto_env
-from panto_env.backend.memory import PAGE, aligned_zeros, copy_whole
+from panto_env.backend.packed import PAGE, aligned_zeros, copy_whole
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS

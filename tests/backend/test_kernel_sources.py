@@ -13,8 +13,7 @@ import pytest
 import panto_env
 from panto_env import backend
 from panto_env.backend import JIT, compile
-from panto_env.backend.cache import PACKAGE
-from panto_env.backend.kernel_sources import DECORATORS, kernel_sources
+from panto_env.backend.cache import DECORATORS, PACKAGE, kernel_sources
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,12 @@ import pytest
 pytest.importorskip("numba_cuda", reason="numba-cuda is not installed; `make ptx` installs it apart")
 torch = pytest.importorskip("torch")
 
-from panto_env.backend.columns import Columns  # noqa: E402
-from panto_env.backend.cuda import TILE, PackedTiles, compiled  # noqa: E402
+from panto_env.backend.cuda import (  # noqa: E402
+    TILE,
+    Columns,
+    PackedTiles,
+    compiled,
+)
 from panto_env.backend.ptx import COMPUTE_CAPABILITY, ptx_of, without_device  # noqa: E402
 from panto_env.control import Task  # noqa: E402
 from panto_env.control.on_device import BEGUN, RESULTS, arrays_of, control_unless_idle  # noqa: E402
