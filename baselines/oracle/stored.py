@@ -18,7 +18,7 @@ from panto_env.base.checksums import __version__, read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, read_toml, write_whole
 from panto_env.base.settings import Between, Positive, Settings, parse
-from panto_env.catalog.content import is_entry
+from panto_env.catalog.loader import is_entry
 from panto_env.control.identity import OF_TRAINS
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import (

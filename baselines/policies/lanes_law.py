@@ -18,8 +18,8 @@ from panto_env.base.checksums import remembered
 from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
-from panto_env.catalog.content import is_entry
 from panto_env.catalog.drawn_lines import DRAWN
+from panto_env.catalog.loader import is_entry
 from panto_env.control.observation import Context
 from panto_env.plant.catenary.schema import CatenaryData
 from panto_env.plant.pantograph.schema import PantographData

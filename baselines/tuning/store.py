@@ -15,7 +15,7 @@ from panto_env.base.checksums import __version__, read_checked, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import alone_in, check_output, write_whole
 from panto_env.base.table import Table
-from panto_env.catalog.content import content_unless_catalogue
+from panto_env.catalog.loader import content_unless_catalogue
 from panto_env.cluster import spread
 from panto_env.cluster.parts import identity, open_parts
 from panto_env.control.lines import draws_line, line_name

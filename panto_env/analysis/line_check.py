@@ -12,8 +12,7 @@ import numpy as np
 
 from ..base.arrays import Array, to_kmh
 from ..base.table import Alarm, Table
-from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
-from ..catalog.family import LineFamily
+from ..catalog.family import SOURCE, LineFamily, gradient_limits, gradients, highest_speed
 from ..catalog.section import LineSection
 from ..control.lines import line_generator, line_of_seed
 from ..metrics.compliance import Criterion

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import warnings
 from collections.abc import Mapping
@@ -12,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
+from ..base.checksums import remembered
 from ..base.errors import InputError, UnusualWarning, nearest, shown, suggest
 from ..base.files import read_toml
 from ..base.settings import Settings, explain
@@ -22,7 +25,7 @@ from ..plant.pantograph.schema import PantographData
 from .drawn_lines import DRAWN, DrawnLines
 from .family import LineFamily
 from .section import LineSection
-from .unusual import Ranges, ranges_of, remarks
+from .values import Ranges, ranges_of, remarks
 
 E = TypeVar("E", CatenaryData, PantographData)
 
@@ -296,4 +299,45 @@ def _split(table: Mapping[str, Any], prefix: str, sources: dict[str, str]) -> di
             values[key] = _split(item, f"{place}.", sources)
         else:
             values[key] = item
+    return values
+
+
+WORDS = ("name", "description", "sources", "published")
+"""Keys that say nothing of the values."""
+
+
+@remembered
+def content_of(entry: CatenaryData | PantographData) -> str:
+    """SHA-256 of a line's or a pantograph's values, in hexadecimal.
+
+    Values at their defaults are left out, so that a key that is added later changes nothing.
+    """
+    # By its own class, not a base's; a rig holds a line.
+    values = _without_words(entry.model_dump(mode="json", exclude_defaults=True, serialize_as_any=True))
+    return hashlib.sha256(json.dumps([type(entry).__name__, values], sort_keys=True).encode()).hexdigest()
+
+
+def content_unless_catalogue(entry: CatenaryData | PantographData) -> str | None:
+    """``content_of`` an entry, or None where the catalogue has it by its name, with the same values."""
+    found = content_of(entry)
+    return None if _content_in_catalogue(entry, entry.name) == found else found
+
+
+def is_entry(entry: CatenaryData | PantographData, name: str, content: str | None) -> bool:
+    """Whether a line or a pantograph is the one stored by its name and ``content_unless_catalogue``."""
+    known = _content_in_catalogue(entry, name) if content is None else content
+    return known == content_of(entry)  # None where it was a file's: there is nothing to know its values by
+
+
+def _content_in_catalogue(entry: CatenaryData | PantographData, name: str) -> str | None:
+    """``content_of`` the catalogue's entry of a name, of the kind of ``entry``; None where it has none."""
+    line = isinstance(entry, CatenaryData)
+    if name not in available("catenary" if line else "pantograph"):
+        return None
+    return content_of(load_catenary(name) if line else load_pantograph(name))
+
+
+def _without_words(values: Any) -> Any:
+    if isinstance(values, dict):
+        return {key: _without_words(value) for key, value in values.items() if key not in WORDS}
     return values

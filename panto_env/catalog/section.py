@@ -15,10 +15,8 @@ from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS
-from .drawn_lines import Bands, DrawnLines, Speeds, in_words
-from .en50119 import ROUNDING, gradient_limits, gradients
-from .family import LineFamily
-from .line_ranges import Length, Range
+from .drawn_lines import Bands, DrawnLines, Length, Range, Speeds, in_words
+from .family import ROUNDING, LineFamily, gradient_limits, gradients
 from .section_parts import Bridge, Bridges, Curves, Masts, Obstacles, Overlaps, lowered
 from .values import values_of
 

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, SHORTEST_SPAN, SpanLength
-from .line_ranges import Length, Range, Share
+from .drawn_lines import Length, Range, Share
 
 Radius: TypeAlias = Annotated[float, Between(50, 100_000, "m")]
 MOST_RAMP = 40

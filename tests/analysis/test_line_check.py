@@ -10,8 +10,8 @@ from panto_env.analysis.line_check import check, elasticity_table, span_tables
 from panto_env.analysis.parameters import parameter_names
 from panto_env.analysis.plots import plot_line
 from panto_env.catalog import available, load_catenary
-from panto_env.catalog.content import content_of
-from panto_env.catalog.en50119 import gradient_limits, highest_speed
+from panto_env.catalog.family import gradient_limits, highest_speed
+from panto_env.catalog.loader import content_of
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import solve

@@ -10,8 +10,7 @@ from panto_env import InputError, simulate
 from panto_env.base.errors import UnusualWarning
 from panto_env.catalog import available, load_catenary, load_family, load_pantograph, unusual
 from panto_env.catalog.loader import text_of
-from panto_env.catalog.unusual import FACTOR
-from panto_env.catalog.values import values_of
+from panto_env.catalog.values import FACTOR, values_of
 from panto_env.envs import PantographEnv
 from panto_env.plant.catenary import check_line
 from panto_env.plant.pantograph.build import check_at_rest

@@ -6,8 +6,7 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.catalog import available, load_catenary
-from panto_env.catalog.content import content_of
-from panto_env.catalog.loader import text_of
+from panto_env.catalog.loader import content_of, text_of
 from panto_env.control.lines import on_drawn_line, on_example
 from panto_env.control.settings import run_settings
 from panto_env.plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
