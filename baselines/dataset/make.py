@@ -14,9 +14,9 @@ from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import read_checked, sha256_of
 from panto_env.base.errors import InputError
 from panto_env.base.files import alone_in, check_path, make_folder, write_whole
-from panto_env.cluster.parts import (
+from panto_env.cluster import (
     PARTS,
-    Job,
+    PartJob,
     first_difference,
     identity,
     make_parts,
@@ -135,7 +135,7 @@ def make_designs(
         else:
             parts = output / PARTS / "designs"
             open_parts(parts, made_of)
-            jobs: dict[Path, Job] = {}
+            jobs: dict[Path, PartJob] = {}
             for first in range(0, settings.count, DESIGNS_PER_PART):
                 last = min(first + DESIGNS_PER_PART, settings.count)
                 jobs[parts / f"{first:07d}.json"] = partial(simulate_designs, settings, first, last)
@@ -236,7 +236,7 @@ def make_episodes(
     with alone_in(output, "makes data in"):
         sets = [_Order.of(settings, policy_set, output) for policy_set in settings.sets]
         kept = [each.kept() for each in sets]
-        jobs: dict[Path, Job] = {}
+        jobs: dict[Path, PartJob] = {}
         for one, there in zip(sets, kept, strict=True):
             if not there:
                 open_parts(one.parts, one.made_of)
@@ -273,7 +273,7 @@ class _Order:
         table = settings.model_copy(update={"sets": (policy_set,)}).model_dump(mode="json")
         return cls(policy_set, name, output / name, parts, groups, identity("episodes", table))
 
-    def jobs(self, settings: EpisodesSettings) -> dict[Path, Job]:
+    def jobs(self, settings: EpisodesSettings) -> dict[Path, PartJob]:
         return {path: partial(record, settings, group) for path, group in self.groups.items()}
 
     def kept(self) -> bool:

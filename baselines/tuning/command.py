@@ -55,7 +55,7 @@ def tune(
     --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
     With --washout gains are for the policy with that washout: tuned-pd:washout=1.
     """
-    from panto_env.cluster.parts import remove_parts
+    from panto_env.cluster import remove_parts
     from panto_env.control.settings import run_settings
 
     from ..benchmark.settings import TRAINING

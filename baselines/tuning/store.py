@@ -16,8 +16,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import alone_in, check_output, write_whole
 from panto_env.base.table import Table
 from panto_env.catalog.loader import content_unless_catalogue
-from panto_env.cluster import spread
-from panto_env.cluster.parts import identity, open_parts
+from panto_env.cluster import identity, open_parts, spread
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
 from panto_env.terminal import number

@@ -9,7 +9,7 @@ from panto_agents.run_folder import RunFolder
 from panto_agents.settings import parse_training
 from panto_baselines.dataset.make import LIST, verify
 from panto_env import InputError
-from panto_env.cluster.parts import IDENTITY, open_parts
+from panto_env.cluster import IDENTITY, open_parts
 from panto_env.estimation.motion import read_motion
 from panto_env.identification.record import read_record
 

@@ -27,10 +27,10 @@ from panto_baselines.dataset.make import LIST, verify
 from panto_baselines.dataset.settings import EpisodesSettings, chosen, load_episodes
 from panto_configs import names
 from panto_env import InputError, simulate
+from panto_env import cluster as parts
 from panto_env.base.checksums import read_checked, write_arrays, write_checked
 from panto_env.base.files import alone_in
 from panto_env.base.settings import parse
-from panto_env.cluster import parts
 
 from ..deadly import deadly
 from ..plugin import on_path

@@ -27,7 +27,8 @@ from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.tuning.store import tune
 from panto_env import InputError
-from panto_env.cluster import spread, tasks
+from panto_env import cluster as tasks
+from panto_env.cluster import spread
 from panto_env.control.settings import run_settings
 
 from ..deadly import deadly

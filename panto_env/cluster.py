@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
-from ..analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, Take, collect
-from ..backend.cache import source_hash
-from ..base.errors import InputError, shown
-from ..base.machine import cores
+import typer
+
+from .analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, Take, collect, in_processes
+from .backend.cache import source_hash
+from .base.checksums import __version__, commit, read_checked, write_checked
+from .base.errors import InputError, shown
+from .base.files import make_folder
+from .base.machine import cores
 
 T = TypeVar("T")
 LOCAL = "local"
@@ -123,3 +130,129 @@ def _connected(ray: Any, address: str) -> Iterator[None]:
         yield
     finally:
         ray.shutdown()
+
+
+RayAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--ray",
+        metavar="ADDRESS",
+        help='Work on a Ray cluster instead: its address, "auto", or "local" for one on this machine only.',
+    ),
+]
+"""Option of a command whose work can run on a cluster."""
+
+
+def spread(
+    jobs: Sequence[Job[T]],
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+    take: Take[T] | None = None,
+) -> list[T]:
+    """Results of jobs, in the given order; they must not depend on where a job runs.
+
+    workers: processes on this machine, one per core by default. ray: address of a cluster to use instead.
+    take: called in this process with the index and the result of each job as soon as it is finished. Raises
+    InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
+    """
+    if ray is None:
+        return in_processes(jobs, workers=workers, progress=progress, take=take)
+    if workers is not None:
+        raise InputError("A Ray cluster has as many workers as CPUs; leave out either workers or ray.")
+    return on_ray(jobs, ray, progress=progress, take=take)
+
+
+PartJob = Callable[[Path], None]
+"""Work that writes its result to a path, whole or not at all: for other processes a ``functools.partial``."""
+PARTS = ".parts"
+"""Folder in the output for the parts of each data set; hidden, so that Minari does not read it."""
+IDENTITY = "identity.json"
+
+
+def identity(kind: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that determines the results of a work, as plain data."""
+    made_by = {"version": __version__, "commit": commit(), "sources": source_hash()}
+    return {"kind": kind, **made_by, "settings": json.loads(json.dumps(settings))}
+
+
+def open_parts(folder: Path, made_of: Mapping[str, Any]) -> None:
+    """Make the folder of a work's parts, or continue it; made_of: from ``identity``.
+
+    Raises InputError where it holds parts of another work.
+    """
+    make_folder(folder)
+    path = folder / IDENTITY
+    if not path.is_file():
+        write_checked(path, made_of)
+        return
+    difference = first_difference(read_checked(path), made_of)
+    if difference:
+        raise InputError(
+            f"{folder} holds parts of another work ({difference}); finish that one, remove the folder, or "
+            "use another --output."
+        )
+
+
+def make_parts(
+    jobs: Mapping[Path, PartJob],
+    read: Callable[[Path], object],
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Make all files, each by its job; existing files that are whole are kept.
+
+    read: reads a file, and raises InputError where it is missing or damaged; such a file is made again.
+    workers, ray: as in ``spread``. progress: called with the numbers of existing and of all files.
+    """
+    missing = {path: job for path, job in jobs.items() if not _whole(path, read)}
+    kept = len(jobs) - len(missing)
+    if progress is not None:
+        progress(kept, len(jobs))
+    if missing:
+        spread(
+            [partial(job, path) for path, job in missing.items()],
+            workers=workers,
+            ray=ray,
+            progress=None if progress is None else lambda done, _: progress(kept + done, len(jobs)),
+        )
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove a folder of parts that are no longer needed."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder if it is empty."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """The first difference of two identities, as a clause; "" for none."""
+    before, now = ({**each, **each.get("settings", {})} for each in (old, new))
+    for key in sorted(before.keys() | now.keys()):
+        if key != "settings" and before.get(key) != now.get(key):
+            return f"its {key} is {_short(before.get(key))}, this is {_short(now.get(key))}"
+    return ""
+
+
+def _whole(path: Path, read: Callable[[Path], object]) -> bool:
+    """Whether a part exists and is not damaged."""
+    try:
+        read(path)
+        return True
+    except InputError:
+        return False
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+__all__ = ["RayAddress", "spread"]
