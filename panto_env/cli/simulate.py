@@ -137,7 +137,7 @@ def _shown(
     """Progress of a run as a bar or as a live picture: arguments ``progress`` and ``watch`` of the run."""
     drawable = console.is_terminal and not console.is_dumb_terminal and console.width >= LIVE_COLUMNS
     if live and drawable:
-        from ..render.live import live as on_terminal
+        from ..render.strip import live as on_terminal
 
         with on_terminal(console, policy) as watch:
             yield None, watch
@@ -211,8 +211,7 @@ def film(
     A saved run is repeated from its settings, and refused if its contact force differs.
     """
     from ..base.errors import InputError
-    from ..render.film import excerpt, frames
-    from ..render.filmed import Filmed, check_together, policy_pass, saved_passes
+    from ..render.film import Filmed, check_together, excerpt, frames, policy_pass, saved_passes
 
     if len(policies) > MOST:
         raise InputError(f"A film shows up to {MOST} passes, not {len(policies)}.")

@@ -1,8 +1,9 @@
-"""A picture in memory, which needs no screen. OpenCV draws lines, Pillow draws words."""
+"""Check for the packages of the extra 'render', before any of them is imported."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from .packages import check_packages
+from ..base.errors import InputError, listed
+from ..base.plotting import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
+
+IN_WORDS = {"cv2": "OpenCV", "pygame": "pygame", "imageio_ffmpeg": "imageio-ffmpeg"}
+
+
+def check_packages(*names: str) -> None:
+    """Raise InputError where packages that a picture or a film needs are not installed."""
+    missing = [IN_WORDS[name] for name in names if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"Pictures and films need {listed(missing)} not installed; install panto-env with its "
+            "extra: pip install 'panto-env[render]'."
+        )
+
 
 Colour = tuple[int, int, int]
 PARTS = 4
@@ -130,3 +145,13 @@ def zigzag(x: float, top: float, bottom: float, half: float, turns: int) -> Arra
     down = np.concatenate([[0.0, 0.1], np.linspace(0.15, 0.85, 2 * turns), [0.9, 1.0]])
     aside = np.concatenate([[0.0, 0.0], np.where(np.arange(2 * turns) % 2, -half, half), [0.0, 0.0]])
     return np.column_stack([x + aside, top + (bottom - top) * down])
+
+
+GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222, 227, 232)
+METAL, TRAIN, RAW = (70, 78, 88), (196, 204, 213), (186, 194, 203)
+SUPPORT, PAPER = (135, 144, 154), (255, 255, 255)
+FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
+OTHERS = rgb(GREEN), rgb(PURPLE), rgb(BROWN)
+"""Colours of the pantographs of a train that a picture does not show, from the front."""
+WORDS = 0.0222
+"""Size of words, as a share of a frame's height; at 720 rows, 16 px."""

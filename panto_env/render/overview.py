@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
-from .canvas import Canvas, Colour
+from .canvas import FAINT, FORCE, GROUND, INK, METAL, OTHERS, PAPER, QUIET, SUPPORT, TRAIN, Canvas, Colour
 from .moment import AHEAD, BEHIND, Moment, Rider, TrainView
-from .palette import FAINT, FORCE, GROUND, INK, METAL, OTHERS, PAPER, QUIET, SUPPORT, TRAIN
 
 SHARE = 0.24
 """Share of a frame's height that the strip has."""

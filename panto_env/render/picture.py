@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, to_kmh
 from ..plant.state import Place
-from .canvas import SMALLEST, Canvas, Colour, zigzag
-from .layout import TITLE, Layout, force_axis, lost
-from .moment import Moment
-from .overview import SHARE, draw_train
-from .palette import (
+from .canvas import (
     BAD,
     FAINT,
     FORCE,
@@ -23,10 +19,16 @@ from .palette import (
     PUSH,
     QUIET,
     RAW,
+    SMALLEST,
     SUPPORT,
     TRAIN,
     WORDS,
+    Canvas,
+    Colour,
+    zigzag,
 )
+from .moment import TITLE, Layout, Moment, force_axis, lost
+from .overview import SHARE, draw_train
 
 STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
 """Possible distances of the lines of the chart (N), and how many there are at most."""

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console, ConsoleOptions, RenderResult
+from rich.live import Live
 from rich.text import Text
 
 from ..base.arrays import Array, to_kmh
@@ -148,3 +153,30 @@ def _round(heights: Array) -> tuple[float, float]:
         return 0.0, 10.0
     low, high = 10 * np.floor(heights.min() / 10), 10 * np.ceil(heights.max() / 10)
     return float(low), float(max(high, low + 10))
+
+
+INTERVAL = 0.1
+"""Time (s) between two pictures."""
+
+
+@contextmanager
+def live(console: Console, policy: str) -> Iterator[Callable[[Task], None]]:
+    """Show a task's first lane on a terminal while the body runs; yields a function of the task.
+
+    policy: its name. The last picture stays. The cursor is restored in any case.
+    """
+    with Live(Text("preparing the line"), console=console, auto_refresh=False) as shown:
+        latest: list[Task] = []
+        drawn = 0.0
+
+        def watch(task: Task) -> None:
+            nonlocal drawn
+            latest[:] = [task]
+            now = time.monotonic()
+            if now >= drawn + INTERVAL:
+                shown.update(Strip(task, policy), refresh=True)
+                drawn = now
+
+        yield watch
+        if latest:
+            shown.update(Strip(latest[0], policy), refresh=True)

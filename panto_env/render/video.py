@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from .packages import check_packages
+from .canvas import check_packages
 
 Frames = Iterable[NDArray[np.uint8]]
 FILMS = (".mp4", ".gif")

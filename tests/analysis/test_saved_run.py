@@ -107,7 +107,7 @@ def test_the_force_may_differ_by_rounding_alone(kept, factor, same):
 def test_passes_above_each_other_differ_by_rounding_alone(kept, what, by):
     """By a millionth, a run of 1200 m is 1 mm out of step; a tenth would be two spans."""
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
-    from panto_env.render.filmed import Filmed, check_together
+    from panto_env.render.film import Filmed, check_together
 
     run, settings, _ = kept
     first = Filmed("one", run.policy, settings, run.seed, run)
@@ -148,8 +148,7 @@ def film(*arguments):
 
 def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
-    from panto_env.render.film import figures_in_words
-    from panto_env.render.filmed import check_together, policy_pass, saved_passes
+    from panto_env.render.film import check_together, figures_in_words, policy_pass, saved_passes
 
     output = tmp_path / "film.mp4"
     (first,) = saved_passes([str(kept[2])]).values()
@@ -166,8 +165,7 @@ def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path
 
 def test_passes_on_other_lines_have_no_comparison_of_sigma(kept):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
-    from panto_env.render.film import figures_in_words
-    from panto_env.render.filmed import policy_pass, saved_passes
+    from panto_env.render.film import figures_in_words, policy_pass, saved_passes
 
     (first,) = saved_passes([str(kept[2])]).values()
     for other in (

@@ -7,8 +7,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.plant.alignment import Alignment
 from panto_env.plant.catenary.view import NOTHING
-from panto_env.render.layout import Layout
-from panto_env.render.moment import Moment
+from panto_env.render.moment import Layout, Moment
 
 BLUE, ORANGE, VERMILION = (0, 114, 178), (230, 159, 0), (213, 94, 0)
 INK, QUIET, FAINT, METAL = (28, 37, 48), (105, 115, 126), (222, 227, 232), (70, 78, 88)

@@ -10,7 +10,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.plant.catenary.view import LineView
 from panto_env.render import picture
-from panto_env.render.layout import Layout, force_axis, lost
+from panto_env.render.moment import Layout, force_axis, lost
 
 from .recorded import (
     BLUE,

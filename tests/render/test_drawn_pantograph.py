@@ -9,7 +9,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.plant.state import Place
 from panto_env.render import picture
-from panto_env.render.layout import Layout
+from panto_env.render.moment import Layout
 
 from .recorded import (
     BLUE,

@@ -10,8 +10,7 @@ import numpy as np
 
 from panto_env import InputError, simulate
 from panto_env.plant.alignment import Alignment
-from panto_env.render.film import FASTEST, excerpt
-from panto_env.render.filmed import policy_pass, saved_passes
+from panto_env.render.film import FASTEST, excerpt, policy_pass, saved_passes
 
 STIFFNESS = {
     "catenary": "periodic-stiffness",

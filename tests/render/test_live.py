@@ -18,9 +18,8 @@ from panto_env import Trajectory, simulate
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import low_pass
-from panto_env.render.live import live
 from panto_env.render.moment import felt
-from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, chart
+from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, chart, live
 
 from ..cli.test_cli import panto
 

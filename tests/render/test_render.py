@@ -19,12 +19,17 @@ from panto_env.plant.state import Place, Row
 
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
-from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import Excerpt, _highest, excerpt, figures_in_words, frames
-from panto_env.render.filmed import check_together, policy_pass
-from panto_env.render.layout import Layout, force_axis
-from panto_env.render.moment import moment_of
-from panto_env.render.palette import QUIET, SUPPORT
+from panto_env.render.canvas import QUIET, SUPPORT, Canvas, rgb
+from panto_env.render.film import (
+    Excerpt,
+    _highest,
+    check_together,
+    excerpt,
+    figures_in_words,
+    frames,
+    policy_pass,
+)
+from panto_env.render.moment import Layout, force_axis, moment_of
 from panto_env.render.picture import Picture
 from panto_env.render.video import write_film
 

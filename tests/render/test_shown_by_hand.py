@@ -16,10 +16,8 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.figures import LABELS
 from panto_env.plant.state import Row
-from panto_env.render.film import Excerpt, frames
-from panto_env.render.filmed import alike, policy_pass
-from panto_env.render.layout import Layout
-from panto_env.render.moment import moment_of
+from panto_env.render.film import Excerpt, alike, frames, policy_pass
+from panto_env.render.moment import Layout, moment_of
 from panto_env.render.video import _failure
 from panto_env.render.viewer import Viewer, figures_so_far
 
@@ -75,7 +73,7 @@ def test_what_a_moment_says_of_its_task():
 def test_a_window_shows_every_pixel_where_it_is(monkeypatch):
     pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    from panto_env.render.window import Window
+    from panto_env.render.viewer import Window
 
     frame = np.random.default_rng(0).integers(0, 256, (72, 96, 3)).astype(np.uint8)
     window = Window((96, 72), "a title")
@@ -134,7 +132,7 @@ def test_a_viewer_opens_one_window_until_it_is_closed(monkeypatch):
         def close(self):
             events.append("closed")
 
-    monkeypatch.setattr("panto_env.render.window.Window", Window)
+    monkeypatch.setattr("panto_env.render.viewer.Window", Window)
     viewer = Viewer((64, 48))
     viewer.close()
     for number in (1, 2):

@@ -12,7 +12,7 @@ pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.render import live as live_module
+from panto_env.render import strip as live_module
 from panto_env.render.moment import Felt, felt
 from panto_env.render.strip import Strip, _characters, _round, chart
 
