@@ -11,7 +11,7 @@ import typer
 from panto_env.analysis.options import DroppersFile, FiguresFile
 from panto_env.base.errors import InputError, harmless
 from panto_env.base.files import PAGES, check_output, write_whole
-from panto_env.report.template import page_template
+from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.report import LEGEND

@@ -10,8 +10,7 @@ from ..base.checksums import __version__
 from ..base.files import PAGES, check_output, write_whole
 from ..base.table import Alarm, Table
 from ..report.charts import drawn
-from ..report.template import page_template
-from ..report.words import FILTER
+from ..report.page import FILTER, page_template
 from . import compare as compared
 from . import judge as tables
 from . import plots

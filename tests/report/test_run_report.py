@@ -20,8 +20,7 @@ from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
 from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
 from panto_env.report import charts, save
 from panto_env.report.findings import Findings
-from panto_env.report.page import digits, page
-from panto_env.report.words import LEFT_OUT
+from panto_env.report.page import LEFT_OUT, digits, page
 
 from ..catalog.test_catalog import STEP, wire_stiffness
 from ..pages import DOCS
