@@ -293,8 +293,7 @@ def rig(
     """
     from ..catalog import load_catenary, load_pantograph
     from ..rig import report
-    from ..rig.comparison import compare
-    from ..rig.computer import load_rig
+    from ..rig.computer import compare, load_rig
 
     chosen, facts, tables, pairs = parse_spans(spans), [], [], []
     pantograph = load_pantograph(settings.pop("pantograph", PANTOGRAPH))

@@ -9,7 +9,7 @@ from ..analysis.plots import mark_supports_of_run
 from ..base import plotting as marks
 from ..base.plotting import legend_above, series_colour
 from ..metrics.low_pass import amplitudes, zero_phase_low_pass
-from .comparison import Pair
+from .computer import Pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,11 +11,9 @@ from ..base.arrays import from_kmh
 from ..base.table import Table
 from ..plant.catenary.rig import RigData
 from ..plant.pantograph.schema import PantographData
-from . import growth
-from .comparison import FOLLOWED, Pair
-from .computer import RigComputer
+from . import margins as growth
+from .computer import FOLLOWED, Pair, RigComputer, Timing, against_the_clock
 from .margins import SLOWEST, Loop, Margins
-from .real_time import Timing, against_the_clock
 
 QUANTITIES = (
     ("contact force (N)", "contact_force", 1.0),

@@ -88,7 +88,7 @@ def test_a_rig_is_compared_with_its_own_line_or_the_one_that_is_named(monkeypatc
     )
     load = lambda name: name if name is own else SimpleNamespace(name=name)  # noqa: E731
     monkeypatch.setattr("panto_env.catalog.load_catenary", load)
-    monkeypatch.setattr("panto_env.rig.comparison.compare", compare)
+    monkeypatch.setattr("panto_env.rig.computer.compare", compare)
     monkeypatch.setattr("panto_env.rig.report.pair_facts", lambda pair: {"rig": pair})
     monkeypatch.setattr("panto_env.rig.report.pair_table", lambda pair: Table("", ("x",), ((pair,),)))
     monkeypatch.setattr("panto_env.rig.report.followed_sentence", lambda pair: f"It follows {pair}.")

@@ -25,7 +25,7 @@ from panto_env.identification.plots import plot_matches, plot_record
 from panto_env.identification.record import Record
 from panto_env.plant.alignment import Alignment
 from panto_env.report import charts
-from panto_env.rig.comparison import Pair
+from panto_env.rig.computer import Pair
 from panto_env.rig.plots import plot_pairs
 
 from ..analysis.test_line_check import of_unlike_spans

@@ -13,10 +13,10 @@ from panto_env.plant.catenary.rig.arrays import RigRow
 from panto_env.plant.numerics import Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train
-from panto_env.rig import RigComputer, growth
-from panto_env.rig.comparison import compare
+from panto_env.rig import RigComputer
+from panto_env.rig import margins as growth
+from panto_env.rig.computer import Timing, against_the_clock, compare
 from panto_env.rig.margins import Loop, analog_response, dynamic_stiffness, is_stable, margins_of, threshold
-from panto_env.rig.real_time import Timing, against_the_clock
 
 PANTOGRAPH, SPEED = load_pantograph("own-two-mass"), 250.0
 

@@ -17,9 +17,8 @@ from ...base.errors import InputError
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...metrics.low_pass import amplitudes
-from ...rig.comparison import Pair, compare, rms
-from ...rig.computer import load_rig
-from ...rig.growth import with_values
+from ...rig.computer import Pair, compare, load_rig, rms
+from ...rig.margins import with_values
 from ...rig.plots import plot_pairs
 from ...rig.report import Stability, pair_facts, stability, stability_facts, stability_table
 from ..study import Comparison, Outcome, Report
