@@ -16,12 +16,11 @@ from ..catalog.family import SOURCE, LineFamily, gradient_limits, gradients, hig
 from ..catalog.section import LineSection
 from ..control.lines import line_generator, line_of_seed
 from ..metrics.compliance import Criterion
-from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
+from ..plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from ..plant.catenary.flexible.parts import index_at
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import spans_of
-from ..plant.catenary.flexible.static import hang
+from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest, hang
 from .pool import Progress, in_processes
 from .simulation import simulate
 

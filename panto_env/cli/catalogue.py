@@ -20,7 +20,7 @@ from ..catalog.drawn_lines import DrawnLines
 from ..catalog.loader import SCHEMAS, text_of
 from ..catalog.values import by_value, values_of
 from ..plant.actuators import ACTUATOR_PRESETS
-from ..plant.catenary.flexible.dropper_table import (
+from ..plant.catenary.flexible.static import (
     HEADINGS,
     RestingDropper,
     as_rows,

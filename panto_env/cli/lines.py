@@ -16,8 +16,8 @@ from ..catalog import load_catenary, load_drawn
 from ..catalog.loader import drawn_kind, parse_catenary
 from ..control.lines import line_of_seed
 from ..plant.catenary.flexible.as_run import as_run, as_run_tables
-from ..plant.catenary.flexible.dropper_table import dropper_table
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.flexible.static import dropper_table
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, counting, print_json, print_table, writable, written_last
 from .identify import Given, given

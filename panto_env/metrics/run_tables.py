@@ -12,8 +12,8 @@ from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.table import WORKBOOKS, Sheet, write_table, write_workbook
 from ..plant.catenary import CATENARIES
-from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
-from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
+from ..plant.catenary.flexible.static import HEADINGS as AT_REST
+from ..plant.catenary.flexible.static import as_rows, droppers_at_rest
 from .by_span import DROPPER_HEADINGS as MOVING
 from .by_span import SPAN_HEADINGS as BY_SPAN
 from .by_span import STRETCH_HEADINGS as BY_STRETCH

@@ -20,9 +20,8 @@ from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
-from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables
-from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import non_uniformity
+from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables, non_uniformity
+from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest
 from ..plant.line_condition import NEW, LineCondition
 from ..plant.pantograph.schema import PantographData
 

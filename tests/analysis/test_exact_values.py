@@ -21,7 +21,7 @@ from panto_env.analysis.line_check import (
 )
 from panto_env.base.table import Alarm
 from panto_env.catalog import load_catenary, load_drawn
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 
 SPAN = SpanCheck(1, 0.0, 65.0, 1.8, 0.0125, -1.5, 0.25, 0.0654, 48.6, 151.4, 0.000321, 0.000654, 34.16)
 FIRST = SpanCheck(2, 65.0, 50.5, 1.4, -0.0125, 0.0, -0.25, 0.05, 30.0, 99.7, math.nan, math.nan, math.nan)

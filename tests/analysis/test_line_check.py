@@ -12,7 +12,7 @@ from panto_env.analysis.plots import plot_line
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.family import gradient_limits, highest_speed
 from panto_env.catalog.loader import content_of
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import solve
 
@@ -131,7 +131,7 @@ def test_the_stiffest_places_are_not_missed(sequence, monkeypatch):
         table = {name: value for name, value in table.items() if name != "spans"} | {"sequence": sequence}
     line = FlexibleCatenaryData.model_validate(table)
     found = [non_uniformity(each) for each in per_span(*elasticity(line, 100.0))]
-    monkeypatch.setattr("panto_env.plant.catenary.flexible.elasticity.PLACES", 650)
+    monkeypatch.setattr("panto_env.plant.catenary.flexible.as_run.PLACES", 650)
     assert [non_uniformity(each) for each in per_span(*elasticity(line, 100.0))] == pytest.approx(
         found, abs=0.1
     )

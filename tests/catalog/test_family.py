@@ -16,7 +16,7 @@ from panto_env.catalog import available, load_catenary, load_drawn, load_family,
 from panto_env.catalog.loader import text_of
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
-from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.static import hang
 
 from ..command import panto

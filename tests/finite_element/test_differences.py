@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.static import hang
 
 from .differences import at_rest

@@ -13,7 +13,7 @@ from panto_env.metrics.by_span import by_span, moving_droppers
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 
 LENGTHS = (50, 60, 55, 65, 45, 62, 50, 65, 60, 40, 60, 55, 64)
 

@@ -9,7 +9,7 @@ from panto_env.metrics.by_span import moving_droppers
 from panto_env.metrics.figures import LABELS
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import save_droppers, save_figures
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 
 from ..command import panto
 from .test_summary import RUN, replace

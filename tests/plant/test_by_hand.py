@@ -5,7 +5,7 @@ import pytest
 
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.plant.catenary.flexible.dropper_table import RestingDropper, dropper_table
+from panto_env.plant.catenary.flexible.static import RestingDropper, dropper_table
 
 LINES = {"ohl-three-span": "own-two-mass", "periodic-stiffness": "three-mass", "en50318-2002": "en50318-2002"}
 

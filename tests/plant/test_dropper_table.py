@@ -7,8 +7,8 @@ import pandas
 import pytest
 
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.flexible.static import as_rows, droppers_at_rest
 
 from ..command import panto
 from ..finite_element.static import GRAVITY, static_shape

@@ -12,9 +12,8 @@ from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.catenary.flexible.wires import leapfrog
+from panto_env.plant.catenary.flexible.wires import along, lay_out, leapfrog, window_nodes
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant

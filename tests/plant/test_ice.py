@@ -10,9 +10,8 @@ from scipy.sparse.linalg import spsolve
 from panto_env import InputError, simulate
 from panto_env.backend import python_function
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
 

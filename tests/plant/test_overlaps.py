@@ -11,14 +11,12 @@ from panto_env import InputError, simulate
 from panto_env.backend import WIDTH, python_function
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.arrays import CONTACT, LINK, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.build import at_rest
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
-from panto_env.plant.catenary.flexible.elasticity import elasticity
 from panto_env.plant.catenary.flexible.overlaps import heights_of_pair, tension_lengths
-from panto_env.plant.catenary.flexible.scattered_arrays import LINK
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
-from panto_env.plant.catenary.flexible.static import hang
+from panto_env.plant.catenary.flexible.static import droppers_at_rest, hang
+from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.contact import shared_forces
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant

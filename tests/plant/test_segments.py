@@ -7,9 +7,11 @@ from panto_env import simulate
 from panto_env.backend import JIT, WIDTH, kernel, load_row
 from panto_env.plant.catenary.flexible.arrays import PAD
 from panto_env.plant.catenary.flexible.on_grid import Sets
-from panto_env.plant.catenary.flexible.segments import (
+from panto_env.plant.catenary.flexible.wires import (
     along,
     lay_out,
+    leapfrog,
+    leapfrog_weakened,
     move,
     node_after,
     places,
@@ -18,7 +20,6 @@ from panto_env.plant.catenary.flexible.segments import (
     shift_nodes,
     window_nodes,
 )
-from panto_env.plant.catenary.flexible.wires import leapfrog, leapfrog_weakened
 
 pytestmark = pytest.mark.plain
 ROWS = 7

@@ -10,15 +10,14 @@ from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.arrays import CONTACT, HUNG, LINK, MESSENGER, PAD, STITCH
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.build import at_rest
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
-from panto_env.plant.catenary.flexible.scattered_arrays import HUNG, LINK, STITCH
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
+from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.line_condition import NEW, LineCondition
 from panto_env.plant.numerics import Numerics
 

@@ -11,12 +11,10 @@ from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.plant.catenary.flexible.as_run import as_run
-from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
-from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.as_run import as_run, elasticity
+from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.fixed_wires import tensions_of_fixed
-from panto_env.plant.catenary.flexible.tension import with_tension_left
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
 from panto_env.report.findings import Findings

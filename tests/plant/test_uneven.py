@@ -14,10 +14,9 @@ from panto_env import InputError, simulate
 from panto_env.backend import WIDTH
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.arrays import CONTACT, LINK, MESSENGER, PAD
 from panto_env.plant.catenary.flexible.build import at_rest
-from panto_env.plant.catenary.flexible.scattered_arrays import LINK
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train

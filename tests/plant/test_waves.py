@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.waves import carrying_grid, wave_ahead
+from panto_env.plant.catenary.flexible.grid import carrying_grid, wave_ahead
 
 LINE = load_catenary("en50318-2002")
 WIRE = LINE.contact_wire

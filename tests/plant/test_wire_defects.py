@@ -13,9 +13,8 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import zero_phase_low_pass
-from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.resolution import HARD_SPOT_GRID
-from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wire_defects import RAMP, worn_depth
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition

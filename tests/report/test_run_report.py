@@ -16,8 +16,8 @@ from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
 from panto_env.plant.catenary import CATENARIES
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 from panto_env.report import charts, save
 from panto_env.report.findings import Findings
 from panto_env.report.page import LEFT_OUT, digits, page

@@ -18,8 +18,7 @@ from ...side_wind import SHORTEST_WAVE, SIDE_ROWS
 from ...trigonometry import cosine_of_turns, sine_of_turns
 from ..protocol import advance_wire, end_step
 from ..schema import Wire
-from .arrays import PAD, STENCIL, FlexibleLine, FlexibleWire
-from .blown_arrays import Air, Gusts
+from .arrays import PAD, STENCIL, Air, FlexibleLine, FlexibleWire, Gusts
 
 AIR_DENSITY = 1.225
 """kg/m^3, at 15 degrees and sea level."""

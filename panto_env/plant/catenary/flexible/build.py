@@ -17,16 +17,16 @@ from .attached import joined_springs, links_of, springs_of
 from .beams import Located, Profile, located
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
-from .near_build import near_droppers
+from .near import near_droppers
 from .on_grid import in_equal_rows, on_grid
 from .overlaps import heights_of_pair, pairs_of, tension_lengths
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
-from .segments import lay_out, places
 from .static import StaticShape
 from .stitches import moving_stitches
 from .wire_defects import NO_DEFECTS, WireDefects
+from .wires import lay_out, places
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 MOST_NODES = 1_000_000

@@ -22,10 +22,9 @@ from ....base.checksums import remembered
 from ....base.errors import AccuracyWarning, InputError
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
-from .grid import finest_stable, nodes_per_span, stable
+from .grid import carrying_grid, finest_stable, nodes_per_span, stable
 from .schema import FlexibleCatenaryData
 from .stitches import stitched
-from .waves import carrying_grid
 from .window import window_of
 
 STEPS = (

@@ -15,9 +15,8 @@ from ....backend import (
     store_row,
 )
 from ...state import own_row
-from .arrays import MESSENGER, PAD
-from .scattered_arrays import MAST, SPRING, STITCH
-from .segments import row_of, segment_of, share_ends
+from .arrays import MAST, MESSENGER, PAD, SPRING, STITCH
+from .wires import row_of, segment_of, share_ends
 
 EASED_ALIKE, EASED = 4.0, 8.0
 """Share of a span, as its inverse, over which wires come to rest towards a new span, where spans are of one

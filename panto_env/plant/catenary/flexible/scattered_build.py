@@ -9,20 +9,24 @@ import numpy as np
 
 from ....backend import WIDTH, bind, pack
 from ....base.arrays import Array, Index
-from .arrays import LOWER, MESSENGER, PAD, FlexibleLine, FlexibleWire
-from .on_grid import OnGrid
-from .scattered import take_start
-from .scattered_arrays import (
+from .arrays import (
     HUNG,
     LINK,
     LINK_ROWS,
+    LOWER,
     MAST_ROWS,
+    MESSENGER,
+    PAD,
     STITCH,
     AlongLine,
+    FlexibleLine,
+    FlexibleWire,
     InWindow,
     Scattered,
     ScatteredWindow,
 )
+from .on_grid import OnGrid
+from .scattered import take_start
 
 NODES = 4
 HUNG_NODES = NODES + 2

@@ -13,9 +13,9 @@ from .arrays import CONTACT, MESSENGER, PAD
 from .beams import Profile
 from .overlaps import FAR, heights_of_pair, tension_lengths
 from .scattered_build import present, rope_nodes
-from .segments import along
 from .shape import StaticShape
 from .stitches import moving_stitches
+from .wires import along
 
 if TYPE_CHECKING:
     from .model import FlexibleCatenary
