@@ -14,7 +14,7 @@ from ..control import Task
 from ..metrics import compliance as en50367
 from ..metrics.low_pass import low_pass
 from ..plant.alignment import Alignment
-from ..plant.catenary.view import LineView
+from ..plant.catenary.protocol import LineView
 from ..plant.state import Place, Row
 
 BEHIND, AHEAD = 1.3, 0.75

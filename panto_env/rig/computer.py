@@ -21,8 +21,7 @@ from ..metrics.low_pass import in_band
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.protocol import check_speeds
 from ..plant.catenary.rig import Rig, RigData
-from ..plant.catenary.rig.arrays import RigRow
-from ..plant.catenary.rig.computer import sample
+from ..plant.catenary.rig.step import RigRow, sample
 from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics, Runs
 from ..plant.valid_range import Ending, reason

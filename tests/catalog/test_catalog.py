@@ -17,9 +17,9 @@ from panto_env.catalog import available, load_catenary, load_family, load_pantog
 from panto_env.catalog.section import LineSection
 from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.periodic_stiffness import PeriodicStiffnessData
 from panto_env.plant.catenary.rig import RigData
-from panto_env.plant.catenary.three_span.schema import ThreeSpanData
+from panto_env.plant.catenary.three_span import ThreeSpanData
 from panto_env.plant.pantograph.schema import PantographData
 
 LOADERS: dict[str, Callable[[Any], Any]] = {

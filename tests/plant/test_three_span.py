@@ -3,7 +3,7 @@ import pytest
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.three_span import build as three_span
+from panto_env.plant.catenary import three_span
 from panto_env.plant.numerics import Numerics, Runs
 
 

@@ -22,7 +22,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.diagnosis.features import Evidence, Region, candidates
 from panto_env.plant.alignment import Alignment
-from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.periodic_stiffness import PeriodicStiffnessData
 from panto_env.render.moment import moment_of
 from panto_env.render.strip import Strip
 from panto_env.report.findings import Findings

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
 from panto_env.plant.alignment import Alignment
-from panto_env.plant.catenary.view import NOTHING
+from panto_env.plant.catenary.protocol import NOTHING
 from panto_env.render.moment import Layout, Moment
 
 BLUE, ORANGE, VERMILION = (0, 114, 178), (230, 159, 0), (213, 94, 0)

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
-from panto_env.plant.catenary.view import LineView
+from panto_env.plant.catenary.protocol import LineView
 from panto_env.render import picture
 from panto_env.render.moment import Layout, force_axis, lost
 

@@ -20,8 +20,8 @@ from panto_env.plant.catenary.protocol import (
     place_contact,
 )
 from panto_env.plant.catenary.rig import Rig
-from panto_env.plant.catenary.rig.arrays import RIG_ROW, RigRow
 from panto_env.plant.catenary.rig.build import assumed, bank, outer_lead
+from panto_env.plant.catenary.rig.step import RIG_ROW, RigRow
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
 

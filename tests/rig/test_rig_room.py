@@ -9,7 +9,7 @@ import pytest
 from panto_env import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.cli import make_app
-from panto_env.plant.catenary.rig.arrays import RigRow
+from panto_env.plant.catenary.rig.step import RigRow
 from panto_env.plant.numerics import Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train

@@ -1,4 +1,6 @@
-"""What a kind of catenary provides: a class for Python, and its operations for kernels.
+"""Shape of a line at one moment, for pictures.
+
+What a kind of catenary provides: a class for Python, and its operations for kernels.
 
 A step of a lane calls ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
 point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. ``ending_by_wire`` is called once per
@@ -16,6 +18,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...backend import operation
 from ...base.arrays import Array, from_kmh, to_kmh
 from ...base.errors import InputError, beside
@@ -23,7 +28,26 @@ from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
 from ..valid_range import ENDING
 from .schema import CLEAR, CatenaryData
-from .view import LineView
+
+
+class LineView(NamedTuple):
+    """Part of one lane's line. Arrays are empty for what a line does not have."""
+
+    x: Array  # (n,): positions along the line (m)
+    contact: Array  # (n,): height of the contact wire there (m)
+    messenger: Array  # (n,): height of the messenger wire there (m), or (0,)
+    supports: Array  # (supports,): positions (m)
+    droppers: Array  # (droppers,): positions (m)
+    tops: Array  # (droppers,): height of their upper ends (m)
+    bottoms: Array  # (droppers,): height of their lower ends (m)
+    further: tuple[tuple[Array, Array], ...]  # positions and heights (m) of stitch wires and a second pair
+    slack: NDArray[np.bool_]  # (droppers,): whether each dropper is slack
+
+
+NONE = np.zeros(0)
+NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, NONE, NONE, (), slack=np.zeros(0, dtype=np.bool_))
+"""View of a line that has neither wires nor supports."""
+
 
 SLOWEST = 1e-9
 """Minimum speed of a train (m/s); below it the train counts as at rest."""

@@ -12,9 +12,8 @@ from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ...side_wind import draw_side_wind
-from ..protocol import StartPoint, check_speeds
+from ..protocol import LineView, StartPoint, check_speeds
 from ..schema import FEWEST_SPANS
-from ..view import LineView
 from .arrays import Beside, FlexibleLine
 from .attached import dropper_positions
 from .blown import air_about, start_wind

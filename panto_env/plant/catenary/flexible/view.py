@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ..view import LineView
+from ..protocol import LineView
 from .arrays import CONTACT, MESSENGER, PAD
 from .beams import Profile
 from .overlaps import FAR, heights_of_pair, tension_lengths

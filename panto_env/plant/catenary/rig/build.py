@@ -14,11 +14,10 @@ from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
 from ...pantograph.build import exponential
 from ..flexible import KIND as FLEXIBLE
-from ..protocol import CatenaryModel, StartPoint
+from ..protocol import CatenaryModel, LineView, StartPoint
 from ..three_span import KIND as THREE_SPAN
-from ..view import LineView
-from .arrays import TERMS, FitRow, RigLine, RigRow, RigWire
 from .schema import Computer, RigData
+from .step import TERMS, FitRow, RigLine, RigRow, RigWire
 
 LINES = {"flexible": FLEXIBLE, "three_span": THREE_SPAN}
 STEPS = 4

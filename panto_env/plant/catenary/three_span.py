@@ -1,20 +1,191 @@
-"""A three-span catenary for a number of lanes: modes, their exact step, and its state."""
+"""Arrays of a three-span catenary: its constants and the state of all lanes.
+
+Three-span catenary (paper 2, section 2.1, Eqs 1-6): one equivalent wire, in modal form.
+
+The wire is anchored at both ends of the three spans and stands on springs K_S at the two supports
+between them. The pantograph is always in the central span: when it leaves it, the deflection of the
+second and third span is moved to the first and second, the third starts at rest, and the modal
+coordinates follow by least squares.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from ....base.arrays import Array, one_thread
-from ...line_condition import DrawnLine
-from ...numerics import Numerics, Runs
-from ..protocol import StartPoint, check_speeds, refuse_defects
-from ..view import NOTHING, LineView
-from .arrays import MARGIN, ThreeSpanLine, ThreeSpanWire
-from .schema import ThreeSpanData
+from ...backend import implements, inlined
+from ...base.arrays import Array, Index, one_thread
+from ...base.settings import Between
+from ..line_condition import DrawnLine
+from ..numerics import Numerics, Runs
+from ..valid_range import ENDING
+from .protocol import (
+    NOTHING,
+    CatenaryKind,
+    LineView,
+    StartPoint,
+    advance_wire,
+    apply_force,
+    check_speeds,
+    ending_by_wire,
+    look_at_contact,
+    place_contact,
+    record_wire,
+    refuse_defects,
+    rise_at_contact,
+)
+from .schema import CatenaryData, Wire
+
+MARGIN = 2.0  # m, of the table beyond the central span: a step may end past the support
+
+
+class ThreeSpanLine(NamedTuple):
+    """Constants of the line; modes are scaled to unit modal mass."""
+
+    span: float  # m
+    time_step: float  # s
+    shape: Array  # (points, modes): mode shapes about the central span (1/sqrt(kg))
+    spacing: float  # of the points (m)
+    propagate: Array  # (4, modes): exact free motion over a step: q <- q, v; v <- q, v
+    impulse: Array  # (2, modes): change of q and v by 1 N of modal force over a step
+    half_step: Array  # (3, modes): q at mid-step <- q, v at the step's start, 1 N of modal force
+    softness: Array  # (modes,): 1 / omega^2 (s^2)
+    at_support: Array  # (2, modes): mode shapes at the two supports
+    project: Array  # (modes, modes): modal coordinates in the next span from those in this one
+    free_uplift: float  # room for the uplift at a support (m)
+
+
+class ThreeSpanWire(NamedTuple):
+    """State of the wire in all lanes."""
+
+    modal: Array  # (lanes, 2, modes): coordinates and their rates
+    contact_shape: Array  # (lanes, collectors, modes): mode shapes at the contact points
+    scratch: Array  # (lanes, 2, modes)
+    central_span: Index  # (lanes,): number of the central span along the line
+
+
+class ThreeSpanData(CatenaryData):
+    """One equivalent tensioned wire on springs, three spans long (paper 2, section 2.1)."""
+
+    kind: Literal["three_span"] = "three_span"
+    wire: Wire
+    suspension_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(
+        description="spring K_S at each support (N/m)"
+    )
+    modes: Annotated[int, Between(3, 400)] = Field(description="number of vibration modes kept")
+    damping_ratio: Annotated[float, Between(0, 0.99)] = Field(description="damping ratio of each mode (-)")
+
+
+@inlined
+def read_shape(line, wire, lane, x, shape):
+    """Write the mode shapes at x (m along the line), about the central span, to ``shape``, (modes,)."""
+    local = x - wire.central_span[lane] * line.span + MARGIN
+    ratio = min(max(local / line.spacing, 0.0), line.shape.shape[0] - 1.001)
+    k = int(ratio)
+    for m in range(shape.size):
+        shape[m] = line.shape[k, m] + (ratio - k) * (line.shape[k + 1, m] - line.shape[k, m])
+
+
+@implements(advance_wire, ThreeSpanLine)
+def _advance(line, wire, lane):
+    q, v = wire.modal[lane, 0], wire.modal[lane, 1]
+    for m in range(q.size):
+        coordinate, rate = q[m], v[m]
+        q[m] = line.propagate[0, m] * coordinate + line.propagate[1, m] * rate
+        v[m] = line.propagate[2, m] * coordinate + line.propagate[3, m] * rate
+
+
+@inlined
+def deflection(shape, q):
+    """Height (m) of the wire at a place, from its mode shapes there and the modal coordinates."""
+    height = 0.0
+    for m in range(q.size):
+        height += shape[m] * q[m]
+    return height
+
+
+@inlined
+def project(line, wire, lane):
+    """Project the wire's shape and rates onto the three spans about the next one."""
+    modal, before = wire.modal[lane], wire.scratch[lane]
+    size = modal.shape[1]
+    for k in range(2):
+        for m in range(size):
+            before[k, m] = modal[k, m]
+        for m in range(size):
+            total = 0.0
+            for j in range(size):
+                total += line.project[m, j] * before[k, j]
+            modal[k, m] = total
+    wire.central_span[lane] += 1
+
+
+@implements(place_contact, ThreeSpanLine)
+def _place(line, wire, lane, contact, x):
+    if contact == 0 and x >= (wire.central_span[lane] + 1) * line.span:
+        project(line, wire, lane)
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
+    read_shape(line, wire, lane, x, shape)
+    middle = 0.0
+    for m in range(shape.size):
+        middle += shape[m] * (line.half_step[0, m] * modal[0, m] + line.half_step[1, m] * modal[1, m])
+    return deflection(shape, modal[0]), middle
+
+
+@implements(rise_at_contact, ThreeSpanLine)
+def _rise(line, wire, lane, contact, x0, x1):
+    q, v, shape = wire.modal[lane, 0], wire.modal[lane, 1], wire.scratch[lane, 0]
+    read_shape(line, wire, lane, x1, shape)
+    rise = deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v)
+    read_shape(line, wire, lane, x0, shape)
+    return rise - (deflection(shape, q) - 0.5 * line.time_step * deflection(shape, v))
+
+
+@implements(look_at_contact, ThreeSpanLine)
+def _look(line, wire, lane, contact, x):
+    shape, at_end, at_middle = wire.contact_shape[lane, contact], 0.0, 0.0
+    for m in range(shape.size):
+        at_end += shape[m] * line.impulse[0, m] * shape[m]
+        at_middle += shape[m] * line.half_step[2, m] * shape[m]
+    return deflection(shape, wire.modal[lane, 0]), at_end, at_middle, 0.0
+
+
+@implements(apply_force, ThreeSpanLine)
+def _apply(line, wire, lane, contact, x, force):
+    modal, shape = wire.modal[lane], wire.contact_shape[lane, contact]
+    for m in range(shape.size):
+        modal[0, m] += line.impulse[0, m] * shape[m] * force
+        modal[1, m] += line.impulse[1, m] * shape[m] * force
+
+
+@inlined
+def support_uplift(line, wire, lane, side):
+    """Uplift (m) at the support before the central span (side 0) or behind it (1)."""
+    total = 0.0
+    for m in range(line.at_support.shape[1]):
+        total += line.at_support[side, m] * wire.modal[lane, 0, m]
+    return total
+
+
+@implements(ending_by_wire, ThreeSpanLine)
+def _ending(line, wire, lane):
+    for side in range(2):
+        if support_uplift(line, wire, lane, side) > line.free_uplift:
+            return ENDING.STOP
+    return ENDING.NONE
+
+
+@implements(record_wire, ThreeSpanLine)
+def _record(line, wire, lane, uplift, tension):
+    for side in range(2):
+        support = wire.central_span[lane] - 1 + side
+        if 0 <= support < uplift.size:
+            uplift[support] = support_uplift(line, wire, lane, side)
+
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
 VIEW_POINTS = 361
@@ -177,3 +348,8 @@ def _at_rest(lanes: int, collectors: int, size: int) -> ThreeSpanWire:
         scratch=np.zeros((lanes, 2, size)),
         central_span=np.zeros(lanes, dtype=np.int64),
     )
+
+
+__all__ = ["KIND", "ThreeSpan", "ThreeSpanData"]
+
+KIND = CatenaryKind(ThreeSpanData, ThreeSpan)

@@ -1,19 +1,72 @@
-"""A line of periodic stiffness for a number of lanes."""
+"""Arrays of a line of periodic stiffness: only its constants, since nothing moves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from ....base.arrays import Array
-from ...line_condition import DrawnLine
-from ...numerics import Numerics, Runs
-from ..protocol import StartPoint, check_speeds, refuse_defects
-from ..view import NOTHING, LineView
-from .arrays import PeriodicLine, PeriodicWire
-from .schema import PeriodicStiffnessData
+from ...backend import implements, inlined
+from ...base.arrays import Array
+from ...base.settings import Between
+from ..alignment import AlignmentArrays, in_spans
+from ..line_condition import DrawnLine
+from ..numerics import Numerics, Runs
+from ..trigonometry import cosine_of_turns
+from .protocol import (
+    NOTHING,
+    CatenaryKind,
+    LineView,
+    StartPoint,
+    check_speeds,
+    look_at_contact,
+    place_contact,
+    refuse_defects,
+)
+from .schema import CatenaryData
+
+
+class PeriodicLine(NamedTuple):
+    """Constants of the line."""
+
+    mean: float  # k_m (N/m)
+    variation: float  # epsilon (-)
+    alignment: AlignmentArrays
+
+
+class PeriodicWire(NamedTuple):
+    """A massless wire has no state, but Numba requires a field."""
+
+    nothing: Array
+
+
+class PeriodicStiffnessData(CatenaryData):
+    """A massless spring whose stiffness varies along the span (paper 3, Eqs 1-5)."""
+
+    kind: Literal["periodic_stiffness"] = "periodic_stiffness"
+    mean_stiffness: Annotated[float, Between(10, 1e8, "N/m")] = Field(description="mean stiffness k_m (N/m)")
+    stiffness_variation: Annotated[float, Between(0, 0.99)] = Field(
+        description="relative amplitude epsilon of the stiffness (-)"
+    )
+
+
+@inlined
+def stiffness(line, x):
+    """Stiffness k (N/m) at x (m), Eq. 5 of paper 3."""
+    return line.mean * (1.0 + line.variation * cosine_of_turns(in_spans(line.alignment, x)))
+
+
+@implements(place_contact, PeriodicLine)
+def _place(line, wire, lane, contact, x):
+    return 0.0, 0.0
+
+
+@implements(look_at_contact, PeriodicLine)
+def _look(line, wire, lane, contact, x):
+    return 0.0, 0.0, 0.0, 1.0 / stiffness(line, x)
+
 
 TIME_STEP = 5e-3
 """Default time step (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
@@ -64,3 +117,8 @@ class PeriodicStiffness:
     def view(self, lane: int, begin: float, end: float) -> LineView:
         """An empty view: a spring has no shape along the line."""
         return NOTHING
+
+
+__all__ = ["KIND", "PeriodicStiffness", "PeriodicStiffnessData"]
+
+KIND = CatenaryKind(PeriodicStiffnessData, PeriodicStiffness)
