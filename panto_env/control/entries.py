@@ -22,10 +22,10 @@ from ..plant.actuators import ActuatorSettings
 from ..plant.alignment import mean_over_own_length
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
+from ..plant.functions import cosine_of_turns, sine_of_turns
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import READING
 from ..plant.state import ROW
-from ..plant.trigonometry import cosine_of_turns, sine_of_turns
 from .state import NOW, NOW_ROWS, TASK_ROW
 
 SPAN_LENGTH = ("span length", 50.0, "m")

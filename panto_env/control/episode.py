@@ -14,8 +14,7 @@ from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
-from ..plant.state import PerCollector, per_collector
-from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
+from ..plant.state import HEAD_RANGE, LOSS_TIME, PerCollector, per_collector
 from .entries import AVERAGED, DEVIATIONS, line_values
 from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout

@@ -14,9 +14,9 @@ from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError, beside
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.schema import MOST_SPANS
-from ..plant.drift import ahead, largest_drift, largest_lag
 from ..plant.plant import Plant
 from ..plant.state import SAMPLE_ROWS
+from ..plant.train import ahead, largest_drift, largest_lag
 from .settings import RunSettings, speed_range
 
 COPIES = 2

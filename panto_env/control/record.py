@@ -16,8 +16,7 @@ from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
-from ..plant.state import Row
-from ..plant.valid_range import LARGEST_HEIGHT, LARGEST_SPEED, Ending, reason
+from ..plant.state import LARGEST_HEIGHT, LARGEST_SPEED, Ending, Row, reason
 from .identity import identity
 from .mean_force import named
 from .state import TaskRow

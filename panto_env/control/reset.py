@@ -11,14 +11,12 @@ import numpy as np
 from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..plant.alignment import Alignment
-from ..plant.drift import draw_drift
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.build import with_scatter
 from ..plant.pantograph.schema import PantographData
-from ..plant.side_wind import draw_side_wind
-from ..plant.state import SAMPLE_ROWS, Row
-from ..plant.valid_range import Ending
-from ..plant.wind import draw_wind
+from ..plant.state import SAMPLE_ROWS, Ending, Row
+from ..plant.train import draw_drift
+from ..plant.wind import draw_side_wind, draw_wind
 from .episode import Results
 from .memory import forget
 from .record import ending

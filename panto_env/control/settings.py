@@ -24,12 +24,11 @@ from ..metrics.figures import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count
-from ..plant.drift import largest_drift
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
-from ..plant.train import MOST_COLLECTORS, Train
+from ..plant.train import MOST_COLLECTORS, Train, largest_drift
 from .observation import OBSERVATIONS
 from .reward import REWARDS, CostWeights, Reward
 

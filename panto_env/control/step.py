@@ -14,10 +14,9 @@ from ..metrics.low_pass import low_pass_sections
 from ..plant.alignment import between_supports
 from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
-from ..plant.state import PLACE, ROW, Row
+from ..plant.state import ENDING, LARGEST_HEIGHT, PLACE, ROW, Row
 from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, place_on_line, position
-from ..plant.valid_range import ENDING, LARGEST_HEIGHT
 from .memory import keep_front
 from .observation import (
     begin_averages,

@@ -15,7 +15,7 @@ from ..base.arrays import Array, Index, Lanes
 from ..plant.pantograph.build import matrices
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
-from ..plant.sensors.noise import AHEAD
+from ..plant.sensors.base import AHEAD
 from ..plant.state import ROW, Row
 from .kalman import steady_gain
 from .model import EstimatorSettings, build_model

@@ -12,8 +12,7 @@ from pydantic import Field, field_validator
 
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
-from .side_wind import SideWind
-from .wind import Wind
+from .wind import SideWind, Wind
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a smooth wire (seen in one toy model). It
 # is that of a wire just strung: makers keep short waves of contact wires within 0.1 mm (seen: nkt cables,

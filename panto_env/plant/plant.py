@@ -13,7 +13,6 @@ from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
-from .drift import DRIFT_ROWS, ahead, gain
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
 from .pantograph.build import NONE_REFLECTED, check_compression, pantographs, rest_state
@@ -21,7 +20,7 @@ from .pantograph.schema import PantographData
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
-from .train import Train
+from .train import DRIFT_ROWS, Train, ahead, gain
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
 
 

@@ -24,7 +24,7 @@ from ..plant.catenary.rig import Rig, RigData
 from ..plant.catenary.rig.step import RigRow, sample
 from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics, Runs
-from ..plant.valid_range import Ending, reason
+from ..plant.state import Ending, reason
 
 
 def load_rig(source: Any) -> RigData:

@@ -10,7 +10,7 @@ import pytest
 
 import panto_env
 from panto_env.backend import JIT, kernel
-from panto_env.plant.contact import contact_force
+from panto_env.plant.pantograph.step import contact_force
 
 PACKAGE = Path(panto_env.__file__).parent
 CODE = """

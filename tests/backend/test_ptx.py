@@ -17,7 +17,7 @@ from panto_env.control import Task  # noqa: E402
 from panto_env.control.on_device import BEGUN, RESULTS, arrays_of, control_unless_idle  # noqa: E402
 from panto_env.control.settings import run_settings  # noqa: E402
 from panto_env.envs import IDS  # noqa: E402
-from panto_env.plant.contact import contact_force  # noqa: E402
+from panto_env.plant.pantograph.step import contact_force  # noqa: E402
 
 
 def columns(name, lanes):

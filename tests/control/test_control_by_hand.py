@@ -13,9 +13,8 @@ from panto_env.control.record import LARGEST_DEVIATION, diverged, trajectory
 from panto_env.control.reward import add_to_limits
 from panto_env.control.settings import run_settings
 from panto_env.control.state import NOW, Now, TaskRow
-from panto_env.plant.contact import shared_forces
-from panto_env.plant.state import Row
-from panto_env.plant.valid_range import LARGEST_HEIGHT, Ending
+from panto_env.plant.pantograph.step import shared_forces
+from panto_env.plant.state import LARGEST_HEIGHT, Ending, Row
 
 SHORT = {"distance": 120.0, "spans": 6, "window": 0}
 

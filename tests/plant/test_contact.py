@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from panto_env.backend import kernel
-from panto_env.plant.contact import contact_force
+from panto_env.plant.pantograph.step import contact_force
 
 pytestmark = pytest.mark.plain
 

@@ -8,7 +8,7 @@ from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.grid import point_gain, stencil_weights
 from panto_env.plant.catenary.three_span import ThreeSpan
-from panto_env.plant.interpolation import stencil
+from panto_env.plant.functions import stencil
 from panto_env.plant.numerics import Numerics, Runs
 
 from ..finite_element import simulation as finite_element

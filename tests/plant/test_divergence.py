@@ -14,8 +14,7 @@ from panto_env.control.settings import run_settings
 from panto_env.control.state import TaskRow
 from panto_env.envs import IDS
 from panto_env.plant.pantograph.schema import PantographData
-from panto_env.plant.state import Row
-from panto_env.plant.valid_range import Ending
+from panto_env.plant.state import Ending, Row
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])

@@ -10,8 +10,8 @@ from panto_env.backend import python_function
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.trajectory import Trajectory
-from panto_env.plant.drift import ahead, draw_drift, largest_drift, largest_lag
-from panto_env.plant.trigonometry import sine_of_turns
+from panto_env.plant.functions import sine_of_turns
+from panto_env.plant.train import ahead, draw_drift, largest_drift, largest_lag
 
 from ..lanes import check_lanes_are_singles
 

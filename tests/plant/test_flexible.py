@@ -4,7 +4,7 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.backend import WIDTH, kernel
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant import interpolation
+from panto_env.plant import functions as interpolation
 from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD, STENCIL
 from panto_env.plant.catenary.flexible.attached import dropper_positions

@@ -10,7 +10,7 @@ from panto_env.plant.catenary.flexible.grid import missing_between, missing_yiel
 from panto_env.plant.catenary.flexible.on_grid import STIFFEST
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.interpolation import stencil
+from panto_env.plant.functions import stencil
 from panto_env.plant.numerics import Numerics, Runs
 
 LINE = load_catenary("en50318-2002")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from panto_env.backend import kernel
-from panto_env.plant.interpolation import stencil
-from panto_env.plant.trigonometry import cosine_of_turns, sine_of_turns
+from panto_env.plant.functions import cosine_of_turns, sine_of_turns, stencil
 
 pytestmark = pytest.mark.plain
 

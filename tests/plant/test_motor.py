@@ -11,9 +11,8 @@ from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.plant.actuators.motor import MotorActuator
-from panto_env.plant.actuators.motor.arrays import MotorRow
-from panto_env.plant.actuators.motor.current import age, decay
-from panto_env.plant.actuators.motor.power import motor_power
+from panto_env.plant.actuators.motor.schema import motor_power
+from panto_env.plant.actuators.motor.step import MotorRow, age, decay
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.pantograph.build import matrices

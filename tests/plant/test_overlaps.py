@@ -17,8 +17,8 @@ from panto_env.plant.catenary.flexible.build import at_rest
 from panto_env.plant.catenary.flexible.overlaps import heights_of_pair, tension_lengths
 from panto_env.plant.catenary.flexible.static import droppers_at_rest, hang
 from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
-from panto_env.plant.contact import shared_forces
 from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.pantograph.step import shared_forces
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train

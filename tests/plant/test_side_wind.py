@@ -7,7 +7,7 @@ from scipy.signal import welch
 
 from panto_env import InputError, simulate
 from panto_env.plant.catenary.flexible.blown import diameter
-from panto_env.plant.side_wind import (
+from panto_env.plant.wind import (
     DECAY,
     HEIGHT,
     QUICKEST_GUST,
@@ -15,7 +15,7 @@ from panto_env.plant.side_wind import (
     SLOWEST_GUST,
     SideWind,
     draw_side_wind,
-    resolved,
+    side_resolved,
     side_winds_at,
 )
 
@@ -39,8 +39,8 @@ def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
     assert whole == pytest.approx(2.0**2, rel=1e-6)
     limits = SLOWEST_GUST * 12 / HEIGHT, QUICKEST_GUST * 12 / HEIGHT
     band, _ = quad(lambda n: panofsky(n, 12.0, 2.0), *limits, limit=200)
-    assert resolved() == pytest.approx(band / 2.0**2, rel=1e-6)
-    assert 0.90 < resolved() < 0.92
+    assert side_resolved() == pytest.approx(band / 2.0**2, rel=1e-6)
+    assert 0.90 < side_resolved() < 0.92
 
 
 def test_gusts_at_a_place_have_panofsky_s_spectrum_less_what_is_short_along_the_track():

@@ -17,7 +17,7 @@ from panto_env.plant.catenary.flexible.wires import places
 from panto_env.plant.catenary.protocol import ending_by_wire
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.plant.valid_range import FREE_UPLIFT, Ending
+from panto_env.plant.state import FREE_UPLIFT, Ending
 
 from ..command import panto
 

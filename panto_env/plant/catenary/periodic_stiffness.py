@@ -12,9 +12,9 @@ from ...backend import implements, inlined
 from ...base.arrays import Array
 from ...base.settings import Between
 from ..alignment import AlignmentArrays, in_spans
+from ..functions import cosine_of_turns
 from ..line_condition import DrawnLine
 from ..numerics import Numerics, Runs
-from ..trigonometry import cosine_of_turns
 from .protocol import (
     NOTHING,
     CatenaryKind,

@@ -26,7 +26,7 @@ from ...base.arrays import Array, from_kmh, to_kmh
 from ...base.errors import InputError, beside
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
-from ..valid_range import ENDING
+from ..state import ENDING
 from .schema import CLEAR, CatenaryData
 
 

@@ -22,7 +22,7 @@ from ...base.arrays import Array, Index, one_thread
 from ...base.settings import Between
 from ..line_condition import DrawnLine
 from ..numerics import Numerics, Runs
-from ..valid_range import ENDING
+from ..state import ENDING
 from .protocol import (
     NOTHING,
     CatenaryKind,

@@ -17,7 +17,7 @@ from ...base.arrays import Array
 from ...catalog import load_catenary, load_pantograph
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
-from ...plant.actuators.motor.arrays import MotorArrays
+from ...plant.actuators.motor.step import MotorArrays
 from ...plant.line_condition import DrawnLine, LineCondition
 from ...plant.numerics import Numerics, Runs
 from ...plant.plant import Plant

@@ -28,8 +28,8 @@ from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
 from ...plant.actuators.motor import MotorActuator
-from ...plant.actuators.motor.arrays import MotorArrays
-from ...plant.actuators.motor.power import MotorPower, motor_power
+from ...plant.actuators.motor.schema import MotorPower, motor_power
+from ...plant.actuators.motor.step import MotorArrays
 from ...plant.state import Place, Row
 
 PANTOGRAPH, CATENARY, MOTOR = "own-motor-head", "en50318-2002", "head-motor"

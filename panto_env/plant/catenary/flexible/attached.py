@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ...interpolation import stencil
+from ...functions import stencil
 from .arrays import CONTACT, MESSENGER, PAD
 from .grid import spring_levels
 from .overlaps import TensionLength, tension_lengths

@@ -14,8 +14,8 @@ from numpy.typing import DTypeLike
 
 from ....backend import WIDTH, bind, called, kernel, load_row, open_packed, pack, store_row
 from ....base.arrays import Array
-from ...side_wind import SHORTEST_WAVE, SIDE_ROWS
-from ...trigonometry import cosine_of_turns, sine_of_turns
+from ...functions import cosine_of_turns, sine_of_turns
+from ...wind import SHORTEST_WAVE, SIDE_ROWS
 from ..protocol import advance_wire, end_step
 from ..schema import Wire
 from .arrays import PAD, STENCIL, Air, FlexibleLine, FlexibleWire, Gusts

@@ -11,7 +11,7 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...numerics import Numerics
-from ...valid_range import LARGEST_SPEED
+from ...state import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .attached import joined_springs, links_of, springs_of
 from .beams import Located, Profile, located

@@ -19,7 +19,7 @@ import numpy as np
 from ....backend import WIDTH, python_function
 from ....base.arrays import Array
 from ....base.checksums import remembered
-from ...interpolation import cubic_weights, stencil
+from ...functions import cubic_weights, stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
 

@@ -11,7 +11,7 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
-from ...side_wind import draw_side_wind
+from ...wind import draw_side_wind
 from ..protocol import LineView, StartPoint, check_speeds
 from ..schema import FEWEST_SPANS
 from .arrays import Beside, FlexibleLine

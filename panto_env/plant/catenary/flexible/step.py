@@ -12,8 +12,7 @@ step, acts on it. So the wire's displacement at the ends of a step is the mean o
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
-from ...state import own_row
-from ...valid_range import ENDING
+from ...state import ENDING, own_row
 from ..protocol import (
     advance_wire,
     apply_force,

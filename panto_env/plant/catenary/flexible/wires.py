@@ -21,7 +21,7 @@ from ....backend import (
     store_row,
 )
 from ....base.arrays import Array, Index
-from ...interpolation import cubic_weights
+from ...functions import cubic_weights
 from .arrays import PAD, STENCIL
 
 

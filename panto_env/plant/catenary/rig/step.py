@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ....backend import NOT_NEGATIVE, constants, implements, inlined, kernel, open_packed
 from ....base.arrays import Array
-from ...valid_range import ENDING
+from ...state import ENDING
 from ..protocol import (
     advance_wire,
     apply_force,
