@@ -15,8 +15,7 @@ from panto_env.control.task import Task
 from panto_env.metrics.low_pass import band_rms
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome, Table, find_study, write
-from panto_env.studies.paper1_control.angles import wrap
-from panto_env.studies.paper1_control.cases import (
+from panto_env.studies.paper1_control.passes import (
     ACTUATORS,
     ANGLE_SPEEDS,
     GAIN,
@@ -36,11 +35,15 @@ from panto_env.studies.paper1_control.cases import (
     USUAL,
     Case,
     all_cases,
+    amplification,
     control,
+    longest,
+    passive_at_mean,
+    records,
+    run,
     sampled,
+    wrap,
 )
-from panto_env.studies.paper1_control.linear import amplification
-from panto_env.studies.paper1_control.passes import longest, passive_at_mean, records, run
 
 from ..pages import check_page, same_row, statements_table, tables_of
 

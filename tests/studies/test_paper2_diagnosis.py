@@ -16,7 +16,7 @@ from panto_env.diagnosis.training import (
 )
 from panto_env.plant.line_condition import LineCondition
 from panto_env.studies.paper2 import diagnosis as study
-from panto_env.studies.paper2 import diagnosis_cases as judged
+from panto_env.studies.paper2 import diagnosis_tables as judged
 from panto_env.studies.paper2.diagnosis_tables import alarms_per_10_km, elsewhere_per_10_km, smallest
 
 TRACK = Track("en50318-2002", "dsa250", 220.0, seed=21)

@@ -12,19 +12,17 @@ from panto_env.studies.paper2.estimation import (
     METHODS,
     OBSERVATIONS,
     cases,
-    known_pantograph,
-    over_noise,
-    parameter_information,
-    run,
-)
-from panto_env.studies.paper2.estimation_plots import delay_plot, figure_11_12
-from panto_env.studies.paper2.estimation_tables import (
     comparisons,
+    known_pantograph,
     noise_table,
+    over_noise,
     over_speed_tables,
+    parameter_information,
     parameters_table,
+    run,
     ways_table,
 )
+from panto_env.studies.paper2.estimator import delay_plot, figure_11_12
 
 BOTH, ONE = OBSERVATIONS
 

@@ -5,7 +5,8 @@ import pytest
 
 from panto_env import InputError
 from panto_env.plant.state import Place
-from panto_env.studies.paper2 import motor_bench, motors
+from panto_env.studies.paper2 import head_motors as motor_bench
+from panto_env.studies.paper2 import motors
 
 SPEED = 250.0
 

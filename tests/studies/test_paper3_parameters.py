@@ -6,8 +6,7 @@ import pytest
 
 from panto_env.analysis.sweep import sweep
 from panto_env.studies import find_study, write
-from panto_env.studies.paper3_parameters.equations import Equations
-from panto_env.studies.paper3_parameters.passes import influences, run_pass
+from panto_env.studies.paper3_parameters.passes import Equations, influences, run_pass
 
 pytestmark = pytest.mark.slow
 PLANT = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}

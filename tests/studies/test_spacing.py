@@ -9,9 +9,23 @@ import pytest
 
 from panto_env import simulate
 from panto_env.studies import Outcome, find_study, write
-from panto_env.studies.spacing.passes import CASES, INTERVAL, SPEEDS_KMH, WATCHED, Curve, Wake, curves, wake
-from panto_env.studies.spacing.tables import distances_table, extremes_table, verdict
-from panto_env.studies.spacing.theories import THEORIES, Fit, at_arrival, fit, frequencies, strongest
+from panto_env.studies.spacing.passes import (
+    CASES,
+    INTERVAL,
+    SPEEDS_KMH,
+    THEORIES,
+    WATCHED,
+    Curve,
+    Fit,
+    Wake,
+    at_arrival,
+    curves,
+    fit,
+    frequencies,
+    strongest,
+    wake,
+)
+from panto_env.studies.spacing.study import distances_table, extremes_table, verdict
 
 from ..pages import check_page
 

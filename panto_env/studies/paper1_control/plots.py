@@ -10,8 +10,7 @@ from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
 from ...base import plotting as marks
 from ...base.plotting import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, legend_above, series_colour
 from ...metrics.figures import LABELS
-from .angles import cost_over_angle
-from .cases import (
+from .passes import (
     ANGLE_SPEEDS,
     DAMPING,
     DEFAULT_GAIN,
@@ -27,10 +26,12 @@ from .cases import (
     THETA,
     THETAS,
     Case,
+    Result,
     control,
+    cost_over_angle,
+    records,
     sampled,
 )
-from .passes import Result, records
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,11 +9,11 @@ from itertools import product
 
 from ...base.table import Table
 from ...metrics.figures import LABELS
-from .angles import cost_over_angle
-from .cases import (
+from .passes import (
     ACTUATORS,
     ANGLE_CONTROLS,
     ANGLE_SPEEDS,
+    BANDS,
     DAMPED_GAINS,
     DAMPINGS,
     FAST_SPEEDS,
@@ -32,12 +32,13 @@ from .cases import (
     SPEEDS,
     USUAL,
     Case,
+    Result,
+    amplification,
     control,
+    cost_over_angle,
     damped,
     sampled,
 )
-from .linear import amplification
-from .passes import BANDS, Result
 
 Results = Mapping[Case, Result]
 Column = tuple[str, Callable[[Result], str]]

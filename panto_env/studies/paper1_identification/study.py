@@ -29,9 +29,8 @@ from ...identification import (
 from ...identification.model import Parameters
 from ..study import Outcome, Report
 from . import plots, tables
-from .comparisons import comparisons
-from .computations import LAST_FREQUENCIES, NOISES, RECORDS, SAMPLINGS, Computed, compute
-from .published import PUBLISHED
+from .published import LAST_FREQUENCIES, NOISES, PUBLISHED, RECORDS, SAMPLINGS, Computed, compute
+from .tables import comparisons
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,7 +21,8 @@ from ...diagnosis.features import BROKEN, FALSE_ALARMS, RAISED, SPOT
 from ...diagnosis.plots import plot_diagnosis
 from ...diagnosis.training import Track, draw_defect, drive
 from ..study import Comparison, Outcome, Report
-from .diagnosis_cases import (
+from .diagnosis_tables import (
+    BROKEN_HEADINGS,
     HEALTHY,
     LINES,
     MEANS,
@@ -30,16 +31,13 @@ from .diagnosis_cases import (
     SEEDS,
     SPEEDS_KMH,
     Case,
-    broken_only,
-    judge_track,
-)
-from .diagnosis_tables import (
-    BROKEN_HEADINGS,
     alarms_per_10_km,
+    broken_only,
     broken_row,
     broken_table,
     confusion_table,
     elsewhere_per_10_km,
+    judge_track,
     severity_table,
     share,
     smallest_table,

@@ -1,25 +1,86 @@
-"""Section 4.1 of paper 2 as a part of its study: Figs 11 and 12, and every other way to find the force."""
+"""The estimator's figures: the paper's Figs 11 and 12, and delay over frequency."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
+from typing import TYPE_CHECKING
 
-from ...estimation.motion import measure
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.plotting import ORANGE, legend_above, series_colour
+from ...estimation.estimate import COHERENT, phases
+from ...estimation.motion import Motion, measure
 from ..study import Outcome, Report
 from .estimation import (
     LAG,
+    MISMATCH,
     OBSERVATIONS,
     SPEED_KMH,
+    START,
     cases,
+    comparisons,
     filtered,
     known_pantograph,
+    noise_table,
     over_noise,
+    over_speed_tables,
     parameter_information,
+    parameters_table,
     run,
+    ways_table,
 )
-from .estimation_plots import delay_plot, figure_11_12
-from .estimation_tables import comparisons, noise_table, over_speed_tables, parameters_table, ways_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+SHOWN = 4.0
+"""Seconds drawn: about five spans at 250 km/h. Own choice."""
+HIGHEST = 20.0
+"""Of the frequencies shown (Hz)."""
+
+
+def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
+    """True and estimated contact force (N), (n,): Fig. 11 with velocities, Fig. 12 without."""
+    from matplotlib.figure import Figure
+
+    assert motion.contact_force is not None
+    number = 11 + OBSERVATIONS.index(observation)
+    shown = (motion.time >= START) & (motion.time <= START + SHOWN)
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    axis = figure.subplots()
+    axis.plot(motion.time[shown], motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
+    axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
+    axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
+    words = f"as Fig. {number} of paper 2, from {observation}"
+    figure.suptitle(f"{words}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %", fontsize="medium")
+    legend_above(axis)
+    axis.grid(color="0.9")
+    return figure
+
+
+def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
+    """Delay by phase over frequency of estimates (N), (n,), by name; only where they are coherent."""
+    from matplotlib.figure import Figure
+
+    assert motion.contact_force is not None
+    kept = slice(round(START / motion.time_step), None)
+    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    axis = figure.subplots()
+    for k, (name, force) in enumerate(forces.items()):
+        found = phases(motion.contact_force[kept], force[kept], motion.time_step)
+        late = np.where(found.coherence >= COHERENT, 1e3 * found.delay, np.nan)
+        axis.plot(found.frequency, late, "o-", markersize=3, color=series_colour(k), label=name)
+    axis.axhline(0, color="0.4", linewidth=0.8)
+    axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
+    words = f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent"
+    figure.suptitle(words, fontsize="medium")
+    legend_above(axis, 3)
+    axis.grid(color="0.9")
+    return figure
 
 
 def outcome(report: Report) -> Outcome:

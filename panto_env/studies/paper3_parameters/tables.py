@@ -13,9 +13,18 @@ from ...base.table import Table
 from ...metrics import compliance as en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison
-from .equations import RUN_TIME, Equations
-from .passes import SPANS, SYSTEM, Influence, Pass, Passes, largest_static_force
-from .sensitivity import SHARES, Sensitivity
+from .passes import (
+    RUN_TIME,
+    SHARES,
+    SPANS,
+    SYSTEM,
+    Equations,
+    Influence,
+    Pass,
+    Passes,
+    Sensitivity,
+    largest_static_force,
+)
 
 
 @dataclass(frozen=True)

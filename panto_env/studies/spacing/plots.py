@@ -11,8 +11,7 @@ from ...base.arrays import from_kmh
 from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, series_colour
 from ...catalog import load_catenary
 from ...metrics.compliance import STD_OF_MEAN
-from .passes import Case, Curve
-from .theories import Fit
+from .passes import Case, Curve, Fit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,9 +11,8 @@ from ...base.checksums import __version__, read_checked
 from ...base.errors import InputError
 from ...envs import IDS
 from . import roofline
-from .environments import by_cores, by_lanes
-from .plants import COUNTED, Report, cost_of_settings, in_single, plant_speed
-from .processor import describe
+from .plants import COUNTED, Report, by_cores, by_lanes, cost_of_settings, in_single, plant_speed
+from .roofline import describe
 
 
 def run(repeats: int = 5, report: Report = lambda _: None) -> dict[str, Any]:
