@@ -28,7 +28,7 @@ class Played(NamedTuple):
 
     # (control steps, actions): as it gave them, clipped to -1..1. Of several pantographs side by side, each
     # from where it comes onto the line, with zeros after the last.
-    actions: Array
+    actions: NDArray[np.float64]
     washout: float  # time constant (s) of what the environment subtracted from them, 0 for nothing
 
 
@@ -73,7 +73,7 @@ def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def _passes(actions: Array, steps: NDArray[np.int64], washout: Array) -> list[Played]:
+def _passes(actions: NDArray[np.float64], steps: NDArray[np.int64], washout: Array) -> list[Played]:
     """The inverse of ``_arrays``."""
     each = np.split(actions, np.cumsum(steps)[:-1])
     return [Played(one, float(time)) for one, time in zip(each, washout, strict=True)]

@@ -7,10 +7,10 @@ spectrum; wavelength within the band and phase are drawn.
 
 Wind across the track: its vertical gusts at any place along a line at any time, in closed form.
 
-Gusts are a sum of cosines in time and along the track. Each has a frequency from one of ``SIDE_BANDS`` equal bands
-of the logarithm of frequency, with the band's share of Panofsky's spectrum. Its wavenumber along the track is
-drawn from Cauchy's distribution of the scale C n / (2 pi U): over all draws the gusts at two places d apart
-then have Davenport's coherence exp(-C n d / U).
+Gusts are a sum of cosines in time and along the track. Each has a frequency from one of ``SIDE_BANDS`` equal
+bands of the logarithm of frequency, with the band's share of Panofsky's spectrum. Its wavenumber along the
+track is drawn from Cauchy's distribution of the scale C n / (2 pi U): over all draws the gusts at two places
+d apart then have Davenport's coherence exp(-C n d / U).
 """
 
 from __future__ import annotations

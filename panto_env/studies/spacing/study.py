@@ -107,8 +107,8 @@ def theories_table(found: Sequence[tuple[Curve, Found]]) -> Table:
     """Frequency, period of the distance, correlation and phase of every theory, curve by curve."""
     rows = []
     names = THEORIES | {BEST: "frequency that fits best"}
-    for curve, fits in found:
-        for key, each in fits.items():
+    for curve, fitted in found:
+        for key, each in fitted.items():
             rows.append(
                 (
                     curve.case.line,
