@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import os
 import signal
 import sys
 import warnings
+from contextlib import suppress
 from types import FrameType
 from typing import Annotated, Any, TextIO
 
@@ -13,7 +16,7 @@ from typer import Abort
 
 from ..base.checksums import __version__
 from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning, one_line
-from ..terminal import NARROW, console, guarded_streams, say, show_always
+from ..terminal import NARROW, console, say
 from .group import PlugInGroup, give_options_once
 
 UsageError: Any = typer.BadParameter.__base__
@@ -25,10 +28,11 @@ def main() -> None:
 
     SIGTERM ends it like an interrupt from the keyboard, with all clean-up.
     """
-    show_always()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # where an encoding lacks Greek letters
     warnings.showwarning = _show_warning
-    with guarded_streams():
-        sys.exit(_run())
+    sys.exit(_run())
 
 
 def _run() -> int:
@@ -49,6 +53,10 @@ def _run() -> int:
         return _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
     except Abort:
         status = 1
+    except OSError as error:  # standard output is full, or nobody reads it on
+        with suppress(OSError):  # otherwise the exit would fail too
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1 if isinstance(error, BrokenPipeError) else _refuse(f"{error}.")
     if stopped:
         say("Stopped by SIGTERM before it was done.")
         status = 128 + signal.SIGTERM
