@@ -75,11 +75,13 @@ def refuse_overwriting(path: str | Path, force: bool) -> None:
         raise InputError(f"{path} exists already; give another --output, or --force to overwrite it.")
 
 
+def into_file(words: str, suffixes: Sequence[str]) -> Any:
+    """Option for an output file: its help ends with its suffixes."""
+    return typer.Option(help=f"{words} ({', '.join(suffixes)}).", callback=writable(suffixes))
+
+
 Force = Annotated[bool, typer.Option("--force", help="Overwrite earlier results in the output.")]
-Plot = Annotated[
-    str | None,
-    typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
-]
+Plot = Annotated[str | None, into_file("Write a picture to this file", PICTURES)]
 
 
 WIDE = 200

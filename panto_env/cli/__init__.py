@@ -37,7 +37,15 @@ def main() -> None:
 
 def _run() -> int:
     """Exit status of the command."""
-    stopped = _stop_on_sigterm()
+    stopped: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        """Turn the first SIGTERM into an interrupt; a second one kills."""
+        signal.signal(number, signal.SIG_DFL)
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
     status: int | None
     try:
         status = make_app()(standalone_mode=False)  # otherwise Typer draws a box around errors
@@ -63,19 +71,6 @@ def _run() -> int:
     return status or 0
 
 
-def _stop_on_sigterm() -> list[int]:
-    """Turn the first SIGTERM into an interrupt, and return a list that will hold it; a second one kills."""
-    stopped: list[int] = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        signal.signal(number, signal.SIG_DFL)
-        stopped.append(number)
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
-    return stopped
-
-
 def _refuse(sentence: str) -> int:
     say(one_line(sentence))
     return 2
@@ -98,17 +93,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
-    from . import catalogue, diagnose, estimate, fit, identify, simulate, sweep
-    from . import fit as drift
-    from . import lines as family
-    from . import lines as line
-    from . import records as compare
-    from . import records as record
-    from . import simulate as film
-    from . import studies as reproduce
-    from . import studies as rig
-    from . import studies as speed
-    from . import studies as validate
+    from . import catalogue, diagnose, estimate, fit, identify, lines, records, simulate, studies, sweep
 
     app = typer.Typer(
         name="panto",
@@ -123,22 +108,12 @@ def make_app() -> typer.Typer:
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
-    app.command()(simulate.simulate)
-    app.command()(film.film)
-    app.command()(sweep.sweep)
-    app.command()(family.family)
-    app.command()(line.line)
-    app.command()(validate.validate)
-    app.command()(identify.identify)
-    app.command()(estimate.estimate)
-    app.command()(diagnose.diagnose)
-    app.command()(record.record)
-    app.command()(compare.compare)
-    app.command()(fit.fit)
-    app.command()(drift.drift)
-    app.command()(speed.speed)
-    app.command()(reproduce.reproduce)
-    app.command()(rig.rig)
+    for command in (
+        *(simulate.simulate, simulate.film, sweep.sweep, lines.family, lines.line, studies.validate),
+        *(identify.identify, estimate.estimate, diagnose.diagnose, records.record, records.compare),
+        *(fit.fit, fit.drift, studies.speed, studies.reproduce, studies.rig),
+    ):
+        app.command()(command)
     give_options_once(app)
     return app
 

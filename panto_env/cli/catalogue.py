@@ -32,7 +32,7 @@ from ..plant.line_condition import LINE_CONDITIONS
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SENSOR_PRESETS
 from ..policies import maker_of, parameters_of, policy_names
-from ..terminal import Json, console, print_json, print_table, writable
+from ..terminal import Json, console, into_file, print_json, print_table
 
 Entry = CatenaryData | PantographData | DrawnLines
 LOADERS: Mapping[str, Callable[[str], Entry]] = {
@@ -168,10 +168,8 @@ def list_entries(
     ] = False,
     droppers: Annotated[
         str | None,
-        typer.Option(
-            help="Write the droppers of the line at rest, with force, length and stretch, to this file "
-            f"({', '.join(TABLES)}).",
-            callback=writable(TABLES),
+        into_file(
+            "Write the droppers of the line at rest, with force, length and stretch, to this file", TABLES
         ),
     ] = None,
     json: Json = False,

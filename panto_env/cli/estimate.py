@@ -15,11 +15,11 @@ from ..terminal import (
     Json,
     Plot,
     alert,
+    into_file,
     number,
     print_json,
     print_table,
     progress_console,
-    writable,
     written_last,
 )
 from .identify import pairs
@@ -82,9 +82,7 @@ def estimate(
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option(
-            help=f"Write the estimate to this file ({', '.join(TABLES)}).", callback=writable(TABLES)
-        ),
+        into_file("Write the estimate to this file", TABLES),
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -179,12 +177,7 @@ def _figures(found: Estimate) -> dict[str, float]:
 
     step = float(found.time[1] - found.time[0])
     force = low_pass(found.force, step)[found.first :]
-    return {
-        "mean": float(force.mean()),
-        "std": float(force.std()),
-        "max": float(force.max()),
-        "min": float(force.min()),
-    }
+    return {name: float(getattr(force, name)()) for name in ("mean", "std", "max", "min")}
 
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:
@@ -213,7 +206,7 @@ def _plain(
         "nis": tested.nis,
         "largest_autocorrelation": tested.whiteness.largest,
         "tests": [
-            {"name": test.name, "value": test.value, "low": test.low, "high": test.high, "kept": test.kept}
+            {key: getattr(test, key) for key in ("name", "value", "low", "high", "kept")}
             for test in found.verdict.tests
         ],
         "believe": found.verdict.believe,
@@ -243,15 +236,11 @@ def _print(
     print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", "", "judged by"), rows))
     for reason in found.verdict.reasons:
         alert("Warning:", f"{reason}.")
-    if scores:
-        print_table(_scores_table(scores))
-
-
-def _scores_table(scores: list[Score]) -> Table:
-    rows = []
+    compared: list[tuple[str, ...]] = []
     for each in scores:
         forces = number(each.bias, 2), number(each.rms, 2)
         likeness = number(each.correlation, 4), number(1e3 * each.delay, 2)
-        rows.append((f"0 to {each.band:g} Hz", *forces, *likeness))
-    headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
-    return Table("Compared with the recorded contact force", headings, rows)
+        compared.append((f"0 to {each.band:g} Hz", *forces, *likeness))
+    if compared:
+        headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
+        print_table(Table("Compared with the recorded contact force", headings, compared))

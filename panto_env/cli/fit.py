@@ -15,6 +15,7 @@ from ..terminal import (
     alert,
     bars,
     console,
+    into_file,
     print_json,
     print_table,
     progress_console,
@@ -56,18 +57,15 @@ def fit(
     column: Heading = None,
     output: Annotated[
         str | None,
-        typer.Option(help="Write the fitted line to this file (.toml).", callback=writable((".toml",))),
+        into_file("Write the fitted line to this file", (".toml",)),
     ] = None,
     pantograph_output: Annotated[
         str | None,
-        typer.Option(help="Write the fitted pantograph to this file (.toml).", callback=writable((".toml",))),
+        into_file("Write the fitted pantograph to this file", (".toml",)),
     ] = None,
     values: Annotated[
         str | None,
-        typer.Option(
-            help=f"Write all values with their intervals to this file ({', '.join(TABLES)}).",
-            callback=writable(TABLES),
-        ),
+        into_file("Write all values with their intervals to this file", TABLES),
     ] = None,
     keep: Annotated[
         str | None,
@@ -202,10 +200,7 @@ def drift(
     ] = None,
     values: Annotated[
         str | None,
-        typer.Option(
-            help=f"Write all changes with their intervals to this file ({', '.join(TABLES)}).",
-            callback=writable(TABLES),
-        ),
+        into_file("Write all changes with their intervals to this file", TABLES),
     ] = None,
     plot: Plot = None,
     json: Json = False,

@@ -19,7 +19,7 @@ from ..plant.catenary.flexible.as_run import as_run, as_run_tables
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import dropper_table
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
-from ..terminal import Json, Plot, alert, console, counting, print_json, print_table, writable, written_last
+from ..terminal import Json, Plot, alert, console, counting, into_file, print_json, print_table, written_last
 from .identify import Given, given
 from .records import Heading, Unit
 
@@ -55,9 +55,7 @@ def line(
     ] = "new",
     output: Annotated[
         str | None,
-        typer.Option(
-            help="Write the line between the masts to this TOML file (.toml).", callback=writable((".toml",))
-        ),
+        into_file("Write the line between the masts to this TOML file", (".toml",)),
     ] = None,
     plot: Plot = None,
     json: Json = False,

@@ -17,10 +17,10 @@ from ..terminal import (
     Plot,
     alert,
     console,
+    into_file,
     print_json,
     print_table,
     progress_console,
-    writable,
     written_last,
 )
 from .identify import given
@@ -58,7 +58,7 @@ Filtered = Annotated[
 
 Page = Annotated[
     str | None,
-    typer.Option(help="Write a page with tables and charts to this file (.html).", callback=writable(PAGES)),
+    into_file("Write a page with tables and charts to this file", PAGES),
 ]
 
 
@@ -102,10 +102,7 @@ def record(
     column: Heading = None,
     output: Annotated[
         str | None,
-        typer.Option(
-            help=f"Write the figures of all parts to this file ({', '.join(TABLES)}).",
-            callback=writable(TABLES),
-        ),
+        into_file("Write the figures of all parts to this file", TABLES),
     ] = None,
     plot: Plot = None,
     html: Page = None,

@@ -30,6 +30,7 @@ from ..terminal import (
     alert,
     bars,
     console,
+    into_file,
     number,
     print_json,
     say,
@@ -184,9 +185,7 @@ def film(
             "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then apply to all."
         ),
     ],
-    output: Annotated[
-        str, typer.Option(help=f"Film to write ({', '.join(FILMS)}).", callback=writable(FILMS))
-    ],
+    output: Annotated[str, into_file("Film to write", FILMS)],
     first_span: Annotated[int, typer.Option(min=1, max=1000, help="Span in which the film begins.")] = 10,
     seconds: Annotated[
         float, typer.Option(min=0.1, max=600, help="Time of the run that is shown (s).")

@@ -24,7 +24,7 @@ from ..base.table import TABLES
 from ..control.identity import plain
 from ..control.settings import run_settings
 from ..metrics.figures import LABELS, NUMBER
-from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
+from ..terminal import Json, Plot, console, counting, into_file, number, print_json, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -52,7 +52,7 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
     output: Annotated[
         str | None,
-        typer.Option(help=f"Save the table to this file ({', '.join(TABLES)}).", callback=writable(TABLES)),
+        into_file("Save the table to this file", TABLES),
     ] = None,
     plot: Plot = None,
     json: Json = False,

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all; what cannot be written is refused before any work, in one sentence."""
+"""Files are written whole or not at all; what cannot be written is refused before any work."""
 
 import errno
 import json
@@ -52,11 +52,11 @@ def fail(*_, **__):
 def test_a_disk_that_fails_leaves_the_old_file_and_nothing_else(where, old, monkeypatch):
     if where != "the body":
         monkeypatch.setattr(where, fail)
-    with pytest.raises(InputError, match=r"out\.json cannot be written: No space left on device\.$"):  # noqa: SIM117
-        with write_whole(old) as temporary:
-            temporary.write_text("half")
-            if where == "the body":
-                fail()
+    message = r"out\.json cannot be written: No space left on device\.$"
+    with pytest.raises(InputError, match=message), write_whole(old) as temporary:  # noqa: PT012
+        temporary.write_text("half")
+        if where == "the body":
+            fail()
     assert old.read_text() == "old"
     assert os.listdir() == ["out.json"]
 
