@@ -4,13 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..analysis.plots import save
 from ..base.arrays import from_kmh
 from ..base.errors import InputError
+from ..base.settings import parse
 from ..base.table import TABLES, Alarm, Sheet, Table, write_table
+from ..catalog import load_pantograph
+from ..estimation.estimate import BANDS, Estimate, Score, score
+from ..estimation.estimate import estimate as run
+from ..estimation.estimate import tune as find
+from ..estimation.innovations import nis
+from ..estimation.model import EstimatorSettings
+from ..estimation.motion import Motion, read_motion
+from ..estimation.plausibility import rezeroed
+from ..estimation.plots import plot_estimate
+from ..metrics.figures import LABELS
+from ..metrics.low_pass import low_pass
+from ..plant.pantograph.schema import PantographData
 from ..terminal import (
     Json,
     Plot,
@@ -23,12 +37,6 @@ from ..terminal import (
     written_last,
 )
 from .identify import pairs
-
-if TYPE_CHECKING:
-    from ..estimation.estimate import Estimate, Score
-    from ..estimation.model import EstimatorSettings
-    from ..estimation.motion import Motion
-    from ..plant.pantograph.schema import PantographData
 
 TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
 
@@ -80,10 +88,7 @@ def estimate(
         list[str] | None,
         typer.Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
     ] = None,
-    output: Annotated[
-        str | None,
-        into_file("Write the estimate to this file", TABLES),
-    ] = None,
+    output: Annotated[str | None, into_file("Write the estimate to this file", TABLES)] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -93,13 +98,6 @@ def estimate(
     A record that cannot be a pantograph's is refused with the likely mistake. The mean force depends on the
     lift, and the inertia of the head on its mass: no test shows whether these are wrong.
     """
-    from ..base.settings import parse
-    from ..catalog import load_pantograph
-    from ..estimation.estimate import estimate as run
-    from ..estimation.model import EstimatorSettings
-    from ..estimation.motion import read_motion
-    from ..estimation.plausibility import rezeroed
-
     known = load_pantograph(pantograph)
     metres = None if speed is None else from_kmh(speed)
     motion = read_motion(file, 0.0, speed=metres, span=span, units=pairs(unit or []))
@@ -117,8 +115,6 @@ def estimate(
     given = {key: value for key, value in given.items() if value is not None}
     settings = parse(EstimatorSettings, given, "settings")
     if tune:
-        from ..estimation.estimate import tune as find
-
         names = TUNED if only else (*TUNED, "velocity_noise")
         with progress_console.status("tuning"):
             tuned = find([motion], known, settings, names)
@@ -136,9 +132,6 @@ def estimate(
         if output is not None:
             later(write_table, _sheet(found), output)
         if plot is not None:
-            from ..analysis.plots import save
-            from ..estimation.plots import plot_estimate
-
             title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
             later(save, plot_estimate(found, title, motion.contact_force), plot)
         if json:
@@ -163,7 +156,6 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
 
 
 def _sheet(found: Estimate) -> Sheet:
-    from ..estimation.innovations import nis
 
     normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
     columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
@@ -173,8 +165,6 @@ def _sheet(found: Estimate) -> Sheet:
 
 def _figures(found: Estimate) -> dict[str, float]:
     """Statistics of the estimate behind EN 50317's low-pass (N), after the filter's start."""
-    from ..metrics.low_pass import low_pass
-
     step = float(found.time[1] - found.time[0])
     force = low_pass(found.force, step)[found.first :]
     return {name: float(getattr(force, name)()) for name in ("mean", "std", "max", "min")}
@@ -182,8 +172,6 @@ def _figures(found: Estimate) -> dict[str, float]:
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:
     """Comparison with the record's contact force, if any, in bands for which the record is long enough."""
-    from ..estimation.estimate import BANDS, score
-
     if motion.contact_force is None:
         return []
     kept, scores = slice(found.first, None), []
@@ -219,7 +207,6 @@ def _plain(
 def _print(
     found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
 ) -> None:
-    from ..metrics.figures import LABELS
 
     rows: list[tuple[str, str, str]] = [
         (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()

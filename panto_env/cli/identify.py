@@ -7,17 +7,18 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
+from .. import identification
+from ..analysis.plots import save
+from ..base.arrays import Array
 from ..base.errors import InputError
-from ..identification.performance import SUFFIXES, check_possible
+from ..identification import METHODS, Identification, Match
+from ..identification.performance import SUFFIXES, check_possible, matches_table, parameters_table
+from ..identification.plots import plot_matches
 from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable, written_last
-
-if TYPE_CHECKING:
-    from ..base.arrays import Array
-    from ..identification import Identification, Match
 
 T = TypeVar("T")
 Given = tuple[dict[str, str], dict[str, str]]
@@ -77,12 +78,8 @@ def identify(
     with the likely mistake; values that no pantograph can have are marked; a pantograph is written only where
     the model explains the recorded motion.
     """
-    from .. import identification
-
     full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
     known = {name: _value(name, text) for name, text in pairs([*(measured or []), *(more or [])]).items()}
-    if plot is not None:
-        from ..analysis.plots import save
     record = identification.read_record(file, pairs(unit or []))
     with progress_console.status("identifying"):
         identified = identification.identify(record, known, band=band, free_offset=free_offset)
@@ -111,8 +108,6 @@ def identify(
             )
             later(write, chosen, output)
         if plot is not None and chosen is not None:
-            from ..identification.plots import plot_matches
-
             title = f"{file.name}, model by {chosen.method}"
             first, last = float(record.time[0]), float(record.time[-1])
             later(save, plot_matches(record.time, matches, title, first, last), plot)
@@ -177,15 +172,12 @@ def _plain(identified: Identification, matches: list[Match], method: Method) -> 
 
 def _by_short_name(by_method: Mapping[str, T]) -> dict[str, T]:
     """Values by short names of methods, from values by full names; other keys are left out."""
-    from ..identification import METHODS
-
     return {
         short.value: by_method[full] for short, full in zip(Method, METHODS, strict=True) if full in by_method
     }
 
 
 def _print(identified: Identification, matches: list[Match], method: str) -> None:
-    from ..identification.performance import matches_table, parameters_table
 
     print_table(parameters_table(_by_short_name(identified.fits), identified.band))
     for fit in identified.fits.values():

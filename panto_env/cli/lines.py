@@ -8,12 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
+from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
 from ..analysis.options import print_criteria
+from ..analysis.plots import plot_line, save
 from ..base.errors import InputError
 from ..base.files import write_whole
 from ..base.settings import parse
 from ..catalog import load_catenary, load_drawn
 from ..catalog.loader import drawn_kind, parse_catenary
+from ..catalog.masts import line_from_masts
 from ..control.lines import line_of_seed
 from ..plant.catenary.flexible.as_run import as_run, as_run_tables
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -54,8 +57,7 @@ def line(
         typer.Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run."),
     ] = "new",
     output: Annotated[
-        str | None,
-        into_file("Write the line between the masts to this TOML file", (".toml",)),
+        str | None, into_file("Write the line between the masts to this TOML file", (".toml",))
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -64,8 +66,6 @@ def line(
 
     Exits with 1 if a limit of EN 50119 is broken.
     """
-    from ..analysis.line_check import check, elasticity_table, span_tables
-
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
     chosen, text = _line(name, seed, masts, output, given(unit, column))
@@ -81,8 +81,6 @@ def line(
         if output is not None and text is not None:
             later(_write, text, output)
         if plot is not None:
-            from ..analysis.plots import plot_line, save
-
             later(save, plot_line(found), plot)
         if json:
             print_json(
@@ -121,7 +119,6 @@ def _line(
         return line_of_seed(load_drawn(name), seed)[0], None
     if masts is None:
         return load_catenary(name), None
-    from ..catalog.masts import line_from_masts
 
     text = line_from_masts(name, masts, *columns)
     named = {"name": Path(output or masts).stem}
@@ -150,8 +147,6 @@ def family(
     Each runs at the highest speed of its trains. Exits with 1 if a line is outside the family's or the
     section's own bands of what is plausible.
     """
-    from ..analysis.line_check import drawn_lines, facts, table
-
     chosen = load_drawn(name)
     with counting("running") as progress:
         lines = drawn_lines(chosen, range(first, first + seeds), progress)

@@ -4,13 +4,39 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..analysis.plots import save
 from ..base.files import PAGES
 from ..base.table import TABLES, write_rows
+from ..catalog import load_catenary
 from ..metrics.trajectory import Trajectory
+from ..records.compare import (
+    Comparison,
+    acceptance_table,
+    criterion_notes,
+    figures_table,
+    shift_sentence,
+    spans_table,
+)
+from ..records.compare import compare as hold
+from ..records.compare import plain as plain_comparison
+from ..records.judge import (
+    FILE_HEADINGS,
+    Judgement,
+    judge,
+    part_tables,
+    plain,
+    requirement_remarks,
+    requirements_table,
+    rows_of,
+    whole_table,
+)
+from ..records.page import save_comparison_page, save_record_page
+from ..records.plots import plot_comparison, plot_record
+from ..records.record_file import read_record
 from ..terminal import (
     ALARM,
     Json,
@@ -24,11 +50,6 @@ from ..terminal import (
     written_last,
 )
 from .identify import given
-
-if TYPE_CHECKING:
-    from ..records.compare import Comparison
-    from ..records.judge import Judgement
-
 
 Unit = Annotated[
     list[str] | None,
@@ -100,10 +121,7 @@ def record(
     filtered: Filtered = None,
     unit: Unit = None,
     column: Heading = None,
-    output: Annotated[
-        str | None,
-        into_file("Write the figures of all parts to this file", TABLES),
-    ] = None,
+    output: Annotated[str | None, into_file("Write the figures of all parts to this file", TABLES)] = None,
     plot: Plot = None,
     html: Page = None,
     json: Json = False,
@@ -114,10 +132,6 @@ def record(
     losses of contact are those of the raw force. A record that cannot be a measuring train's is refused with
     the likely mistake.
     """
-    from ..catalog import load_catenary
-    from ..records.judge import FILE_HEADINGS, judge, plain, rows_of
-    from ..records.record_file import read_record
-
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
         measured = read_record(file, **reading(unit, column, mass, filtered))
@@ -127,13 +141,8 @@ def record(
         if output is not None:
             later(write_rows, rows_of(found), output, FILE_HEADINGS)
         if plot is not None:
-            from ..analysis.plots import save
-            from ..records.plots import plot_record
-
             later(save, plot_record(found, title), plot)
         if html is not None:
-            from ..records.page import save_record_page
-
             later(partial(save_record_page, found, title), html)
         if json:
             print_json(plain(found))
@@ -142,7 +151,6 @@ def record(
 
 
 def _print_record(found: Judgement, title: str) -> None:
-    from ..records.judge import part_tables, requirement_remarks, requirements_table, whole_table
 
     for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
         print_table(table)
@@ -179,9 +187,6 @@ def compare(
     whose σ is within 20 %, and whose uplift and range of the contact point's height are within 20 mm
     (recalled).
     """
-    from ..records.compare import compare as hold
-    from ..records.record_file import read_record
-
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
         measured = read_record(file, **reading(unit, column, mass, filtered))
@@ -190,18 +195,11 @@ def compare(
     title += f" at {simulated.speed_kmh:g} km/h"
     with written_last() as later:
         if plot is not None:
-            from ..analysis.plots import save
-            from ..records.plots import plot_comparison
-
             later(save, plot_comparison(found, title), plot)
         if html is not None:
-            from ..records.page import save_comparison_page
-
             later(partial(save_comparison_page, found, title), html)
         if json:
-            from ..records.compare import plain
-
-            print_json(plain(found))
+            print_json(plain_comparison(found))
         else:
             _print_comparison(found, title)
     if found.accepted is False:
@@ -209,13 +207,6 @@ def compare(
 
 
 def _print_comparison(found: Comparison, title: str) -> None:
-    from ..records.compare import (
-        acceptance_table,
-        criterion_notes,
-        figures_table,
-        shift_sentence,
-        spans_table,
-    )
 
     console.print(title, soft_wrap=True)
     console.print(shift_sentence(found), soft_wrap=True)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from ..analysis import simulation
 from ..analysis.options import (
     RENAMED,
     DroppersFile,
@@ -20,6 +21,8 @@ from ..analysis.options import (
     print_criteria,
     with_settings,
 )
+from ..analysis.plots import plot_run, save
+from ..base.errors import InputError
 from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.trajectory import OUTPUTS, Trajectory
@@ -67,13 +70,9 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
-    from ..analysis.simulation import simulate as run
-
     chosen = parse_spans(spans)
-    if plot is not None:
-        from ..analysis.plots import plot_run, save
     with _shown(live, policy or "passive") as (progress, watch):
-        trajectory = run(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
+        trajectory = simulation.simulate(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
     with written_last() as later:
         if output is not None:
             later(trajectory.save, output, None if trajectory.terminated else chosen)
@@ -209,7 +208,6 @@ def film(
     Several policies run on the same line under the same seed, above each other, with their figures.
     A saved run is repeated from its settings, and refused if its contact force differs.
     """
-    from ..base.errors import InputError
     from ..render.film import Filmed, check_together, excerpt, frames, policy_pass, saved_passes
 
     if len(policies) > MOST:

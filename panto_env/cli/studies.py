@@ -14,11 +14,20 @@ from rich.text import Text
 
 from .. import studies
 from ..analysis.options import Seed, Spans, parse_spans, print_criteria, with_settings
+from ..analysis.plots import save
 from ..base.checksums import with_checksum
 from ..base.errors import InputError
 from ..base.files import finite, make_folder
 from ..base.table import Table
+from ..catalog import load_catenary, load_pantograph
+from ..rig import report
+from ..rig.computer import compare, load_rig
+from ..rig.plots import plot_pairs
 from ..studies.en50318 import study
+from ..studies.en50318.plots import plot_reference
+from ..studies.throughput import study as measured
+from ..studies.throughput import tables as shown
+from ..studies.throughput.plots import plot_speed
 from ..terminal import (
     ALARM,
     Json,
@@ -66,9 +75,6 @@ def validate(
     json: Json = False,
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..studies.en50318.plots import plot_reference
     with progress_console.status("validating") as status:
         validation = study.run(
             status.update,
@@ -206,16 +212,12 @@ def speed(
             )
         _on_device(device, repeats, json)
         return
-    from ..studies.throughput import study, tables
 
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..studies.throughput.plots import plot_speed
     if results:
-        found = [study.read(path) for path in results]
+        found = [measured.read(path) for path in results]
     else:
         with progress_console.status("measuring") as status:
-            found = [study.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
+            found = [measured.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
     result = found[0]
     with written_last() as later:
         if plot is not None:
@@ -223,10 +225,10 @@ def speed(
         if json:
             print_json(with_checksum(finite(result)))
         elif markdown:
-            sys.stdout.write("\n".join(tables.markdown(found)))
+            sys.stdout.write("\n".join(shown.markdown(found)))
         else:
-            console.print("\n".join(tables.machines(found)))
-            for part in (tables.summary(found), *tables.details(result)):
+            console.print("\n".join(shown.machines(found)))
+            for part in (shown.summary(found), *shown.details(result)):
                 if isinstance(part, str):
                     console.print(part)
                 else:
@@ -291,10 +293,6 @@ def rig(
 
     By default that is pantograph own-two-mass at 250 km/h, as in paper 2.
     """
-    from ..catalog import load_catenary, load_pantograph
-    from ..rig import report
-    from ..rig.computer import compare, load_rig
-
     chosen, facts, tables, pairs = parse_spans(spans), [], [], []
     pantograph = load_pantograph(settings.pop("pantograph", PANTOGRAPH))
     speed_kmh = settings.pop("speed_kmh", SPEED_KMH)
@@ -320,9 +318,6 @@ def rig(
                 tables.append(report.timing_table(data.name, timing))
     with written_last() as later:
         if plot is not None:
-            from ..analysis.plots import save
-            from ..rig.plots import plot_pairs
-
             later(save, plot_pairs(pairs), plot)
         if json:
             print_json(facts)

@@ -13,11 +13,12 @@ from rich.table import Table
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.parameters import with_distances
+from ..analysis.plots import save
 from ..analysis.pool import MOST_PASSES
 from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
-from ..analysis.sweep_plots import pantographs_of
+from ..analysis.sweep_plots import pantographs_of, plot_sweep
 from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.table import TABLES
@@ -50,21 +51,15 @@ def sweep(
     spans: Spans = None,
     seed: Seed = 0,
     workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
-    output: Annotated[
-        str | None,
-        into_file("Save the table to this file", TABLES),
-    ] = None,
+    output: Annotated[str | None, into_file("Save the table to this file", TABLES)] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Run all combinations of values of one to three parameters, and print figures and verdicts."""
     values = _parse(parameters)
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..analysis.sweep_plots import plot_sweep
-
-        if sum(len({*each}) > 1 for each in values.values()) > 2:  # before hours of passes
-            raise InputError("A plot shows one or two parameters with several values; leave out --plot.")
+    several = sum(len({*each}) > 1 for each in values.values())
+    if plot is not None and several > 2:  # before hours of passes
+        raise InputError("A plot shows one or two parameters with several values; leave out --plot.")
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
     line_spans = settings.pop("spans", None)

@@ -131,6 +131,7 @@ def test_a_command_that_typer_does_not_take_and_a_loader_that_fails(site, tmp_pa
         find_policy(str(tmp_path / "a.their"))
 
 
+@pytest.mark.filterwarnings("always::panto_env.base.errors.PlugInWarning")
 def test_one_that_takes_a_name_of_ours_is_left_out_and_named(site):
     for name, arguments in (("benchmark", ["benchmark", "--help"]), ("simulate", ["simulate", "--help"])):
         done = panto(*arguments)

@@ -47,7 +47,7 @@ def made(monkeypatch):
             asked.append((lines.name, seeds))
             return [drawn(seed) for seed in list(seeds)[:20]]
 
-        monkeypatch.setattr(lines_of, "drawn_lines", drawn_lines)
+        monkeypatch.setattr("panto_env.cli.lines.drawn_lines", drawn_lines)
         return asked
 
     return of
@@ -186,8 +186,8 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         called.update(given, **{name: [run.path.name for run in each] for name, each in runs.items()})
         return found
 
-    monkeypatch.setattr("panto_env.diagnosis.diagnose", judge)
-    monkeypatch.setattr("panto_env.diagnosis.diagnosis.verdict", lambda found: ["It is healthy.", "So."])
+    monkeypatch.setattr(diagnose, "judge", judge)
+    monkeypatch.setattr(diagnose, "verdict", lambda found: ["It is healthy.", "So."])
     words = ("diagnose", "run", "--healthy", "a", "b", "c", "--again", "d", "--seed", 4)
     done = panto(*words)
     assert done.stdout.splitlines()[:2] == ["It is healthy.", "So."]
@@ -205,9 +205,9 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         refused = panto("diagnose", "run", "--healthy", "a", *wrong)
         assert (refused.returncode, sentence in refused.stderr) == (2, True)
     titles, table = [], Table("where", ("m",), (("93",),))
-    monkeypatch.setattr("panto_env.diagnosis.diagnosis.findings_table", lambda found: table)
-    monkeypatch.setattr("panto_env.diagnosis.plots.plot_diagnosis", lambda found, title: titles.append(title))
-    monkeypatch.setattr("panto_env.analysis.plots.save", lambda plot, path: None)
+    monkeypatch.setattr(diagnose, "findings_table", lambda found: table)
+    monkeypatch.setattr(diagnose, "plot_diagnosis", lambda found, title: titles.append(title))
+    monkeypatch.setattr(diagnose, "save", lambda plot, path: None)
     assert "where" not in done.stdout
     found.findings = (SimpleNamespace(begin=93.0),)
     alone = panto("diagnose", "run", "--healthy", "a", "b", "--plot", tmp_path / "it.png")
@@ -227,15 +227,15 @@ def test_a_rig_is_compared_with_its_own_line_or_the_one_that_is_named(monkeypatc
         return data.name
 
     for name, replaced in {
-        "cli.studies.REFERENCE": "re250",
-        "rig.computer.load_rig": lambda name: SimpleNamespace(name=name, line=rigs[name]),
-        "catalog.load_catenary": lambda name: name if name is own else SimpleNamespace(name=name),
-        "rig.computer.compare": compare,
-        "rig.report.pair_facts": lambda pair: {"rig": pair},
-        "rig.report.pair_table": lambda pair: Table("", ("x",), ((pair,),)),
-        "rig.report.followed_sentence": lambda pair: f"It follows {pair}.",
+        "REFERENCE": "re250",
+        "load_rig": lambda name: SimpleNamespace(name=name, line=rigs[name]),
+        "load_catenary": lambda name: name if name is own else SimpleNamespace(name=name),
+        "compare": compare,
+        "report.pair_facts": lambda pair: {"rig": pair},
+        "report.pair_table": lambda pair: Table("", ("x",), ((pair,),)),
+        "report.followed_sentence": lambda pair: f"It follows {pair}.",
     }.items():
-        monkeypatch.setattr(f"panto_env.{name}", replaced)
+        monkeypatch.setattr(f"panto_env.cli.studies.{name}", replaced)
     done = panto("rig", "one", "two", "--seed", 3, *options)
     assert done.returncode == 0
     rest = ("own-two-mass", 250.0, None, None, 3)
