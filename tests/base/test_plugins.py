@@ -59,7 +59,7 @@ def load(path):
     raise KeyError(str(path))
 """
 
-pytestmark = pytest.mark.filterwarnings("ignore::panto_env.base.errors.PlugInWarning")
+quiet = pytest.mark.filterwarnings("ignore::panto_env.base.errors.PlugInWarning")
 
 
 @pytest.fixture
@@ -97,6 +97,7 @@ def test_a_missing_package_is_named():
         plugins.load(point)
 
 
+@quiet
 def test_a_plug_in_that_can_t_be_loaded_stops_no_other_command(site):
     for words in ("--version", "--help", "simulate --help", "list pd"):
         assert panto(*words.split()).returncode == 0
@@ -111,6 +112,7 @@ def test_a_plug_in_that_can_t_be_loaded_stops_no_other_command(site):
     assert np.isclose(told["pd"]["parameters"]["gain"], find_policy("pd").gain)
 
 
+@quiet
 def test_it_is_said_what_is_wrong_with_it(site):
     for name, why in SAID.items():
         said = rf"The plug-in '{name}' of plugin {why}"
@@ -120,6 +122,7 @@ def test_it_is_said_what_is_wrong_with_it(site):
             find_policy(name)
 
 
+@quiet
 def test_a_command_that_typer_does_not_take_and_a_loader_that_fails(site, tmp_path):
     done = panto("unlike")
     assert done.returncode == 2
@@ -131,7 +134,6 @@ def test_a_command_that_typer_does_not_take_and_a_loader_that_fails(site, tmp_pa
         find_policy(str(tmp_path / "a.their"))
 
 
-@pytest.mark.filterwarnings("always::panto_env.base.errors.PlugInWarning")
 def test_one_that_takes_a_name_of_ours_is_left_out_and_named(site):
     for name, arguments in (("benchmark", ["benchmark", "--help"]), ("simulate", ["simulate", "--help"])):
         done = panto(*arguments)
@@ -144,6 +146,7 @@ def test_one_that_takes_a_name_of_ours_is_left_out_and_named(site):
         assert type(find_policy(str(FOLDER / "head.safetensors"))).__module__.startswith("panto_agents")
 
 
+@quiet
 def test_a_tuning_does_not_load_them(site):
     from panto_baselines.tuning.tune import tunable
 

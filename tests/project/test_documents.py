@@ -208,3 +208,13 @@ def takes_json(command):
     if hasattr(command, "commands"):
         return any(takes_json(own) for own in command.commands.values())
     return any("--json" in parameter.opts for parameter in command.params)
+
+
+PROMISED = re.findall(r"`(tests/\S+?)::(\w+)`", (ROOT / "docs" / "promises.md").read_text(encoding="utf-8"))
+
+
+def test_what_is_promised_has_its_test():
+    assert len(PROMISED) > 20
+    for file, name in PROMISED:
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert re.search(rf"^\s*def {name}\(", text, re.MULTILINE), (file, name)
