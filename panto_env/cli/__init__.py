@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Annotated, Any, TextIO
 
 import typer
-from typer import Abort
+from typer import Abort, Option
 
 from ..base.checksums import __version__
 from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning, one_line
@@ -125,7 +125,7 @@ def _show_version(requested: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
+    bool, Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
 ]
 
 

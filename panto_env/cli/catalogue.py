@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
-import typer
 from pydantic import BaseModel
 from rich.table import Table
+from typer import Argument, Option
 
 from ..base.errors import InputError, suggest
 from ..base.files import finite, read_toml
@@ -157,14 +157,13 @@ def _preset(family: str, name: str) -> Description:
 def list_entries(
     name: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Show all values of this line, pantograph, policy, line condition, preset of actuator or "
             "sensors, or TOML file."
         ),
     ] = None,
     toml: Annotated[
-        bool,
-        typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from."),
+        bool, Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from.")
     ] = False,
     droppers: Annotated[
         str | None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from ..analysis.plots import save
 from ..base.errors import InputError
@@ -28,35 +28,34 @@ threshold has no meaning."""
 def diagnose(
     run: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="Run to be diagnosed, from `panto simulate --output`; with --fit, a record of a train."
         ),
     ],
-    more: Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)] = None,
+    more: Annotated[list[Path] | None, Argument(metavar="", hidden=True)] = None,
     healthy: Annotated[
         list[Path] | None,
-        typer.Option(
+        Option(
             metavar="RUN...",
             help="Healthy runs over the same line at the same speed, three or more; better ten or more.",
         ),
     ] = None,
     fit: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Instead of healthy runs: what a fit to earlier records knows of the healthy line, from "
             "`panto fit --keep`."
         ),
     ] = None,
     again: Annotated[
-        list[Path] | None,
-        typer.Option(help="A further run over the diagnosed line, for a mean; may be repeated."),
+        list[Path] | None, Option(help="A further run over the diagnosed line, for a mean; may be repeated.")
     ] = None,
     false_alarms: Annotated[
-        float | None, typer.Option(help="False alarms per km that set the threshold. Default: 0.1.")
+        float | None, Option(help="False alarms per km that set the threshold. Default: 0.1.")
     ] = None,
     pantograph: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Pantograph that the estimator assumes: a name of the catalogue or a TOML file. Default: "
             "the run's, as designed."
         ),
@@ -65,7 +64,7 @@ def diagnose(
     filtered: Filtered = None,
     unit: Unit = None,
     column: Heading = None,
-    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
+    seed: Annotated[int, Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
 ) -> None:

@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from ..analysis.plots import save
 from ..base.arrays import from_kmh
@@ -44,49 +44,45 @@ TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
 def estimate(
     file: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="CSV: time, head, frame, and where measured head_velocity, frame_velocity, frame_force, "
             "head_force; a contact_force is compared with the estimate."
         ),
     ],
     pantograph: Annotated[
-        str, typer.Option(help="Name in the catalogue, or a TOML file, e.g. from `panto identify`.")
+        str, Option(help="Name in the catalogue, or a TOML file, e.g. from `panto identify`.")
     ],
     speed: Annotated[
         float | None,
-        typer.Option(help="Speed of the train (km/h); required for aerodynamic uplift.", min=0, max=1000),
+        Option(help="Speed of the train (km/h); required for aerodynamic uplift.", min=0, max=1000),
     ] = None,
-    span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1, max=1000)] = None,
+    span: Annotated[float | None, Option(help="Length of a span (m).", min=1, max=1000)] = None,
     lift: Annotated[
         float | None,
-        typer.Option(
-            help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0, max=100_000
-        ),
+        Option(help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0, max=100_000),
     ] = None,
     displacements: Annotated[
-        bool, typer.Option("--displacements", help="Do not use velocities, even if they were measured.")
+        bool, Option("--displacements", help="Do not use velocities, even if they were measured.")
     ] = False,
     force_model: Annotated[
-        str, typer.Option(help="random-walk, shaped or periodic, with values such as 'shaped:wavelength=5'.")
+        str, Option(help="random-walk, shaped or periodic, with values such as 'shaped:wavelength=5'.")
     ] = "random-walk",
     displacement_noise: Annotated[
-        float | None, typer.Option(help="White noise of a sample, rms (m).", show_default="2e-5")
+        float | None, Option(help="White noise of a sample, rms (m).", show_default="2e-5")
     ] = None,
     velocity_noise: Annotated[
-        float | None, typer.Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
+        float | None, Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
     ] = None,
-    lag: Annotated[float, typer.Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
+    lag: Annotated[float, Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
     free_zero: Annotated[
-        bool,
-        typer.Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift."),
+        bool, Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift.")
     ] = False,
     tune: Annotated[
-        bool,
-        typer.Option("--tune", help="First find noise intensities on this record by maximum likelihood."),
+        bool, Option("--tune", help="First find noise intensities on this record by maximum likelihood.")
     ] = False,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
+        Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
     ] = None,
     output: Annotated[str | None, into_file("Write the estimate to this file", TABLES)] = None,
     plot: Plot = None,
@@ -156,7 +152,6 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
 
 
 def _sheet(found: Estimate) -> Sheet:
-
     normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
     columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
     units = {"time": "time (s)", "contact_force": "contact_force (N)", "nis": "nis (-)"}
@@ -207,7 +202,6 @@ def _plain(
 def _print(
     found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
 ) -> None:
-
     rows: list[tuple[str, str, str]] = [
         (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()
     ]

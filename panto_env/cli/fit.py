@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from ..analysis.plots import save
 from ..base.errors import InputError, suggest
@@ -41,13 +41,13 @@ from .records import Filtered, Heading, Mass, Unit, reading
 
 def fit(
     files: Annotated[
-        list[Path], typer.Argument(metavar="RECORD...", help="Records, as `panto record` reads them.")
+        list[Path], Argument(metavar="RECORD...", help="Records, as `panto record` reads them.")
     ],
-    line: Annotated[str, typer.Option(help="Line as designed: a name in the catalogue or a TOML file.")],
-    pantograph: Annotated[str, typer.Option(help="Pantograph: a name in the catalogue or a TOML file.")],
+    line: Annotated[str, Option(help="Line as designed: a name in the catalogue or a TOML file.")],
+    pantograph: Annotated[str, Option(help="Pantograph: a name in the catalogue or a TOML file.")],
     free: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="What may differ from the design, of tensions, droppers, supports, damping, pantograph and "
             "unevenness.",
             show_default="tensions,droppers,supports,damping,unevenness",
@@ -55,7 +55,7 @@ def fit(
     ] = None,
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Standard deviation of a kind of values before any record is seen, e.g. droppers=0.01 (m), "
             "tensions=0.03 (of the design's); may be repeated."
         ),
@@ -73,7 +73,7 @@ def fit(
     ] = None,
     keep: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Write the fit itself to this file (.safetensors), for `panto drift`.",
             callback=writable((".safetensors",)),
         ),
@@ -157,13 +157,13 @@ def by_kind(given: list[str]) -> dict[str, float]:
 
 
 def drift(
-    earlier: Annotated[Path, typer.Argument(help="Earlier fit, from `panto fit --keep`.")],
-    later: Annotated[Path, typer.Argument(help="Later fit, of the same line as designed.")],
+    earlier: Annotated[Path, Argument(help="Earlier fit, from `panto fit --keep`.")],
+    later: Annotated[Path, Argument(help="Later fit, of the same line as designed.")],
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Standard deviation of a kind of changes before any record is seen, e.g. droppers=0.002 "
-            "(m); may be repeated. Default: half of the fits' tolerance of values.",
+            "(m); may be repeated. Default: half of the fits' tolerance of values."
         ),
     ] = None,
     values: Annotated[

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
 from ..analysis.options import print_criteria
@@ -32,14 +33,14 @@ FORCE = 100.0
 def line(
     name: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Line: a name of the catalogue, a TOML file, or what to draw one from, such as "
             "section:main-line."
         ),
     ],
     masts: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="CSV file with a row per mast: position or span (m); mast, a name; contact_height, "
             "messenger_height or encumbrance (m); type, a name in span_types; stagger, radius, cant. All "
             "else is the line's."
@@ -47,14 +48,13 @@ def line(
     ] = None,
     unit: Unit = None,
     column: Heading = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed with which a line is drawn.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed with which a line is drawn.")] = 0,
     speed: Annotated[
-        float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
+        float | None, Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
     ] = None,
-    force: Annotated[float, typer.Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
+    force: Annotated[float, Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
     line_condition: Annotated[
-        str,
-        typer.Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run."),
+        str, Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run.")
     ] = "new",
     output: Annotated[
         str | None, into_file("Write the line between the masts to this TOML file", (".toml",))
@@ -134,13 +134,11 @@ MOST_SEEDS = 100_000
 
 
 def family(
-    name: Annotated[
-        str, typer.Argument(help="Family or section, of the catalogue or a TOML file.")
-    ] = "high-speed",
-    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
-    first: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
+    name: Annotated[str, Argument(help="Family or section, of the catalogue or a TOML file.")] = "high-speed",
+    seeds: Annotated[int, Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
+    first: Annotated[int, Option(min=0, help="First seed.")] = 0,
     json: Json = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print the table for a document.")] = False,
+    markdown: Annotated[bool, Option("--markdown", help="Print the table for a document.")] = False,
 ) -> None:
     """Draw lines from a family or a section, run a passive pantograph on each, and print the ranges.
 

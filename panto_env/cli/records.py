@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from ..analysis.plots import save
 from ..base.files import PAGES
@@ -25,7 +26,6 @@ from ..records.compare import compare as hold
 from ..records.compare import plain as plain_comparison
 from ..records.judge import (
     FILE_HEADINGS,
-    Judgement,
     judge,
     part_tables,
     plain,
@@ -53,24 +53,22 @@ from .identify import given
 
 Unit = Annotated[
     list[str] | None,
-    typer.Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+    Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
 ]
 Heading = Annotated[
     list[str] | None,
-    typer.Option(
-        "--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."
-    ),
+    Option("--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."),
 ]
 Mass = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Mass between force sensors and contact (kg), for EN 50317's correction by accelerations that "
         "were recorded."
     ),
 ]
 Filtered = Annotated[
     float | None,
-    typer.Option(
+    Option(
         min=20,
         help="Cut-off (Hz) of a low-pass that is in the force already: it hides losses of contact.",
         show_default="whether the force looks low-passed at 20 Hz",
@@ -94,7 +92,7 @@ def reading(
 def record(
     file: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="CSV or Parquet: two of time, position and speed; force, or force_1, force_2...; where "
             "measured acceleration_1..., height, uplift, raised, run. Also a run that `panto simulate` wrote "
             "as .csv."
@@ -102,15 +100,15 @@ def record(
     ],
     line: Annotated[
         str | None,
-        typer.Option(help="Line: a name in the catalogue or a TOML file, for spans, overlaps and limits."),
+        Option(help="Line: a name in the catalogue or a TOML file, for spans, overlaps and limits."),
     ] = None,
     span: Annotated[
         float | None,
-        typer.Option(help="Length of equal spans from 0 m on (m), instead of a line.", min=1, max=1000),
+        Option(help="Length of equal spans from 0 m on (m), instead of a line.", min=1, max=1000),
     ] = None,
     section: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Length of sections (m).",
             min=1,
             max=1e6,
@@ -147,27 +145,22 @@ def record(
         if json:
             print_json(plain(found))
             return
-        _print_record(found, title)
-
-
-def _print_record(found: Judgement, title: str) -> None:
-
-    for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
-        print_table(table)
-    for sentence in requirement_remarks(found):
-        console.print(sentence, soft_wrap=True)
-    for note in found.notes:
-        alert("Note:", note)
+        for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
+            print_table(table)
+        for sentence in requirement_remarks(found):
+            console.print(sentence, soft_wrap=True)
+        for note in found.notes:
+            alert("Note:", note)
 
 
 def compare(
-    file: Annotated[Path, typer.Argument(metavar="RECORD", help="Record, as `panto record` reads it.")],
+    file: Annotated[Path, Argument(metavar="RECORD", help="Record, as `panto record` reads it.")],
     run: Annotated[
-        Path, typer.Argument(help="Run at the record's speed, from `panto simulate --output run.parquet`.")
+        Path, Argument(help="Run at the record's speed, from `panto simulate --output run.parquet`.")
     ],
     shift: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="About what is to be added to the record's positions (m): the best within half a span of "
             "it is taken.",
             show_default="the best within 1.5 spans",
@@ -207,7 +200,6 @@ def compare(
 
 
 def _print_comparison(found: Comparison, title: str) -> None:
-
     console.print(title, soft_wrap=True)
     console.print(shift_sentence(found), soft_wrap=True)
     for table in (figures_table(found), spans_table(found), acceptance_table(found)):

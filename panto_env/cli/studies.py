@@ -11,6 +11,7 @@ import typer
 from rich import table as rich_table
 from rich.markup import escape
 from rich.text import Text
+from typer import Argument, Option
 
 from .. import studies
 from ..analysis.options import Seed, Spans, parse_spans, print_criteria, with_settings
@@ -46,30 +47,28 @@ from ..terminal import (
 
 def validate(
     convergence: Annotated[
-        bool, typer.Option("--convergence", help="Print the convergence of figures with grid and step.")
+        bool, Option("--convergence", help="Print the convergence of figures with grid and step.")
     ] = False,
     window: Annotated[
-        bool, typer.Option("--window", help="Print how travelling windows compare with whole lines.")
+        bool, Option("--window", help="Print how travelling windows compare with whole lines.")
     ] = False,
     wear: Annotated[
-        bool, typer.Option("--wear", help="Print the effect of the time step on figures of a worn line.")
+        bool, Option("--wear", help="Print the effect of the time step on figures of a worn line.")
     ] = False,
     conditions: Annotated[
         bool,
-        typer.Option(
-            "--conditions", help="Print figures in each named condition of a line, on several lines."
-        ),
+        Option("--conditions", help="Print figures in each named condition of a line, on several lines."),
     ] = False,
     lines: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--lines",
             help="Print the errors of the default grid and step on every line of the catalogue and on twenty "
             "drawn ones, at all speeds (ten minutes).",
         ),
     ] = False,
     start: Annotated[
-        bool, typer.Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
+        bool, Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
     ] = False,
     plot: Plot = None,
     json: Json = False,
@@ -110,8 +109,8 @@ def validate(
 
 
 def reproduce(
-    name: Annotated[str, typer.Argument(help="A study, or all.")] = "all",
-    output: Annotated[Path, typer.Option(help="Folder for figures (PNG) and numbers (JSON).")] = Path(
+    name: Annotated[str, Argument(help="A study, or all.")] = "all",
+    output: Annotated[Path, Option(help="Folder for figures (PNG) and numbers (JSON).")] = Path(
         "runs/reproduce"
     ),
     json: Json = False,
@@ -154,14 +153,8 @@ def reproduce(
 
 
 def _print(outcome: studies.Outcome) -> None:
-    for table in outcome.tables:
-        print_table(table)
-    console.print(_comparisons(outcome))
-    if outcome.verdict:
-        console.print(outcome.verdict)
-
-
-def _comparisons(outcome: studies.Outcome) -> rich_table.Table:
+    for each in outcome.tables:
+        print_table(each)
     table = rich_table.Table(title=outcome.title)
     for heading in ("quantity", "unit", "ours", "paper", "agrees within", "note"):
         table.add_column(heading, justify="right" if heading in ("ours", "agrees within") else "left")
@@ -175,26 +168,25 @@ def _comparisons(outcome: studies.Outcome) -> rich_table.Table:
             f"{number(comparison.low, 3)} to {number(comparison.high, 3)}",
             comparison.note,
         )
-    return table
+    console.print(table)
+    if outcome.verdict:
+        console.print(outcome.verdict)
 
 
 def speed(
     results: Annotated[
         list[Path] | None,
-        typer.Argument(help="Results stored with --json, to print next to each other instead of measuring."),
+        Argument(help="Results stored with --json, to print next to each other instead of measuring."),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
+    repeats: Annotated[int, Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
     device: Annotated[
         str | None,
-        typer.Option(
-            help='Measure the vector environments on this device instead: "cuda", or "cpu" to try it.'
-        ),
+        Option(help='Measure the vector environments on this device instead: "cuda", or "cpu" to try it.'),
     ] = None,
     plot: Plot = None,
     json: Json = False,
     markdown: Annotated[
-        bool,
-        typer.Option("--markdown", help="Print the tables for README.md, then those for docs/speed.md."),
+        bool, Option("--markdown", help="Print the tables for README.md, then those for docs/speed.md.")
     ] = False,
 ) -> None:
     """Measure the speed of each plant relative to real time on one core, and environment steps per second.
@@ -210,7 +202,14 @@ def speed(
             raise InputError(
                 "--device measures anew and prints one table; leave out results, --plot and --markdown."
             )
-        _on_device(device, repeats, json)
+        from ..studies.throughput import device as lanes  # needs PyTorch
+
+        with progress_console.status("measuring") as status:
+            of_lanes = lanes.run(device, repeats, report=lambda what: status.update(f"measuring {what}"))
+        if json:
+            print_json(of_lanes)
+        else:
+            print_table(_plain(lanes.table(of_lanes)))
         return
 
     if results:
@@ -235,18 +234,6 @@ def speed(
                     print_table(_plain(part))
 
 
-def _on_device(name: str, repeats: int, json: bool) -> None:
-    """Measure and print the speed of lanes on a device."""
-    from ..studies.throughput import device  # needs PyTorch
-
-    with progress_console.status("measuring") as status:
-        found = device.run(name, repeats, report=lambda what: status.update(f"measuring {what}"))
-    if json:
-        print_json(found)
-    else:
-        print_table(_plain(device.table(found)))
-
-
 def _plain(table: Table) -> Table:
     """The table without the backticks of Markdown."""
     rows = [tuple(cell.replace("`", "") for cell in row) for row in table.cells]
@@ -264,25 +251,24 @@ def rig(
     settings: dict[str, Any],
     rigs: Annotated[
         list[str] | None,
-        typer.Argument(help=f"Rigs, of the catalogue or as TOML files. [default: {' '.join(RIGS)}]"),
+        Argument(help=f"Rigs, of the catalogue or as TOML files. [default: {' '.join(RIGS)}]"),
     ] = None,
     reference: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Line with which the rig is compared; by default its computed line if that has droppers, "
             f"else {REFERENCE}."
         ),
     ] = None,
-    policy: Annotated[str | None, typer.Option(help="Policy, on the rig and on the line.")] = None,
+    policy: Annotated[str | None, Option(help="Policy, on the rig and on the line.")] = None,
     stability: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--stability", help="Find the delay and lag at which each loop gets unstable; about 20 s per rig."
         ),
     ] = False,
     clock: Annotated[
-        float,
-        typer.Option(min=0, max=3600, help="Run each rig's computer in real time for this time (s)."),
+        float, Option(min=0, max=3600, help="Run each rig's computer in real time for this time (s).")
     ] = 0.0,
     spans: Spans = None,
     seed: Seed = 0,

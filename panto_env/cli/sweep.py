@@ -8,8 +8,8 @@ from functools import partial
 from math import isfinite
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
+from typer import Argument, Option
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
 from ..analysis.parameters import with_distances
@@ -36,7 +36,7 @@ def sweep(
     settings: dict[str, Any],
     parameters: Annotated[
         list[str],
-        typer.Argument(
+        Argument(
             metavar="NAME=VALUES...",
             help="One to three parameters by dotted name, e.g. pantograph.masses.1, "
             "catenary.contact_wire.tension, catenary.droppers.spacing, actuator.lag, policy.gain, speed_kmh "
@@ -45,12 +45,11 @@ def sweep(
         ),
     ],
     policy: Annotated[
-        list[str] | None,
-        typer.Option(help="Policy: a name, name:key=value,... or a model file; may be repeated."),
+        list[str] | None, Option(help="Policy: a name, name:key=value,... or a model file; may be repeated.")
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
+    workers: Annotated[int | None, Option(help="Number of threads; by default one per core.")] = None,
     output: Annotated[str | None, into_file("Save the table to this file", TABLES)] = None,
     plot: Plot = None,
     json: Json = False,
