@@ -94,19 +94,15 @@ def identify(
             identified.failures[f"the model by {chosen.method}"] = str(error)
     with written_last() as later:
         if output is not None and chosen is not None:
-            source: dict[str, Any] = {
-                "static_force": static_force,
-                "force_source": "own choice: --static-force",
-            }
-            if static_force is None and record.force is None:
+            force, source = static_force, "own choice: --static-force"
+            if force is None and record.force is not None:
+                force, source = float(record.force.mean()), f"mean contact force of {file.name}"
+            if force is None:
                 raise InputError(
                     "The record has no force; give the lifting force of the pantograph: --static-force N."
                 )
-            if static_force is None:
-                mean = f"mean contact force of {file.name}"
-                source = {"static_force": float(record.force.mean()), "force_source": mean}
-            facts = {"matches": matches, "record": file.name} | source
-            later(partial(identification.write_pantograph, **facts), chosen, output)
+            own: dict[str, Any] = {"static_force": force, "force_source": source, "record": file.name}
+            later(partial(identification.write_pantograph, matches=matches, **own), chosen, output)
         if plot is not None and chosen is not None:
             title = f"{file.name}, model by {chosen.method}"
             first, last = float(record.time[0]), float(record.time[-1])
