@@ -72,7 +72,7 @@ def find_policy(source: Any) -> Policy:
             f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
         )
     if kind == "installed":
-        return _make(maker_of(name), str(source), parameters)
+        return _make(_maker(point), str(source), parameters)
     if not os.path.isfile(path):
         raise InputError(f"The model file {path} does not exist; check the path.")
     with plugins.blamed(point):
@@ -149,7 +149,10 @@ def maker_of(name: str) -> Callable[..., Policy]:
 
     Raises InputError, which names its package, where it can't be loaded or is neither.
     """
-    point = plugins.installed(plugins.POLICIES)[name]
+    return _maker(plugins.installed(plugins.POLICIES)[name])
+
+
+def _maker(point: EntryPoint) -> Callable[..., Policy]:
     with plugins.blamed(point):
         maker: Callable[..., Policy] = plugins.load(point)
         parameters_of(maker)

@@ -24,10 +24,8 @@ from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import dropper_table
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, counting, into_file, print_json, print_table, written_last
-from .identify import Given, given
+from .identify import given
 from .records import Heading, Unit
-
-FORCE = 100.0
 
 
 def line(
@@ -52,7 +50,7 @@ def line(
     speed: Annotated[
         float | None, Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
     ] = None,
-    force: Annotated[float, Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
+    force: Annotated[float, Option(min=1, max=1000, help="Force for the elasticity (N).")] = 100.0,
     line_condition: Annotated[
         str, Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run.")
     ] = "new",
@@ -68,7 +66,15 @@ def line(
     """
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
-    chosen, text = _line(name, seed, masts, output, given(unit, column))
+    text = None if masts is None else line_from_masts(name, masts, *given(unit, column))
+    chosen: Any
+    if masts is not None and text is not None:
+        table = {"name": Path(output or masts).stem} | tomllib.loads(text)
+        chosen = parse_catenary(table, Path(masts))
+    elif drawn_kind(name):
+        chosen, *_ = line_of_seed(load_drawn(name), seed)
+    else:
+        chosen = load_catenary(name)
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
@@ -94,8 +100,8 @@ def line(
             )
         else:
             other, named = as_run_tables(chosen, run) if run else [], chosen.alignment().span_name
-            for table in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
-                print_table(table)
+            for each in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
+                print_table(each)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:
                 console.print(
@@ -105,24 +111,10 @@ def line(
                 print_table(elasticity_table([found]))
             if run and not other:
                 console.print("This condition changes no tension along the line: it is run as designed.")
-            for each in broken:
-                alert(f"{each.name} is not kept.")
+            for limit in broken:
+                alert(f"{limit.name} is not kept.")
     if broken:
         raise typer.Exit(1)
-
-
-def _line(
-    name: str, seed: int, masts: str | None, output: str | None, columns: Given
-) -> tuple[Any, str | None]:
-    """The line, and the text of its TOML file where it is made from masts."""
-    if masts is None and drawn_kind(name):
-        return line_of_seed(load_drawn(name), seed)[0], None
-    if masts is None:
-        return load_catenary(name), None
-
-    text = line_from_masts(name, masts, *columns)
-    named = {"name": Path(output or masts).stem}
-    return parse_catenary(named | tomllib.loads(text), Path(masts)), text
 
 
 def _write(text: str, path: str) -> None:
@@ -130,12 +122,9 @@ def _write(text: str, path: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-MOST_SEEDS = 100_000
-
-
 def family(
     name: Annotated[str, Argument(help="Family or section, of the catalogue or a TOML file.")] = "high-speed",
-    seeds: Annotated[int, Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
+    seeds: Annotated[int, Option(min=1, max=100_000, help="Number of lines.")] = 100,
     first: Annotated[int, Option(min=0, help="First seed.")] = 0,
     json: Json = False,
     markdown: Annotated[bool, Option("--markdown", help="Print the table for a document.")] = False,
