@@ -217,11 +217,16 @@ def _print(
     print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", "", "judged by"), rows))
     for reason in found.verdict.reasons:
         alert("Warning:", f"{reason}.")
-    compared: list[tuple[str, ...]] = []
+    if scores:
+        print_table(_scores_table(scores))
+
+
+def _scores_table(scores: list[Score]) -> Table:
+    rows = []
     for each in scores:
         forces = number(each.bias, 2), number(each.rms, 2)
-        likeness = number(each.correlation, 4), number(1e3 * each.delay, 2)
-        compared.append((f"0 to {each.band:g} Hz", *forces, *likeness))
-    if compared:
-        headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
-        print_table(Table("Compared with the recorded contact force", headings, compared))
+        rows.append(
+            (f"0 to {each.band:g} Hz", *forces, number(each.correlation, 4), number(1e3 * each.delay, 2))
+        )
+    headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
+    return Table("Compared with the recorded contact force", headings, rows)
