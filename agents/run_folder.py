@@ -12,7 +12,7 @@ from typing import Any
 
 from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.errors import InputError, shown
-from panto_env.base.files import alone_in, check_path, make_folder, write_whole
+from panto_env.base.files import alone_in, make_folder, write_whole
 
 from .evaluation import Pair
 from .model_file import read_model
@@ -28,7 +28,6 @@ class RunFolder:
     """Paths of a run's files; reads and writes those that are neither models nor TensorBoard logs."""
 
     def __init__(self, path: str | Path) -> None:
-        check_path(path)
         self.path = Path(path)
         self.settings = self.path / "settings.json"
         self.model = self.path / "model.safetensors"  # at the end of the training

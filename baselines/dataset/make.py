@@ -13,7 +13,7 @@ from typing import Any
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import read_checked, sha256_of
 from panto_env.base.errors import InputError
-from panto_env.base.files import alone_in, check_path, make_folder, write_whole
+from panto_env.base.files import alone_in, make_folder, write_whole
 from panto_env.cluster import (
     PARTS,
     PartJob,
@@ -44,10 +44,8 @@ def write_checksums(folder: Path) -> None:
 def verify(path: Path) -> list[tuple[Path, int]]:
     """Verify all data sets in or below ``path``: their folders, each with its number of files.
 
-    Raises InputError, naming the file, if one is missing, differs or is not listed, if there is no list, and
-    for an impossible path.
+    Raises InputError, naming the file, if one is missing, differs or is not listed, or if there is no list.
     """
-    check_path(path)
     lists = sorted(path.rglob(LIST))
     if not lists:
         raise InputError(f"There is no {LIST} in or below {path}; give the folder of a data set.")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from panto_env.analysis.options import DroppersFile, FiguresFile
-from panto_env.base.errors import InputError, harmless
+from panto_env.base.errors import InputError
 from panto_env.base.files import PAGES, check_output, write_whole
 from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
@@ -94,7 +94,7 @@ def report(
         from .tables import summary
 
         tables = [summary(read_result(file)) for file in files]
-        print(harmless("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables)))
+        print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
         return
     path = files[0].with_suffix(PAGES[0]) if output is None else output
     check_output(path, PAGES)

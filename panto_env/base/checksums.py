@@ -1,9 +1,7 @@
-"""The version of the package, and the commit where it runs from a checkout.
+"""Version and commit, checksums of results, and results that are cached.
 
-The checksum of all our files: SHA-256 of a file's content, so that a damaged file is refused.
-
-It covers plain data and arrays, not their layout in a container: a result in JSON, a saved run in Parquet
-and a model in safetensors all have it in their table of plain data, under the key ``sha256``.
+A checksum covers plain data and arrays, not their layout in a container: a result in JSON, a saved run in
+Parquet and a model in safetensors all have it in their table of plain data, under the key ``sha256``.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from .errors import InputError
-from .files import check_nesting, check_regular, write_whole
+from .files import read_text, write_whole
 
 __version__ = "0.2.0"
 
@@ -68,10 +66,6 @@ def with_checksum(table: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]] =
 def without_checksum(table: Any, arrays: Mapping[str, NDArray[Any]] = NO_ARRAYS) -> dict[str, Any]:
     """The table without its checksum. Raises ValueError where the checksum is missing or does not fit."""
     if isinstance(table, dict):
-        try:
-            check_nesting(table)
-        except RecursionError as error:
-            raise ValueError("it is nested too deeply") from error
         rest = {key: value for key, value in table.items() if key != CHECKSUM}
         if table.get(CHECKSUM) == checksum(rest, arrays):
             return rest
@@ -86,14 +80,10 @@ def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:
 
 def read_checked(path: str | Path) -> dict[str, Any]:
     """The table of a file of ``write_checked``. Raises InputError where it cannot be read or is damaged."""
-    check_regular(path)
+    text = read_text(path)
     try:
-        return without_checksum(json.loads(Path(path).read_text(encoding="utf-8")))
-    except FileNotFoundError as error:
-        raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
-    except OSError as error:
-        raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        return without_checksum(json.loads(text))
+    except (json.JSONDecodeError, RecursionError) as error:
         raise InputError(
             f"{path} is not JSON, or is damaged; give a file that the program wrote, or make it again."
         ) from error
@@ -160,7 +150,6 @@ def read_arrays(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any
     Raises OSError where the file cannot be read, and ValueError, with the reason as a clause, where it is
     damaged or was written by something else.
     """
-    check_regular(path)
     try:
         with safe_open(path, "np") as file:
             metadata = file.metadata() or {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import reprlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -55,12 +55,11 @@ def nearest(name: str, known: Sequence[str]) -> str | None:
 
 
 LONGEST = 300
-"""Maximum letters of a value, or of a word, that is shown whole."""
+"""Maximum letters of a value that is shown whole."""
 LONGEST_LINE = 1000
 """Maximum letters of a message that is shown whole: an input may be a whole file."""
-_WORD = re.compile(r"\S+|\s+")
-_CONTROLS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""Characters that control a terminal or change the direction of writing, except line ends."""
+shortly = reprlib.repr
+"""A value as Python writes it, shortened to about 30 letters."""
 
 
 def beside(value: float, limit: float, form: str) -> str:
@@ -80,32 +79,15 @@ def beside(value: float, limit: float, form: str) -> str:
 
 def shown(value: Any) -> str:
     """A value as Python writes it, whole unless it is very long."""
-    return _cut(_written(repr, value), LONGEST)
+    return _cut(repr(value), LONGEST)
 
 
 def one_line(text: str) -> str:
-    """A text that may quote anything, with its line ends and other controls escaped and long words cut."""
+    """A text that may quote anything, with its line ends and other controls escaped, not too long."""
     line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
-    return _cut(_WORD.sub(lambda word: _cut(word[0], LONGEST), line), LONGEST_LINE)
-
-
-def harmless(text: str) -> str:
-    """A text with its control characters escaped, so that an untrusted file cannot control the terminal."""
-    return _CONTROLS.sub(lambda control: repr(control[0])[1:-1], text)
-
-
-def shortly(value: Any) -> str:
-    """A value as Python writes it, shortened to about 30 letters."""
-    return _written(reprlib.repr, value)
+    return _cut(line, LONGEST_LINE)
 
 
 def _cut(text: str, longest: int) -> str:
     """A text whose middle is left out where it is very long."""
     return text if len(text) <= longest else f"{text[: longest // 2]}...{text[-longest // 3 :]}"
-
-
-def _written(write: Callable[[Any], str], value: Any) -> str:
-    try:
-        return write(value)
-    except Exception:  # a number with thousands of digits, or a foreign object
-        return f"a value of type {type(value).__name__} that cannot be shown"

@@ -15,7 +15,6 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError, suggest
-from .files import check_regular
 
 JITTER = 0.05
 """Maximum distance of a time stamp from equal steps, as a share of the step: more is not rounding."""
@@ -127,7 +126,6 @@ def equal_step(time: Array, minimum: int, purpose: str) -> float:
 
 
 def _text(path: str | Path) -> str:
-    check_regular(path)
     try:
         data = Path(path).read_bytes()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Numbers within a range, for the values of schemas; ranges are wide enough for anything real."""
+"""Settings as data: ranges of numbers, values from text, and errors in words."""
 
 from __future__ import annotations
 
@@ -302,21 +302,17 @@ def parse(kind: type[S], value: Any, name: str, presets: Mapping[str, S] | None 
     if isinstance(value, str):
         preset, _, changes = value.partition(":")
         if preset in presets:
-            return _changed(presets[preset], changes, name)
+            try:
+                given = parse_inline(changes)
+            except InputError as error:
+                raise InputError(f"{name} is not valid: {error}") from error
+            own = presets[preset]
+            return _validated(type(own), own.model_dump() | given, name) if given else own
     options = [f"'{preset}'" for preset in presets]
     if presets:
         options[-1] += f" (with values, such as '{next(iter(presets))}:{next(iter(kind.model_fields))}=...')"
     options.append(f"a table with keys among {', '.join(kind.model_fields)}")
     raise InputError(f"{name} must be {' or '.join(options)}, not {shown(value)}.")
-
-
-def _changed(preset: S, changes: str, name: str) -> S:
-    """A preset with values from "key=value,..."."""
-    try:
-        given = parse_inline(changes)
-    except InputError as error:
-        raise InputError(f"{name} is not valid: {error}") from error
-    return _validated(type(preset), preset.model_dump() | given, name) if given else preset
 
 
 def _validated(kind: type[S], table: Mapping[str, Any], name: str) -> S:

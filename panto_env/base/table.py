@@ -116,25 +116,21 @@ def _write_csv(sheet: Sheet, path: str | Path) -> None:
     import pyarrow as pa
     from pyarrow.csv import write_csv
 
-    columns = [pa.array(_harmless(column), from_pandas=True) for column in sheet.columns.values()]
-    table = pa.Table.from_arrays(columns, [_apart(title) for title in sheet.titles])
-    lists = [column for column in sheet.columns.values() if not hasattr(column, "dtype")]
-    texts = [cell for column in lists for cell in column if isinstance(cell, str)]
-    plain = all(text.isascii() for text in (*sheet.titles, *texts))
+    texts = list(sheet.titles)
+
+    def apart(cell: Any) -> Any:
+        """A text that no spreadsheet takes for a formula."""
+        if isinstance(cell, str):
+            texts.append(cell)
+        return f"'{cell}" if isinstance(cell, str) and cell.startswith(RISKY) else cell
+
+    cells = [each if hasattr(each, "dtype") else list(map(apart, each)) for each in sheet.columns.values()]
+    columns = [pa.array(column, from_pandas=True) for column in cells]
+    table = pa.Table.from_arrays(columns, list(map(apart, sheet.titles)))
+    plain = all(text.isascii() for text in texts)
     with write_whole(path) as temporary, temporary.open("wb") as file:
         file.write(b"" if plain else codecs.BOM_UTF8)  # without it Excel garbles all but ASCII
         write_csv(table, file)
-
-
-def _harmless(column: Any) -> Any:
-    if hasattr(column, "dtype"):
-        return column
-    return [_apart(cell) if isinstance(cell, str) else cell for cell in column]
-
-
-def _apart(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text.startswith(RISKY) else text
 
 
 def write_workbook(sheets: Sequence[Sheet], path: str | Path) -> None:
@@ -152,7 +148,8 @@ def write_workbook(sheets: Sequence[Sheet], path: str | Path) -> None:
     from xlsxwriter.exceptions import FileCreateError
 
     with write_whole(path) as temporary:
-        book = Workbook(temporary, {"constant_memory": True})
+        text_stays = {"strings_to_formulas": False, "strings_to_urls": False}
+        book = Workbook(temporary, {"constant_memory": True, **text_stays})
         book.set_properties({"created": CREATED})
         bold = book.add_format({"bold": True})
         for sheet in sheets:
@@ -173,19 +170,10 @@ def _fill(page: Any, sheet: Sheet, bold: Any, path: str | Path) -> None:
         page.write_string(0, place, title, bold)
     for row, cells in enumerate(zip(*columns, strict=True), start=1):
         for place, value in enumerate(cells):
-            if _write(page, row, place, value) != 0:
+            if isinstance(value, float) and not math.isfinite(value):
+                value = None if math.isnan(value) else str(value)
+            if page.write(row, place, value) != 0:
                 raise InputError(
                     f"{path} cannot be written: row {row}, column '{sheet.titles[place]}', is too long for a "
                     "cell of Excel; write .csv or .parquet."
                 )
-
-
-def _write(page: Any, row: int, place: int, value: Any) -> int:
-    """Write a cell by its type: text stays text. Returns 0 unless it does not fit."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return 0
-    if isinstance(value, bool):
-        return int(page.write_boolean(row, place, value))
-    if isinstance(value, int | float) and math.isfinite(value):
-        return int(page.write_number(row, place, value))
-    return int(page.write_string(row, place, str(value)))

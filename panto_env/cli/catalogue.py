@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
-import typer
 from pydantic import BaseModel
 from rich.table import Table
+from typer import Argument, Option
 
 from ..base.errors import InputError, suggest
 from ..base.files import finite, read_toml
@@ -32,7 +32,7 @@ from ..plant.line_condition import LINE_CONDITIONS
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SENSOR_PRESETS
 from ..policies import maker_of, parameters_of, policy_names
-from ..terminal import Json, console, print_json, print_table, writable
+from ..terminal import Json, console, into_file, print_json, print_table
 
 Entry = CatenaryData | PantographData | DrawnLines
 LOADERS: Mapping[str, Callable[[str], Entry]] = {
@@ -157,21 +157,18 @@ def _preset(family: str, name: str) -> Description:
 def list_entries(
     name: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Show all values of this line, pantograph, policy, line condition, preset of actuator or "
             "sensors, or TOML file."
         ),
     ] = None,
     toml: Annotated[
-        bool,
-        typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from."),
+        bool, Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from.")
     ] = False,
     droppers: Annotated[
         str | None,
-        typer.Option(
-            help="Write the droppers of the line at rest, with force, length and stretch, to this file "
-            f"({', '.join(TABLES)}).",
-            callback=writable(TABLES),
+        into_file(
+            "Write the droppers of the line at rest, with force, length and stretch, to this file", TABLES
         ),
     ] = None,
     json: Json = False,

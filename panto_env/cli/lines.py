@@ -7,36 +7,38 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
+from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
 from ..analysis.options import print_criteria
+from ..analysis.plots import plot_line, save
 from ..base.errors import InputError
 from ..base.files import write_whole
 from ..base.settings import parse
 from ..catalog import load_catenary, load_drawn
 from ..catalog.loader import drawn_kind, parse_catenary
+from ..catalog.masts import line_from_masts
 from ..control.lines import line_of_seed
 from ..plant.catenary.flexible.as_run import as_run, as_run_tables
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import dropper_table
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
-from ..terminal import Json, Plot, alert, console, counting, print_json, print_table, writable, written_last
-from .identify import Given, given
+from ..terminal import Json, Plot, alert, console, counting, into_file, print_json, print_table, written_last
+from .identify import given
 from .records import Heading, Unit
-
-FORCE = 100.0
 
 
 def line(
     name: Annotated[
         str,
-        typer.Argument(
+        Argument(
             help="Line: a name of the catalogue, a TOML file, or what to draw one from, such as "
             "section:main-line."
         ),
     ],
     masts: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="CSV file with a row per mast: position or span (m); mast, a name; contact_height, "
             "messenger_height or encumbrance (m); type, a name in span_types; stagger, radius, cant. All "
             "else is the line's."
@@ -44,20 +46,16 @@ def line(
     ] = None,
     unit: Unit = None,
     column: Heading = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed with which a line is drawn.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed with which a line is drawn.")] = 0,
     speed: Annotated[
-        float | None, typer.Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
+        float | None, Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
     ] = None,
-    force: Annotated[float, typer.Option(min=1, max=1000, help="Force for the elasticity (N).")] = FORCE,
+    force: Annotated[float, Option(min=1, max=1000, help="Force for the elasticity (N).")] = 100.0,
     line_condition: Annotated[
-        str,
-        typer.Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run."),
+        str, Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run.")
     ] = "new",
     output: Annotated[
-        str | None,
-        typer.Option(
-            help="Write the line between the masts to this TOML file (.toml).", callback=writable((".toml",))
-        ),
+        str | None, into_file("Write the line between the masts to this TOML file", (".toml",))
     ] = None,
     plot: Plot = None,
     json: Json = False,
@@ -66,11 +64,17 @@ def line(
 
     Exits with 1 if a limit of EN 50119 is broken.
     """
-    from ..analysis.line_check import check, elasticity_table, span_tables
-
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
-    chosen, text = _line(name, seed, masts, output, given(unit, column))
+    text = None if masts is None else line_from_masts(name, masts, *given(unit, column))
+    chosen: Any
+    if masts is not None and text is not None:
+        table = {"name": Path(output or masts).stem} | tomllib.loads(text)
+        chosen = parse_catenary(table, Path(masts))
+    elif drawn_kind(name):
+        chosen, *_ = line_of_seed(load_drawn(name), seed)
+    else:
+        chosen = load_catenary(name)
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)
@@ -83,8 +87,6 @@ def line(
         if output is not None and text is not None:
             later(_write, text, output)
         if plot is not None:
-            from ..analysis.plots import plot_line, save
-
             later(save, plot_line(found), plot)
         if json:
             print_json(
@@ -98,8 +100,8 @@ def line(
             )
         else:
             other, named = as_run_tables(chosen, run) if run else [], chosen.alignment().span_name
-            for table in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
-                print_table(table)
+            for each in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
+                print_table(each)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:
                 console.print(
@@ -109,25 +111,10 @@ def line(
                 print_table(elasticity_table([found]))
             if run and not other:
                 console.print("This condition changes no tension along the line: it is run as designed.")
-            for each in broken:
-                alert(f"{each.name} is not kept.")
+            for limit in broken:
+                alert(f"{limit.name} is not kept.")
     if broken:
         raise typer.Exit(1)
-
-
-def _line(
-    name: str, seed: int, masts: str | None, output: str | None, columns: Given
-) -> tuple[Any, str | None]:
-    """The line, and the text of its TOML file where it is made from masts."""
-    if masts is None and drawn_kind(name):
-        return line_of_seed(load_drawn(name), seed)[0], None
-    if masts is None:
-        return load_catenary(name), None
-    from ..catalog.masts import line_from_masts
-
-    text = line_from_masts(name, masts, *columns)
-    named = {"name": Path(output or masts).stem}
-    return parse_catenary(named | tomllib.loads(text), Path(masts)), text
 
 
 def _write(text: str, path: str) -> None:
@@ -135,25 +122,18 @@ def _write(text: str, path: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-MOST_SEEDS = 100_000
-
-
 def family(
-    name: Annotated[
-        str, typer.Argument(help="Family or section, of the catalogue or a TOML file.")
-    ] = "high-speed",
-    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Number of lines.")] = 100,
-    first: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
+    name: Annotated[str, Argument(help="Family or section, of the catalogue or a TOML file.")] = "high-speed",
+    seeds: Annotated[int, Option(min=1, max=100_000, help="Number of lines.")] = 100,
+    first: Annotated[int, Option(min=0, help="First seed.")] = 0,
     json: Json = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print the table for a document.")] = False,
+    markdown: Annotated[bool, Option("--markdown", help="Print the table for a document.")] = False,
 ) -> None:
     """Draw lines from a family or a section, run a passive pantograph on each, and print the ranges.
 
     Each runs at the highest speed of its trains. Exits with 1 if a line is outside the family's or the
     section's own bands of what is plausible.
     """
-    from ..analysis.line_check import drawn_lines, facts, table
-
     chosen = load_drawn(name)
     with counting("running") as progress:
         lines = drawn_lines(chosen, range(first, first + seeds), progress)

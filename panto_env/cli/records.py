@@ -4,52 +4,71 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
+from ..analysis.plots import save
 from ..base.files import PAGES
 from ..base.table import TABLES, write_rows
+from ..catalog import load_catenary
 from ..metrics.trajectory import Trajectory
+from ..records.compare import (
+    Comparison,
+    acceptance_table,
+    criterion_notes,
+    figures_table,
+    shift_sentence,
+    spans_table,
+)
+from ..records.compare import compare as hold
+from ..records.compare import plain as plain_comparison
+from ..records.judge import (
+    FILE_HEADINGS,
+    judge,
+    part_tables,
+    plain,
+    requirement_remarks,
+    requirements_table,
+    rows_of,
+    whole_table,
+)
+from ..records.page import save_comparison_page, save_record_page
+from ..records.plots import plot_comparison, plot_record
+from ..records.record_file import read_record
 from ..terminal import (
     ALARM,
     Json,
     Plot,
     alert,
     console,
+    into_file,
     print_json,
     print_table,
     progress_console,
-    writable,
     written_last,
 )
 from .identify import given
 
-if TYPE_CHECKING:
-    from ..records.compare import Comparison
-    from ..records.judge import Judgement
-
-
 Unit = Annotated[
     list[str] | None,
-    typer.Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+    Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
 ]
 Heading = Annotated[
     list[str] | None,
-    typer.Option(
-        "--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."
-    ),
+    Option("--column", help="Heading of a column that has another one, e.g. force_1=F_zw1; may be repeated."),
 ]
 Mass = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="Mass between force sensors and contact (kg), for EN 50317's correction by accelerations that "
         "were recorded."
     ),
 ]
 Filtered = Annotated[
     float | None,
-    typer.Option(
+    Option(
         min=20,
         help="Cut-off (Hz) of a low-pass that is in the force already: it hides losses of contact.",
         show_default="whether the force looks low-passed at 20 Hz",
@@ -58,7 +77,7 @@ Filtered = Annotated[
 
 Page = Annotated[
     str | None,
-    typer.Option(help="Write a page with tables and charts to this file (.html).", callback=writable(PAGES)),
+    into_file("Write a page with tables and charts to this file", PAGES),
 ]
 
 
@@ -73,7 +92,7 @@ def reading(
 def record(
     file: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="CSV or Parquet: two of time, position and speed; force, or force_1, force_2...; where "
             "measured acceleration_1..., height, uplift, raised, run. Also a run that `panto simulate` wrote "
             "as .csv."
@@ -81,15 +100,15 @@ def record(
     ],
     line: Annotated[
         str | None,
-        typer.Option(help="Line: a name in the catalogue or a TOML file, for spans, overlaps and limits."),
+        Option(help="Line: a name in the catalogue or a TOML file, for spans, overlaps and limits."),
     ] = None,
     span: Annotated[
         float | None,
-        typer.Option(help="Length of equal spans from 0 m on (m), instead of a line.", min=1, max=1000),
+        Option(help="Length of equal spans from 0 m on (m), instead of a line.", min=1, max=1000),
     ] = None,
     section: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Length of sections (m).",
             min=1,
             max=1e6,
@@ -100,13 +119,7 @@ def record(
     filtered: Filtered = None,
     unit: Unit = None,
     column: Heading = None,
-    output: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Write the figures of all parts to this file ({', '.join(TABLES)}).",
-            callback=writable(TABLES),
-        ),
-    ] = None,
+    output: Annotated[str | None, into_file("Write the figures of all parts to this file", TABLES)] = None,
     plot: Plot = None,
     html: Page = None,
     json: Json = False,
@@ -117,10 +130,6 @@ def record(
     losses of contact are those of the raw force. A record that cannot be a measuring train's is refused with
     the likely mistake.
     """
-    from ..catalog import load_catenary
-    from ..records.judge import FILE_HEADINGS, judge, plain, rows_of
-    from ..records.record_file import read_record
-
     known = None if line is None else load_catenary(line)
     with progress_console.status("reading and judging"):
         measured = read_record(file, **reading(unit, column, mass, filtered))
@@ -130,39 +139,28 @@ def record(
         if output is not None:
             later(write_rows, rows_of(found), output, FILE_HEADINGS)
         if plot is not None:
-            from ..analysis.plots import save
-            from ..records.plots import plot_record
-
             later(save, plot_record(found, title), plot)
         if html is not None:
-            from ..records.page import save_record_page
-
             later(partial(save_record_page, found, title), html)
         if json:
             print_json(plain(found))
             return
-        _print_record(found, title)
-
-
-def _print_record(found: Judgement, title: str) -> None:
-    from ..records.judge import part_tables, requirement_remarks, requirements_table, whole_table
-
-    for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
-        print_table(table)
-    for sentence in requirement_remarks(found):
-        console.print(sentence, soft_wrap=True)
-    for note in found.notes:
-        alert("Note:", note)
+        for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
+            print_table(table)
+        for sentence in requirement_remarks(found):
+            console.print(sentence, soft_wrap=True)
+        for note in found.notes:
+            alert("Note:", note)
 
 
 def compare(
-    file: Annotated[Path, typer.Argument(metavar="RECORD", help="Record, as `panto record` reads it.")],
+    file: Annotated[Path, Argument(metavar="RECORD", help="Record, as `panto record` reads it.")],
     run: Annotated[
-        Path, typer.Argument(help="Run at the record's speed, from `panto simulate --output run.parquet`.")
+        Path, Argument(help="Run at the record's speed, from `panto simulate --output run.parquet`.")
     ],
     shift: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="About what is to be added to the record's positions (m): the best within half a span of "
             "it is taken.",
             show_default="the best within 1.5 spans",
@@ -182,9 +180,6 @@ def compare(
     whose σ is within 20 %, and whose uplift and range of the contact point's height are within 20 mm
     (recalled).
     """
-    from ..records.compare import compare as hold
-    from ..records.record_file import read_record
-
     with progress_console.status("reading and comparing"):
         simulated = Trajectory.load(run)
         measured = read_record(file, **reading(unit, column, mass, filtered))
@@ -193,18 +188,11 @@ def compare(
     title += f" at {simulated.speed_kmh:g} km/h"
     with written_last() as later:
         if plot is not None:
-            from ..analysis.plots import save
-            from ..records.plots import plot_comparison
-
             later(save, plot_comparison(found, title), plot)
         if html is not None:
-            from ..records.page import save_comparison_page
-
             later(partial(save_comparison_page, found, title), html)
         if json:
-            from ..records.compare import plain
-
-            print_json(plain(found))
+            print_json(plain_comparison(found))
         else:
             _print_comparison(found, title)
     if found.accepted is False:
@@ -212,14 +200,6 @@ def compare(
 
 
 def _print_comparison(found: Comparison, title: str) -> None:
-    from ..records.compare import (
-        acceptance_table,
-        criterion_notes,
-        figures_table,
-        shift_sentence,
-        spans_table,
-    )
-
     console.print(title, soft_wrap=True)
     console.print(shift_sentence(found), soft_wrap=True)
     for table in (figures_table(found), spans_table(found), acceptance_table(found)):

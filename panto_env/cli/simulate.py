@@ -9,7 +9,9 @@ from typing import Annotated, Any
 
 import typer
 from rich.table import Table
+from typer import Argument, Option
 
+from ..analysis import simulation
 from ..analysis.options import (
     RENAMED,
     DroppersFile,
@@ -20,6 +22,8 @@ from ..analysis.options import (
     print_criteria,
     with_settings,
 )
+from ..analysis.plots import plot_run, save
+from ..base.errors import InputError
 from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.trajectory import OUTPUTS, Trajectory
@@ -30,6 +34,7 @@ from ..terminal import (
     alert,
     bars,
     console,
+    into_file,
     number,
     print_json,
     say,
@@ -45,14 +50,13 @@ LIVE_COLUMNS = 40
 def simulate(
     settings: dict[str, Any],
     policy: Annotated[
-        str | None,
-        typer.Option(help="Policy: a name, name:key=value,..., a model file or file.py:Class."),
+        str | None, Option(help="Policy: a name, name:key=value,..., a model file or file.py:Class.")
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
     output: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Save the run to this file: .parquet, which other commands read, .csv or .xlsx.",
             callback=writable(OUTPUTS),
         ),
@@ -61,18 +65,14 @@ def simulate(
     droppers: DroppersFile = None,
     plot: Plot = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Draw force and heights in the terminal during the run.")
+        bool, Option("--live", help="Draw force and heights in the terminal during the run.")
     ] = False,
     json: Json = False,
 ) -> None:
     """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
-    from ..analysis.simulation import simulate as run
-
     chosen = parse_spans(spans)
-    if plot is not None:
-        from ..analysis.plots import plot_run, save
     with _shown(live, policy or "passive") as (progress, watch):
-        trajectory = run(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
+        trajectory = simulation.simulate(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
     with written_last() as later:
         if output is not None:
             later(trajectory.save, output, None if trajectory.terminated else chosen)
@@ -179,30 +179,23 @@ def film(
     settings: dict[str, Any],
     policies: Annotated[
         list[str],
-        typer.Argument(
+        Argument(
             help="Passes to show above each other: a policy as a name, name:key=value,..., a model file or "
             "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then apply to all."
         ),
     ],
-    output: Annotated[
-        str, typer.Option(help=f"Film to write ({', '.join(FILMS)}).", callback=writable(FILMS))
-    ],
-    first_span: Annotated[int, typer.Option(min=1, max=1000, help="Span in which the film begins.")] = 10,
-    seconds: Annotated[
-        float, typer.Option(min=0.1, max=600, help="Time of the run that is shown (s).")
-    ] = 3.0,
+    output: Annotated[str, into_file("Film to write", FILMS)],
+    first_span: Annotated[int, Option(min=1, max=1000, help="Span in which the film begins.")] = 10,
+    seconds: Annotated[float, Option(min=0.1, max=600, help="Time of the run that is shown (s).")] = 3.0,
     slow_motion: Annotated[
-        float, typer.Option(min=0.1, max=100, help="Factor by which the film is slowed down.")
+        float, Option(min=0.1, max=100, help="Factor by which the film is slowed down.")
     ] = 4.0,
     size: Annotated[
         tuple[int, int] | None,
-        typer.Option(
-            help="Width and height (px); by default 1280 x 720, for several policies 480 high each."
-        ),
+        Option(help="Width and height (px); by default 1280 x 720, for several policies 480 high each."),
     ] = None,
     seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Seed of irregularity and noise; 0, unless a saved run has its own."),
+        int | None, Option(min=0, help="Seed of irregularity and noise; 0, unless a saved run has its own.")
     ] = None,
 ) -> None:
     """Write a film of a pass along a line: wires, pantograph, actuator and contact force.
@@ -210,7 +203,6 @@ def film(
     Several policies run on the same line under the same seed, above each other, with their figures.
     A saved run is repeated from its settings, and refused if its contact force differs.
     """
-    from ..base.errors import InputError
     from ..render.film import Filmed, check_together, excerpt, frames, policy_pass, saved_passes
 
     if len(policies) > MOST:

@@ -11,14 +11,24 @@ import typer
 from rich import table as rich_table
 from rich.markup import escape
 from rich.text import Text
+from typer import Argument, Option
 
 from .. import studies
 from ..analysis.options import Seed, Spans, parse_spans, print_criteria, with_settings
+from ..analysis.plots import save
 from ..base.checksums import with_checksum
 from ..base.errors import InputError
 from ..base.files import finite, make_folder
 from ..base.table import Table
+from ..catalog import load_catenary, load_pantograph
+from ..rig import report
+from ..rig.computer import compare, load_rig
+from ..rig.plots import plot_pairs
 from ..studies.en50318 import study
+from ..studies.en50318.plots import plot_reference
+from ..studies.throughput import study as measured
+from ..studies.throughput import tables as shown
+from ..studies.throughput.plots import plot_speed
 from ..terminal import (
     ALARM,
     Json,
@@ -37,38 +47,33 @@ from ..terminal import (
 
 def validate(
     convergence: Annotated[
-        bool, typer.Option("--convergence", help="Print the convergence of figures with grid and step.")
+        bool, Option("--convergence", help="Print the convergence of figures with grid and step.")
     ] = False,
     window: Annotated[
-        bool, typer.Option("--window", help="Print how travelling windows compare with whole lines.")
+        bool, Option("--window", help="Print how travelling windows compare with whole lines.")
     ] = False,
     wear: Annotated[
-        bool, typer.Option("--wear", help="Print the effect of the time step on figures of a worn line.")
+        bool, Option("--wear", help="Print the effect of the time step on figures of a worn line.")
     ] = False,
     conditions: Annotated[
         bool,
-        typer.Option(
-            "--conditions", help="Print figures in each named condition of a line, on several lines."
-        ),
+        Option("--conditions", help="Print figures in each named condition of a line, on several lines."),
     ] = False,
     lines: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--lines",
             help="Print the errors of the default grid and step on every line of the catalogue and on twenty "
             "drawn ones, at all speeds (ten minutes).",
         ),
     ] = False,
     start: Annotated[
-        bool, typer.Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
+        bool, Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
     ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..studies.en50318.plots import plot_reference
     with progress_console.status("validating") as status:
         validation = study.run(
             status.update,
@@ -104,8 +109,8 @@ def validate(
 
 
 def reproduce(
-    name: Annotated[str, typer.Argument(help="A study, or all.")] = "all",
-    output: Annotated[Path, typer.Option(help="Folder for figures (PNG) and numbers (JSON).")] = Path(
+    name: Annotated[str, Argument(help="A study, or all.")] = "all",
+    output: Annotated[Path, Option(help="Folder for figures (PNG) and numbers (JSON).")] = Path(
         "runs/reproduce"
     ),
     json: Json = False,
@@ -148,14 +153,8 @@ def reproduce(
 
 
 def _print(outcome: studies.Outcome) -> None:
-    for table in outcome.tables:
-        print_table(table)
-    console.print(_comparisons(outcome))
-    if outcome.verdict:
-        console.print(outcome.verdict)
-
-
-def _comparisons(outcome: studies.Outcome) -> rich_table.Table:
+    for each in outcome.tables:
+        print_table(each)
     table = rich_table.Table(title=outcome.title)
     for heading in ("quantity", "unit", "ours", "paper", "agrees within", "note"):
         table.add_column(heading, justify="right" if heading in ("ours", "agrees within") else "left")
@@ -169,26 +168,25 @@ def _comparisons(outcome: studies.Outcome) -> rich_table.Table:
             f"{number(comparison.low, 3)} to {number(comparison.high, 3)}",
             comparison.note,
         )
-    return table
+    console.print(table)
+    if outcome.verdict:
+        console.print(outcome.verdict)
 
 
 def speed(
     results: Annotated[
         list[Path] | None,
-        typer.Argument(help="Results stored with --json, to print next to each other instead of measuring."),
+        Argument(help="Results stored with --json, to print next to each other instead of measuring."),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
+    repeats: Annotated[int, Option(min=1, max=1000, help="Repeats; their median counts.")] = 9,
     device: Annotated[
         str | None,
-        typer.Option(
-            help='Measure the vector environments on this device instead: "cuda", or "cpu" to try it.'
-        ),
+        Option(help='Measure the vector environments on this device instead: "cuda", or "cpu" to try it.'),
     ] = None,
     plot: Plot = None,
     json: Json = False,
     markdown: Annotated[
-        bool,
-        typer.Option("--markdown", help="Print the tables for README.md, then those for docs/speed.md."),
+        bool, Option("--markdown", help="Print the tables for README.md, then those for docs/speed.md.")
     ] = False,
 ) -> None:
     """Measure the speed of each plant relative to real time on one core, and environment steps per second.
@@ -204,18 +202,21 @@ def speed(
             raise InputError(
                 "--device measures anew and prints one table; leave out results, --plot and --markdown."
             )
-        _on_device(device, repeats, json)
-        return
-    from ..studies.throughput import study, tables
+        from ..studies.throughput import device as lanes  # needs PyTorch
 
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..studies.throughput.plots import plot_speed
+        with progress_console.status("measuring") as status:
+            of_lanes = lanes.run(device, repeats, report=lambda what: status.update(f"measuring {what}"))
+        if json:
+            print_json(of_lanes)
+        else:
+            print_table(_plain(lanes.table(of_lanes)))
+        return
+
     if results:
-        found = [study.read(path) for path in results]
+        found = [measured.read(path) for path in results]
     else:
         with progress_console.status("measuring") as status:
-            found = [study.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
+            found = [measured.run(repeats, report=lambda what: status.update(f"measuring {what}"))]
     result = found[0]
     with written_last() as later:
         if plot is not None:
@@ -223,26 +224,14 @@ def speed(
         if json:
             print_json(with_checksum(finite(result)))
         elif markdown:
-            sys.stdout.write("\n".join(tables.markdown(found)))
+            sys.stdout.write("\n".join(shown.markdown(found)))
         else:
-            console.print("\n".join(tables.machines(found)))
-            for part in (tables.summary(found), *tables.details(result)):
+            console.print("\n".join(shown.machines(found)))
+            for part in (shown.summary(found), *shown.details(result)):
                 if isinstance(part, str):
                     console.print(part)
                 else:
                     print_table(_plain(part))
-
-
-def _on_device(name: str, repeats: int, json: bool) -> None:
-    """Measure and print the speed of lanes on a device."""
-    from ..studies.throughput import device  # needs PyTorch
-
-    with progress_console.status("measuring") as status:
-        found = device.run(name, repeats, report=lambda what: status.update(f"measuring {what}"))
-    if json:
-        print_json(found)
-    else:
-        print_table(_plain(device.table(found)))
 
 
 def _plain(table: Table) -> Table:
@@ -262,25 +251,24 @@ def rig(
     settings: dict[str, Any],
     rigs: Annotated[
         list[str] | None,
-        typer.Argument(help=f"Rigs, of the catalogue or as TOML files. [default: {' '.join(RIGS)}]"),
+        Argument(help=f"Rigs, of the catalogue or as TOML files. [default: {' '.join(RIGS)}]"),
     ] = None,
     reference: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Line with which the rig is compared; by default its computed line if that has droppers, "
             f"else {REFERENCE}."
         ),
     ] = None,
-    policy: Annotated[str | None, typer.Option(help="Policy, on the rig and on the line.")] = None,
+    policy: Annotated[str | None, Option(help="Policy, on the rig and on the line.")] = None,
     stability: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--stability", help="Find the delay and lag at which each loop gets unstable; about 20 s per rig."
         ),
     ] = False,
     clock: Annotated[
-        float,
-        typer.Option(min=0, max=3600, help="Run each rig's computer in real time for this time (s)."),
+        float, Option(min=0, max=3600, help="Run each rig's computer in real time for this time (s).")
     ] = 0.0,
     spans: Spans = None,
     seed: Seed = 0,
@@ -291,10 +279,6 @@ def rig(
 
     By default that is pantograph own-two-mass at 250 km/h, as in paper 2.
     """
-    from ..catalog import load_catenary, load_pantograph
-    from ..rig import report
-    from ..rig.computer import compare, load_rig
-
     chosen, facts, tables, pairs = parse_spans(spans), [], [], []
     pantograph = load_pantograph(settings.pop("pantograph", PANTOGRAPH))
     speed_kmh = settings.pop("speed_kmh", SPEED_KMH)
@@ -320,9 +304,6 @@ def rig(
                 tables.append(report.timing_table(data.name, timing))
     with written_last() as later:
         if plot is not None:
-            from ..analysis.plots import save
-            from ..rig.plots import plot_pairs
-
             later(save, plot_pairs(pairs), plot)
         if json:
             print_json(facts)

@@ -33,7 +33,6 @@ import numpy as np
 
 from ..base.arrays import METRES_PER_SECOND, Array
 from ..base.errors import InputError, shortly
-from ..base.files import check_regular
 from ..base.record_columns import JITTER, LENGTHS, TIME, Column, places_of, read_columns
 from ..base.table import Sheet, write_table
 from ..metrics.trajectory import KEY
@@ -118,7 +117,6 @@ def _parquet(
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 
-    check_regular(path)
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowException) as error:

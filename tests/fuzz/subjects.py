@@ -59,18 +59,17 @@ def subjects(folder: Path) -> dict[str, Subject]:
     run.evaluations.write_text(
         "steps,speed_kmh,seed,policy_sigma\n" + "".join(f"{128 * k},300,1,{20.5 - k}\n" for k in range(1, 9))
     )
-    found = {
-        f"line {name}": Subject("TOML", _entry(name, folder), _line) for name in available("catenary")
-    } | {
-        f"pantograph {name}": Subject("TOML", _entry(name, folder), _pantograph)
-        for name in ("three-mass", "own-two-mass")
-    }
-    drawn = (("family", load_family), ("section", load_section))
-    found |= {
-        f"{kind} {name}": Subject("TOML", _entry(name, folder), load)
-        for kind, load in drawn
-        for name in available(kind)
-    }
+    found = {}
+    for kind, names, load in (
+        ("line", available("catenary"), _line),
+        ("pantograph", ("three-mass", "own-two-mass"), _pantograph),
+        ("family", available("family"), load_family),
+        ("section", available("section"), load_section),
+    ):
+        for name in names:
+            path = folder / f"{name}.toml"
+            path.write_text(text_of(name), encoding="utf-8")
+            found[f"{kind} {name}"] = Subject("TOML", path, load)
     configs = ROOT / "configs"
     found |= {
         "training": Subject("TOML", configs / "agent-high-speed.toml", load_training),
@@ -92,17 +91,9 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "study": Subject("JSON", _study(folder), read_checked, checked=True),
         "part of a data set": _part(folder),
     }
-    models = {
-        f"model {path.stem}": Subject("model", path, read_model, True)
-        for path in MODELS.glob("*.safetensors")
-    }
-    return found | models
-
-
-def _entry(name: str, folder: Path) -> Path:
-    path = folder / f"{name}.toml"
-    path.write_text(text_of(name), encoding="utf-8")
-    return path
+    for path in MODELS.glob("*.safetensors"):
+        found[f"model {path.stem}"] = Subject("model", path, read_model, checked=True)
+    return found
 
 
 def _line(path: Path) -> Any:
