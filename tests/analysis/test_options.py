@@ -7,9 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_env import InputError
 from panto_env.analysis.options import PANELS, with_settings
-from panto_env.analysis.pool import check_passes
 from panto_env.cli import make_app
 from panto_env.control.settings import fields
 
@@ -41,12 +39,6 @@ def test_the_help_says_defaults_unless_a_file_may_have_others():
     shown = f"Default: {fields()['speed_kmh'].default}."
     assert shown in call("--help", only=("speed_kmh",))[1].replace("│ ", "").replace(" │", "")
     assert "Default" not in call("--help", only=("speed_kmh",), defaults=False)[1]
-
-
-def test_passes_are_counted_up_to_a_hundred_thousand():
-    check_passes(100_000, "This")
-    with pytest.raises(InputError, match="This has 100,001 passes; the maximum is 100,000"):
-        check_passes(100_001, "This")
 
 
 def test_the_help_groups_options_and_learning_comes_last():

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from panto_env import InputError, Trajectory, simulate
+from panto_env import InputError, simulate
 from panto_env.catalog import available, load_catenary
 from panto_env.catalog.loader import FOLDERS
 from panto_env.metrics import compliance as en50367
@@ -70,6 +70,7 @@ def test_mean_force_is_limited_by_speed_and_system(system, speed, largest, small
         assert criterion.kept is kept
         assert "± 0.5" in limits_in_words(criterion)
         assert criterion.margin == pytest.approx(largest - mean, abs=1e-9)
+        assert ("--mean-force en50367" in criterion.note) != kept
     too_low = of_force(figures(mean=smallest - 1), 0.0, speed, system)["mean"]
     assert (too_low.kept, too_low.margin) == (False, pytest.approx(-1.0))
 
@@ -89,11 +90,14 @@ def test_supplies_without_a_mean_force_of_the_standard(system):
         simulate(load_catenary("re250").model_copy(update={"system": system}), mean_force="en50367")
 
 
-def test_f_m_plus_3_sigma_is_judged_beside_the_maximum():
-    """It had stood without a verdict beside the limit that it breaks."""
+def test_f_m_plus_3_sigma_is_judged_beside_the_maximum_and_sources_say_what_is_recalled():
     found = of_force(figures(mean=150.0, std=70.0, statistical_max=360.0, max=340.0), 0.0, 250)
     assert (found["statistical_max"].highest, found["statistical_max"].verdict) == (350.0, "broken")
     assert found["max"].verdict == "kept"
+    assert all("recalled" in criterion.source for criterion in found.values())
+    assert "AC, the line's power supply (drawing 1)" in found["mean"].note
+    assert "--mean-force en50367" in found["mean"].note
+    assert "contact loss CL counts all" in found["arcing"].note
 
 
 @pytest.mark.parametrize(
@@ -207,32 +211,19 @@ def test_an_arc_is_a_loss_of_more_than_5_ms():
     assert arcing(np.zeros(5), 1e-2) == 100.0
 
 
-def test_sources_say_what_is_recalled():
-    criteria = of_force(figures(mean=100.0), 0.0, 250, "DC 3 kV")
-    assert all("recalled" in criterion.source for criterion in criteria.values())
-    assert "DC 3 kV, the line's power supply (drawing 1)" in criteria["mean"].note
-    assert "contact loss CL counts all" in criteria["arcing"].note
-
-
 # --- criteria ------------------------------------------------------------------------------------
 
 
 def test_margin_is_to_the_nearer_limit():
     between = Criterion("a", "a", "N", 7.0, 5.0, 10.0)
     assert (between.margin, between.kept) == (2.0, True)
-    assert (
-        Criterion("a", "a", "N", 4.0, 5.0, 10.0).margin,
-        Criterion("a", "a", "N", 12.0, 5.0, 10.0).margin,
-    ) == (-1, -2)
+    assert [Criterion("a", "a", "N", value, 5.0, 10.0).margin for value in (4.0, 12.0)] == [-1, -2]
+    one, two = ([Criterion("a", "a", "N", value, None, 10.0)] for value in (9.0, 11.0))
+    assert worst([one, two]) == two
     told = Criterion("a", "a", "N", 4.0)
     assert math.isnan(told.margin)
     assert told.kept is None
     assert Criterion("a", "a", "N", 4.0, 4.0, None).kept
-
-
-def test_of_several_runs_the_worst_is_shown():
-    one, two = ([Criterion("a", "a", "N", value, None, 10.0)] for value in (9.0, 11.0))
-    assert worst([one, two]) == two
 
 
 def test_tables_show_limits_and_lines_the_rest():
@@ -285,15 +276,6 @@ def test_what_waves_meet_is_told_of_lines_that_have_it(reference_run):
     assert set(found) - set(by_key(bare.compliance())) == {"dropper reflection", "support reflection"}
 
 
-@pytest.mark.parametrize(("value", "shown"), [(9.9996, "10.000"), (10.0, "10.0"), (-10.4, "-10.4")])
-def test_large_numbers_have_one_figure_after_the_comma_and_small_ones_three(value, shown):
-    assert limits_in_words(Criterion("a", "a", "N", 0.0, value)) == f"at least {shown}"
-
-
-def test_spans_are_those_asked_for(reference_run):
-    assert by_key(reference_run.compliance((5, 6)))["std"].value == reference_run.summary((5, 6)).std
-
-
 def test_a_run_made_up_by_hand():
     line = replace(RUN.line, system="DC 3 kV", wave_speed=100.0, free_uplift=0.4)
     slack = np.ones((40, 4))
@@ -343,13 +325,6 @@ def test_a_line_without_wires_is_held_against_the_force_alone():
     assert set(by_key(run.compliance())) == {
         *("mean", "std", "statistical_max", "max", "arcing", "static_force", "min"),
     }
-
-
-def test_a_saved_run_knows_its_line(tmp_path, reference_run):
-    reference_run.save(tmp_path / "run.parquet")
-    again = Trajectory.load(tmp_path / "run.parquet")
-    assert again.line == reference_run.line
-    assert again.compliance() == reference_run.compliance()
 
 
 # --- commands ------------------------------------------------------------------------------------
@@ -410,11 +385,7 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
 
 def test_simulate_validate_and_evaluate_print_the_same_table():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
-    for output in (
-        printed("simulate", *light),
-        printed("evaluate", "pd", *light, "--line-condition", "new"),  # which moves each of these
-        printed("validate"),
-    ):
+    for output in (printed("simulate", *light), printed("validate")):
         for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
             assert words in output
     validation = json.loads(printed("validate", "--json"))["compliance"]
@@ -426,17 +397,6 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     keys = [criterion["key"] for criterion in entry["policy_compliance"]]
     assert keys == ["mean", "std", "statistical_max", "max", "arcing", "static_force", "min"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
-
-
-@pytest.mark.parametrize("mean", [60.0, 110.0])
-def test_a_broken_mean_force_names_the_option_that_trims_it(mean):
-    within, beyond = (
-        en50367.criteria(figures(mean=each), 0.0, 200 / 3.6, "AC", "recalled") for each in (100.0, mean)
-    )
-    assert "--mean-force" not in by_key(within)["mean"].note
-    assert by_key(beyond)["mean"].kept is False
-    assert "--mean-force en50367" in by_key(beyond)["mean"].note
-    assert any("--mean-force en50367" in line for line in remarks(beyond))
 
 
 def test_the_option_that_trims_the_mean_force_keeps_the_limit():
@@ -467,6 +427,7 @@ def test_the_tutorial_s_first_runs_keep_all_requirements():
         (157.3, 157.3, ("157.3", "at most 157.3", "0.000")),
         (10.0004, 9.9999, ("10.00", "at most 9.9999", "-0.001")),
         (0.1000001, 0.1, ("0.1000001", "at most 0.1000000", "-0.0000001")),
+        (9.9996, 9.9996, ("10.000", "at most 10.000", "0.000")),
         (math.nan, 0.1, ("–", "at most 0.100", "–")),
     ],
 )

@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from panto_env import InputError, simulate
-from panto_env.report import charts, findings
-from panto_env.report.findings import Findings
-from panto_env.report.page import MOST, _different, _side_by_side, _title, number, page
+from panto_env.base.plotting import series_colour
+from panto_env.report import charts
+from panto_env.report.findings import Findings, Folded
+from panto_env.report.page import MOST, _title, page
 
 from ..metrics.test_summary import RUN
 
@@ -46,26 +48,6 @@ def test_what_is_found_in_a_run_of_four_spans():
         assert [k for k, *_ in part.uplifts] == [1] * counts, (begin, end, place)
 
 
-@pytest.mark.parametrize(("covered", "choice"), [(None, "all"), ((10, 12), None)])
-def test_what_is_judged_by_span_stretch_and_dropper_is_what_is_evaluated(monkeypatch, covered, choice):
-    asked = []
-    for name in ("by_span", "by_stretch", "moving_droppers"):
-        monkeypatch.setattr(
-            findings, name, lambda run, spans, name=name: asked.append((name, spans)) or [name]
-        )
-
-    def spans():
-        if covered is None:
-            raise InputError("The run is too short.")
-        return covered
-
-    one = Findings(SimpleNamespace(common_spans=spans, spans_differ=True), "it")
-    assert one.covered == covered
-    assert (one.by_span, one.by_stretch, one.droppers) == (["by_span"], ["by_stretch"], ["moving_droppers"])
-    assert asked == [(name, choice) for name in ("by_span", "by_stretch", "moving_droppers")]
-    assert Findings(SimpleNamespace(common_spans=spans, spans_differ=False), "it").by_span == []
-
-
 @pytest.fixture(scope="module")
 def whole():
     return Findings(simulate(**SHORT), "whole.parquet")
@@ -91,19 +73,11 @@ def drawn(monkeypatch):
 def test_charts_stand_on_the_page_of_runs_that_have_them(whole, short, drawn):
     assert (short.figures, whole.figures is None) == (None, False)
     np.testing.assert_allclose(whole.folded.share, np.arange(240) / 240)
+    of_short, of_whole = "force_along:short.parquet;", "force_along:whole.parquet;"
+    judged = ["force_folded:whole.parquet;", "spectrum:whole.parquet;"]
     for runs, shown in (
-        ([whole], ["force_along:whole.parquet;", "force_folded:whole.parquet;", "spectrum:whole.parquet;"]),
-        ([short], ["force_along:short.parquet;"]),
-        (
-            [short, whole],
-            [
-                "force_along:short.parquet;",
-                "force_along:whole.parquet;",
-                "force_folded:whole.parquet;",
-                "spectrum:whole.parquet;",
-            ],
-        ),
-    ):
+        ([whole], [of_whole, *judged]), ([short], [of_short]), ([short, whole], [of_short, of_whole, *judged])
+    ):  # fmt: skip
         text = page(runs)
         assert [each for each in shown if each in text] == shown
         assert sum(text.count(f"{name}:") for name in CHARTS) == len(shown)
@@ -117,13 +91,6 @@ def test_a_page_holds_one_to_eight_runs(short, drawn):
     for count in (0, 9):
         with pytest.raises(InputError, match=f"^A report shows 1 to 8 runs, not {count}\\.$"):
             page(runs[:count])
-
-
-def test_a_run_without_its_design_is_refused(short):
-    with pytest.raises(InputError, match=r"^old\.parquet was written by an older version"):
-        _ = Findings(replace(short.run, design={}), "old.parquet").line
-    assert short.line.name == "periodic-stiffness"
-    assert short.pantograph.name == "three-mass"
 
 
 def test_titles_and_names_tell_runs_apart():
@@ -142,28 +109,17 @@ def test_titles_and_names_tell_runs_apart():
     assert [*charts.names_of(same).values()] == ["passive (1)", "pd (2)", "pd (3)"]
 
 
-def test_criteria_of_unlike_runs_stand_in_one_row_each():
-    def of(*keys):
-        return SimpleNamespace(criteria=[SimpleNamespace(key=key) for key in keys])
-
-    runs = [of("max", "slack"), of("mean", "max")]
-    rows = _side_by_side(runs)
-    assert [first.key for first, _ in rows] == ["max", "slack", "mean"]
-    assert [[each and each.key for each in own] for _, own in rows] == [
-        ["max", "max"], ["slack", None], [None, "mean"]
-    ]  # fmt: skip
-    assert rows[0][0] is runs[0].criteria[0]
-    assert rows[2][0] is runs[1].criteria[0]
+def test_a_run_without_whole_spans_hides_no_other(monkeypatch):
+    axes, share = Figure().subplots(), np.linspace(0.0, 1.0, 5)
+    monkeypatch.setattr(charts, "drawn", lambda draw: draw(axes))
+    levels = (None, 100.0, None, 120.0)
+    folded = [level and Folded(share, 0 * share + level, share + 90, share + 130) for level in levels]
+    names = {_Named(folded=each): f"run {k}" for k, each in enumerate(folded)}
+    charts.force_folded(names)
+    assert [line.get_label() for line in axes.lines] == ["run 1: median", "run 3: median"]
+    assert [line.get_color() for line in axes.lines] == [series_colour(1), series_colour(3)]
+    assert [line.get_ydata()[0] for line in axes.lines] == [100.0, 120.0]
 
 
-def test_runs_of_one_line_are_grouped_by_its_values():
-    texts = {"1": "x", "2": "y", "3": "x"}
-    runs = [Findings(SimpleNamespace(), file) for file in texts]
-    for one in runs:
-        one.__dict__["line"] = SimpleNamespace(model_dump_json=lambda text=texts[one.file]: text)
-    assert _different(runs, "line") == {runs[0]: ["1", "3"], runs[1]: ["2"]}
-    assert [number(value, digits) for value, digits in ((1.25, 1), (-3.0, 0), (np.inf, 1))] == [
-        "1.2",
-        "-3",
-        "–",
-    ]
+class _Named(SimpleNamespace):
+    __hash__ = object.__hash__

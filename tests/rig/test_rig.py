@@ -11,14 +11,9 @@ from scipy.signal import butter, lsim
 
 from panto_env import InputError, simulate
 from panto_env.backend import kernel
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_catenary
 from panto_env.metrics.low_pass import in_band
-from panto_env.plant.catenary.protocol import (
-    advance_wire,
-    apply_force,
-    end_step,
-    place_contact,
-)
+from panto_env.plant.catenary.protocol import advance_wire, apply_force, end_step, place_contact
 from panto_env.plant.catenary.rig import Rig
 from panto_env.plant.catenary.rig.build import assumed, bank, outer_lead
 from panto_env.plant.catenary.rig.step import RIG_ROW, RigRow
@@ -27,12 +22,7 @@ from panto_env.plant.numerics import Numerics, Runs
 
 LINE, PANTOGRAPH, SPEED = "en50318-2002", "own-two-mass", 250
 EXACT = {
-    "cylinder": {
-        "natural_frequency": 200,
-        "speed_limit": 20,
-        "stiffness": 5e8,
-        "displacement_noise": 0,
-    },
+    "cylinder": {"natural_frequency": 200, "speed_limit": 20, "stiffness": 5e8, "displacement_noise": 0},
     "load_cell": {"noise": 0, "filter_frequency": 2e3, "mass": 0, "compensated_mass": 0},
     "computer": {"delay": 0, "input_bits": 32, "output_bits": 32},
 }
@@ -85,12 +75,8 @@ def parts_of_run(data, commands, force):
     return model, heights, cells
 
 
-def test_row_numbers_of_the_kernel_above_are_those_of_the_names():
-    assert (RigRow.HEIGHT, RigRow.FILTERED, RigRow.COMMAND) == (0, 4, 6)
-
-
 @pytest.mark.plain
-@pytest.mark.parametrize("delay", [0.0, 1e-3, 0.6e-3])
+@pytest.mark.parametrize("delay", [0.0, 0.6e-3])
 def test_the_cylinder_is_its_transfer_function_behind_the_delay(delay):
     data, dt = rig(cylinder={"speed_limit": 20}, computer={"delay": delay}), 2.5e-4
     commands = 1e-3 * np.cumsum(np.random.default_rng(0).standard_normal(160))
@@ -280,10 +266,7 @@ def test_a_rig_may_name_its_line_and_takes_over_what_that_has(tmp_path):
     path.write_text('kind = "rig"\ndescription = "mine"\nline = "re330"\n')
     data, line = load_catenary(str(path)), load_catenary("re330")
     assert (data.span_length, data.spans, data.system) == (line.span_length, line.spans, line.system)
-    path.write_text('kind = "rig"\ndescription = "mine"\nline = "re331"\n')
-    with pytest.raises(InputError, match=r"did you mean 're330'"):
-        load_catenary(str(path))
-    path.write_text('kind = "rig"\ndescription = "mine"\nline = "periodic-stiffness"\n')
-    with pytest.raises(InputError, match="line"):
-        load_catenary(str(path))
-    assert load_pantograph(PANTOGRAPH)
+    for name, words in (("re331", "did you mean 're330'"), ("periodic-stiffness", "line")):
+        path.write_text(f'kind = "rig"\ndescription = "mine"\nline = "{name}"\n')
+        with pytest.raises(InputError, match=words):
+            load_catenary(str(path))
