@@ -149,7 +149,6 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
 
 
 def _series(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each policy, and of each pantograph of a train, in the order in which they were given."""
     found: dict[str, list[Row]] = {}
     for row in rows:
         name = f"{row['policy']}, pantograph {row[NUMBER]}" if NUMBER in row else row["policy"]

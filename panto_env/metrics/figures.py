@@ -1,10 +1,4 @@
-"""Labels of figures for tables and plots: name, short name, unit, and scale from SI.
-
-The spans that the figures of a run cover: first to last, both included (EN 50318 takes 5 and 6).
-
-By default these are the spans after the start has died out and, where a sequence of spans ends, before its
-end is felt. The line's alignment knows their positions.
-"""
+"""Figures of merit with their labels, and the spans that they cover: first to last, both included."""
 
 from __future__ import annotations
 

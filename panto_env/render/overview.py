@@ -79,7 +79,6 @@ def _force(rider: Rider) -> str:
 
 
 def _draw_part_shown(strip: Strip, moment: Moment, span: float) -> None:
-    """Draw a frame about the part of the line that the picture above shows."""
     left, right = strip.across(np.array([moment.position - BEHIND * span, moment.position + AHEAD * span]))
     left, right = max(float(left), strip.margin), min(float(right), strip.width)
     high, low = strip.down(NAMES + 0.05), strip.down(ROOF)
@@ -87,7 +86,6 @@ def _draw_part_shown(strip: Strip, moment: Moment, span: float) -> None:
 
 
 def _draw_chart(strip: Strip, moment: Moment, axis: float, size: float) -> None:
-    """Draw the field of the forces, its lines of 0 N and of the maximum, and the supports."""
     top, bottom = float(strip.down(CHART)), float(strip.down(0.97))
     strip.canvas.box(strip.margin, top, strip.width - strip.margin, bottom - top, PAPER)
     for force, colour in ((0.0, INK), (axis, FAINT)):
@@ -102,7 +100,6 @@ def _draw_chart(strip: Strip, moment: Moment, axis: float, size: float) -> None:
 
 
 def _draw_wire(strip: Strip, train: TrainView) -> None:
-    """Draw the contact wire and the train's roof."""
     inside = train.line.x >= strip.begin
     places, heights = train.line.x[inside], train.line.contact[inside]
     strip.canvas.wire(np.column_stack([strip.across(places), _wire(strip, heights)]), INK, 2)
@@ -116,7 +113,6 @@ def _wire(strip: Strip, heights: Array | float) -> Array:
 
 
 def _draw_rider(strip: Strip, train: TrainView, rider: Rider, colour: Colour, shown: bool) -> None:
-    """Draw a pantograph's mark from the roof to the wire."""
     x, foot = float(strip.across(rider.position)), float(strip.down(ROOF))
     head = float(_wire(strip, float(np.interp(rider.position, train.line.x, train.line.contact))))
     strip.canvas.line([(x, head), (x + 5, 0.5 * (head + foot)), (x, foot)], colour if shown else METAL, 2)
@@ -124,7 +120,6 @@ def _draw_rider(strip: Strip, train: TrainView, rider: Rider, colour: Colour, sh
 
 
 def _draw_force(strip: Strip, rider: Rider, colour: Colour, axis: float, shown: bool) -> None:
-    """Draw the low-passed force of a pantograph over the places where it acted, and where it is now."""
     if rider.filtered.size < 2:
         return
     few = slice(None, None, -max(1, int(rider.places.size / 2000)))  # from the newest sample back

@@ -106,7 +106,6 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
 
 
 def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
-    """Draw the names of the chart's lines and marks above it, where they cover nothing."""
     size, y = 0.85 * _size(layout), layout.chart[0] - 0.75 * _size(layout)
     x = layout.margin
     limit = f"{moment.standard}: {moment.largest_force:.0f} N"
@@ -121,7 +120,6 @@ def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) ->
 
 
 def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colour: Colour) -> None:
-    """Draw what an entry of the legend stands for, as the chart has it."""
     if words == "contact lost":
         canvas.box(x + 0.7 * size, y - 0.35 * size, 0.7 * size, 0.7 * size, colour)
     elif words == "support":
@@ -133,7 +131,6 @@ def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colo
 
 
 def _dashes(canvas: Canvas, left: float, right: float, y: float, colour: Colour) -> None:
-    """Draw a dashed level line."""
     for x in np.arange(left, right, 14):
         canvas.line([(x, y), (min(x + 7, right), y)], colour)
 
@@ -182,7 +179,6 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | None, slack: bool) -> None:
-    """Draw the names of the wires at the left, and of slack droppers while there is one."""
     size, x = 0.85 * _size(layout), 0.01 * layout.width
     canvas.words(x, float(contact[0, 1]) + size, "contact wire", QUIET, size)
     if upper is not None:
@@ -194,7 +190,6 @@ def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | N
 
 
 def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: Array | None) -> None:
-    """Draw a mast behind the line, its arm, and the steady arm of the contact wire."""
     away, scale = 0.018 * layout.width, layout.height / 720
     low = float(np.interp(x, contact[:, 0], contact[:, 1]))
     high = low - 40 * scale if upper is None else float(np.interp(x, upper[:, 0], upper[:, 1]))
@@ -210,7 +205,6 @@ def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: 
 
 
 def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw a line that is only a spring above the pantograph, and the limits of its spans."""
     x, y = layout.pantograph, float(layout.up(moment.wire))
     ceiling = 0.16 * layout.height
     canvas.line([(x - 60, ceiling), (x + 60, ceiling)], METAL, 3)
@@ -226,7 +220,6 @@ def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_pantograph(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw collector head, masses with the springs between them, and the frame's two arms to the roof."""
     x, scale = layout.pantograph, layout.height / 720
     chain = layout.chain(moment.heights).tolist()
     head, frame = chain[0], chain[-1]
@@ -264,7 +257,6 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
-    """Draw the contact force below the places where it acted, and dashed lines at supports."""
     begin = moment.position - (layout.pantograph - layout.margin) / layout.per_metre
     for number in moment.alignment.supports_within(begin, moment.position):
         at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
@@ -283,7 +275,6 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
 
 
 def _rows(moment: Moment) -> dict[str, str]:
-    """Numbers to the right of the chart, by name."""
     place = f"{moment.position:.0f} m"
     if moment.position >= 0:
         place += f", span {moment.alignment.span_name(moment.alignment.span_of(moment.position))}"

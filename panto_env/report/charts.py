@@ -169,7 +169,10 @@ def stiffness(one: Findings) -> str:
 
 def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
     """A distinct name for each run, from what differs between runs, if necessary with its file."""
-    columns = list(zip(*map(_parts, found), strict=True))
+    runs = [one.run for one in found]
+    pantographs = [f"{one.number or ''} {one.run.pantograph}".lstrip() for one in found]
+    columns = [[run.catenary for run in runs], pantographs, [f"{run.speed_kmh:g} km/h" for run in runs]]
+    columns += [[run.policy for run in runs], [f"seed {run.seed}" for run in runs]]
     differing = [column for column in columns if len({*column}) > 1] or [columns[2]]
     names = [", ".join(words) for words in zip(*differing, strict=True)]
     if len({*names}) < len(names):
@@ -180,9 +183,3 @@ def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
 def of_run(one: Findings, name: str) -> str:
     """Name for what all pantographs of a run share; name: of these findings."""
     return f"train of {len(one.train)} pantographs ({one.file})" if one.train else name
-
-
-def _parts(one: Findings) -> tuple[str, ...]:
-    run = one.run
-    pantograph = f"{one.number} {run.pantograph}" if one.number else run.pantograph
-    return run.catenary, pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"

@@ -63,5 +63,4 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
 
 
 def _rig_style(number: int) -> dict[str, Any]:
-    """Broad, so that it is seen where the line's own curve covers it."""
     return {"color": series_colour(number), "linewidth": 2.5}
