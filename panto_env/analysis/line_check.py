@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 
 import numpy as np
 
@@ -169,25 +169,25 @@ class DrawnLine:
     """A drawn line and a passive run at its highest speed; means over spans where nothing else is said."""
 
     seed: int
-    draws: int  # until the line was taken
-    milliseconds: float  # to draw it
-    length: float  # of the line (m)
-    span_length: float  # m
-    shortest_span: float  # m
-    longest_span: float  # m
-    gradient: float  # maximum, up or down (‰)
-    gradient_change: float  # maximum, at a support (‰)
-    droppers: float  # of a span
-    encumbrance: float  # m
-    pre_sag: float  # maximum (m)
-    contact_tension: float  # kN
-    messenger_tension: float  # kN
-    wave_speed_kmh: float
-    speed_kmh: float  # of the run
-    force_deviation: float  # sigma over mean force (-); nan where the run ended early, as the next
-    uplift: float  # m
-    elasticity: float  # maximum (m/N)
-    non_uniformity: float  # of the elasticity (%)
+    draws: Annotated[int, "draws until a line is taken"]
+    milliseconds: Annotated[float, "time to draw it (ms)"]
+    length: Annotated[float, "length of the line (m)"]
+    span_length: Annotated[float, "span (m)"]
+    shortest_span: Annotated[float, "shortest span (m)"]
+    longest_span: Annotated[float, "longest span (m)"]
+    gradient: Annotated[float, "maximum gradient (‰)"]
+    gradient_change: Annotated[float, "maximum change of gradient (‰)"]
+    droppers: Annotated[float, "droppers of a span"]
+    encumbrance: Annotated[float, "encumbrance (m)"]
+    pre_sag: Annotated[float, "pre-sag (m)"]
+    contact_tension: Annotated[float, "tension of the contact wire (kN)"]
+    messenger_tension: Annotated[float, "tension of the messenger (kN)"]
+    wave_speed_kmh: Annotated[float, "wave speed (km/h)"]
+    speed_kmh: Annotated[float, "highest speed of trains (km/h)"]
+    force_deviation: Annotated[float, "σ / F_m at that speed"]  # nan where the run ended early, as the next
+    uplift: Annotated[float, "uplift at a support at that speed (m)"]
+    elasticity: Annotated[float, "maximum elasticity (m/N)"]
+    non_uniformity: Annotated[float, "non-uniformity of the elasticity (%)"]
     ending: str  # where and why the run ended early; empty if it did not
 
     def outside(self, lines: LineFamily | LineSection) -> list[str]:
@@ -196,26 +196,9 @@ class DrawnLine:
         return [name for name, (low, high) in bands.items() if not low <= getattr(self, name) <= high]
 
 
-LABELS = {
-    "draws": "draws until a line is taken",
-    "milliseconds": "time to draw it (ms)",
-    "length": "length of the line (m)",
-    "span_length": "span (m)",
-    "shortest_span": "shortest span (m)",
-    "longest_span": "longest span (m)",
-    "gradient": "maximum gradient (‰)",
-    "gradient_change": "maximum change of gradient (‰)",
-    "droppers": "droppers of a span",
-    "encumbrance": "encumbrance (m)",
-    "pre_sag": "pre-sag (m)",
-    "contact_tension": "tension of the contact wire (kN)",
-    "messenger_tension": "tension of the messenger (kN)",
-    "wave_speed_kmh": "wave speed (km/h)",
-    "speed_kmh": "highest speed of trains (km/h)",
-    "force_deviation": "σ / F_m at that speed",
-    "uplift": "uplift at a support at that speed (m)",
-    "elasticity": "maximum elasticity (m/N)",
-    "non_uniformity": "non-uniformity of the elasticity (%)",
+_HINTS = get_type_hints(DrawnLine, include_extras=True)
+LABELS: dict[str, str] = {
+    name: hint.__metadata__[0] for name, hint in _HINTS.items() if get_origin(hint) is Annotated
 }
 OF_SECTIONS = ("length", "shortest_span", "longest_span", "gradient", "gradient_change")
 """Values that say nothing of a line whose spans are all alike."""

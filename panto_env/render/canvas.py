@@ -47,14 +47,6 @@ class Canvas:
         check_packages("cv2")
         self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
 
-    def start_from(self, other: Canvas) -> None:
-        """Begin a new picture with a copy of another canvas."""
-        self.pixels = other.pixels.copy()
-
-    def fill(self, colour: Colour) -> None:
-        """Fill the picture with one colour."""
-        self.pixels[...] = colour
-
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
         """Draw a filled rectangle."""
         rows = slice(max(round(top), 0), max(round(top + height), 0))

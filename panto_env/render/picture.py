@@ -69,7 +69,7 @@ class Picture:
             self._drawn_for = what
             _draw_still(self._still, layout, moment, axis)
             _draw_rows(self._still, layout, list(rows), apart, named=True)
-        self.canvas.start_from(self._still)
+        self.canvas.pixels = self._still.pixels.copy()
         _draw_line(self.canvas, layout, moment)
         _draw_pantograph(self.canvas, layout, moment)
         _draw_actuators(self.canvas, layout, moment)
@@ -86,7 +86,7 @@ def _size(layout: Layout) -> float:
 
 def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
     """Draw the parts that do not change from frame to frame; axis: maximum of the chart (N)."""
-    canvas.fill(GROUND)
+    canvas.pixels[...] = GROUND
     size, left, right = _size(layout), layout.margin, layout.pantograph
     canvas.words(0.015 * layout.width, 0.04 * layout.height, moment.title, INK, 1.35 * size, bold=True)
     _draw_scale(canvas, layout)

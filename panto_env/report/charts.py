@@ -1,4 +1,4 @@
-"""Charts of a report, as SVG inside the page."""
+"""Charts of a report, as SVG inside the page; names: the runs of a chart, and their names."""
 
 from __future__ import annotations
 
@@ -84,10 +84,7 @@ def force_together(one: Findings) -> str:
 
 
 def force_folded(names: Mapping[Findings, str]) -> str:
-    """Contact force over the place within the span: median, minimum and maximum of all spans.
-
-    names: runs and their names.
-    """
+    """Contact force over the place within the span: median, minimum and maximum of all spans."""
 
     def draw(axes: Axes) -> None:
         for k, one in enumerate(names):
@@ -107,10 +104,7 @@ def force_folded(names: Mapping[Findings, str]) -> str:
 
 
 def spectrum(names: Mapping[Findings, str]) -> str:
-    """Amplitudes of the force of runs, with the span and dropper frequencies of the first one.
-
-    names: runs and their names.
-    """
+    """Amplitudes of the force of runs, with the span and dropper frequencies of the first one."""
     first = next(iter(names))
     of = f", {names[first]}" if len(names) > 1 else ""
 
@@ -134,7 +128,7 @@ def spectrum(names: Mapping[Findings, str]) -> str:
 
 
 def uplifts(names: Mapping[Findings, str]) -> str:
-    """Maximum uplift at each support; names: runs and their names."""
+    """Maximum uplift at each support."""
     supports = sorted({number for one in names for number, _, _ in one.uplifts})
 
     def draw(axes: Axes) -> None:
