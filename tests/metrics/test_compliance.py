@@ -54,7 +54,6 @@ def of_force(figures, nq, speed_kmh, system="AC"):
         ("AC", 201, 0.00097 * 201**2 + 70, 0.00047 * 201**2 + 60),
         ("AC", 300, 157.3, 102.3),
         ("AC 25 kV", 300, 157.3, 102.3),
-        ("AC 15 kV", 100, 94.7, 64.7),
         ("DC 1.5 kV", 150, 141.3, 95.2),
         ("DC 1.5 kV", 200, 181.2, 114.8),
         ("DC 1.5 kV", 250, 200.625, 140.0),
@@ -100,26 +99,18 @@ def test_f_m_plus_3_sigma_is_judged_beside_the_maximum_and_sources_say_what_is_r
     assert "contact loss CL counts all" in found["arcing"].note
 
 
-@pytest.mark.parametrize(
-    ("system", "static", "verdict"),
-    [
-        ("AC 25 kV", 70.0, "kept"),
-        ("AC", 91.0, "broken"),
-        ("DC 3 kV", 70.0, "broken"),
-        ("DC 3 kV", 110.0, "kept"),
-        ("DC 1.5 kV", 111.0, "broken"),
-        ("DC 750 V", 90.0, "kept"),
-        ("DC 600 V", 121.0, "broken"),
-        ("AC", math.nan, "not judged"),
-    ],
-)
-def test_static_force_is_judged_by_power_supply(system, static, verdict):
-    (found,) = en50367.of_static(static, system)
-    assert found.verdict == verdict
-    assert ("not judged, as" in found.note) == (verdict == "not judged")
-    ((*_, shown, _),) = criteria_table([found], "").cells
-    assert shown == verdict
-    assert en50367.of_static(None, system) == []
+def test_static_force_is_judged_by_power_supply():
+    for system, static, verdict in (
+        ("AC 25 kV", 70.0, "kept"), ("AC", 91.0, "broken"), ("DC 3 kV", 70.0, "broken"),
+        ("DC 3 kV", 110.0, "kept"), ("DC 1.5 kV", 111.0, "broken"), ("DC 750 V", 90.0, "kept"),
+        ("DC 600 V", 121.0, "broken"), ("AC", math.nan, "not judged"),
+    ):  # fmt: skip
+        (found,) = en50367.of_static(static, system)
+        assert found.verdict == verdict
+        assert ("not judged, as" in found.note) == (verdict == "not judged")
+        ((*_, shown, _),) = criteria_table([found], "").cells
+        assert shown == verdict
+    assert en50367.of_static(None, "AC") == []
 
 
 def test_the_static_force_of_a_run_is_the_one_that_was_set(reference_run):
@@ -134,6 +125,7 @@ def test_the_static_force_of_a_run_is_the_one_that_was_set(reference_run):
 def test_a_policy_that_moves_a_trimmed_mean_by_a_tenth_does_not_break_the_limit():
     run = simulate("periodic-stiffness", "three-mass", 250.0, mean_force="en50367")
     limit = en50367.largest_mean(250 / 3.6, "AC")
+    assert abs(by_key(run.compliance())["mean"].margin) < 0.15
     moved = replace(run, contact_force=run.contact_force + limit + 0.05 - run.summary().mean)
     criterion = by_key(moved.compliance())["mean"]
     assert criterion.margin == pytest.approx(-0.05, abs=1e-6)
@@ -320,13 +312,6 @@ def test_waves_come_back_from_what_they_meet():
     assert with_arm(stiffness=0.0, mass=0.0).reflections(1.5)[1] == 0.0
 
 
-def test_a_line_without_wires_is_held_against_the_force_alone():
-    run = simulate("periodic-stiffness", "three-mass", 250.0)
-    assert set(by_key(run.compliance())) == {
-        *("mean", "std", "statistical_max", "max", "arcing", "static_force", "min"),
-    }
-
-
 # --- commands ------------------------------------------------------------------------------------
 
 
@@ -383,11 +368,11 @@ def test_a_line_says_its_system_and_its_room(tmp_path):
     assert {"value", "margin", "kept", "source", "unit"} <= set(found["std"])
 
 
-def test_simulate_validate_and_evaluate_print_the_same_table():
+def test_simulate_validate_and_evaluate_tell_the_same_criteria():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 250)
-    for output in (printed("simulate", *light), printed("validate")):
-        for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
-            assert words in output
+    output = printed("simulate", *light)
+    for words in ("criterion", "margin", "verdict", "arcing NQ", "EN 50367", "kept"):
+        assert words in output
     validation = json.loads(printed("validate", "--json"))["compliance"]
     assert [entry["speed_kmh"] for entry in validation] == [250.0, 300.0]
     assert {criterion["key"] for criterion in validation[0]["criteria"]} > {"mean", "std", "doppler", "slack"}
@@ -397,14 +382,6 @@ def test_simulate_validate_and_evaluate_print_the_same_table():
     keys = [criterion["key"] for criterion in entry["policy_compliance"]]
     assert keys == ["mean", "std", "statistical_max", "max", "arcing", "static_force", "min"]
     assert entry["passive_compliance"][1]["value"] == entry["passive"]["std"]
-
-
-def test_the_option_that_trims_the_mean_force_keeps_the_limit():
-    run = simulate("re250", "own-two-mass", 200.0, mean_force="en50367")
-    criterion = by_key(run.compliance())["mean"]
-    assert criterion.kept, criterion
-    assert criterion.margin < 0.15
-    assert "--mean-force" not in criterion.note
 
 
 def test_the_tutorial_s_first_runs_keep_all_requirements():
