@@ -321,7 +321,7 @@ def rig(
     with written_last() as later:
         if plot is not None:
             from ..analysis.plots import save
-            from ..rig.plots import plot_pairs
+            from ..rig.report import plot_pairs
 
             later(save, plot_pairs(pairs), plot)
         if json:
