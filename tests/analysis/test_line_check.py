@@ -23,7 +23,6 @@ from panto_env.analysis.line_check import (
     table,
 )
 from panto_env.analysis.parameters import parameter_names
-from panto_env.analysis.plots import plot_line
 from panto_env.base.table import Alarm
 from panto_env.catalog import available, load_catenary, load_drawn
 from panto_env.catalog.family import gradient_limits, highest_speed
@@ -94,20 +93,6 @@ def test_a_uniform_line_is_one_span():
     assert span.non_uniformity == non_uniformity(yields)
     assert found.largest_gradient == 0.0
     assert len(found.places) == len(places)
-    figure = plot_line(found)
-    assert len(figure.axes) == 3
-
-
-def test_the_drawing_shows_both_wires_every_dropper_and_the_elasticity(line, found):
-    wires, contact, drawn = plot_line(found).axes
-    shape = solve(line)
-    by_label = {each.get_label(): each for each in wires.get_lines()}
-    x, heights = by_label["contact wire"].get_data()
-    np.testing.assert_allclose(heights, shape.contact.height(np.asarray(x)))
-    segments = next(each for each in wires.collections if each.get_label() == "dropper").get_segments()
-    assert len(segments) == len(shape.dropper_tension)
-    np.testing.assert_allclose(contact.get_lines()[-1].get_ydata()[0], 0.0, atol=1e-6)
-    np.testing.assert_allclose(drawn.get_lines()[-1].get_ydata(), 1e3 * found.elasticities)
 
 
 def test_classes_of_speed():

@@ -6,9 +6,6 @@ from matplotlib.figure import Figure
 
 from panto_env import simulate
 from panto_env.analysis.plots import plot_forces, plot_run, say_what_is_hidden
-from panto_env.analysis.sweep import sweep
-from panto_env.analysis.sweep_plots import plot_sweep
-from panto_env.catalog import load_pantograph
 from panto_env.metrics.low_pass import low_pass, zero_phase_low_pass
 
 
@@ -72,24 +69,6 @@ def test_a_run_s_plot_shows_the_evaluated_spans_their_supports_and_limits(run):
     assert low < 1e3 * run.head[inside].min() < 1e3 * run.head[inside].max() < high
 
 
-def test_all_of_a_run_can_be_drawn_and_one_that_ended_early():
-    heavy = load_pantograph("en50318-2002").model_copy(update={"static_force": 600.0})
-    short = simulate(pantograph=heavy)
-    assert short.terminated
-    figure = plot_run(short, "all")
-    assert figure.axes[-1].get_xlim() == pytest.approx((0.0, short.distance))
-    assert f"all {short.distance:.0f} m of the run" in figure.axes[-1].get_xlabel()
-
-
-def test_forces_of_several_runs_say_which_ended_early(run):
-    heavy = load_pantograph("three-mass").model_copy(update={"static_force": 1500.0})
-    ended = simulate("periodic-stiffness", heavy, 300.0)
-    first, second = plot_forces((run, ended), ("p", "heavy"), (10, 11), "both").axes
-    assert first.get_title("left") == "p"
-    assert second.get_title("left") == "heavy, ended early"
-    assert second.get_xlim() == (450.0, 550.0)
-
-
 def test_a_panel_of_fixed_limits_says_what_it_hides():
     axis = Figure().subplots()
     axis.plot([0, 1, 2, 3], [10.0, 500.0, -200.0, 9000.0])
@@ -138,16 +117,3 @@ def test_losses_of_contact_are_squares_with_a_name(light, reference_run):
     np.testing.assert_allclose(squares.get_xdata(), begins)
     assert "contact lost" in names(axis)
     assert "contact lost" not in names(plot_run(reference_run).axes[0])
-
-
-def test_labels_of_a_sweep_are_outside_its_panels():
-    rows = sweep({"speed_kmh": [250.0, 300.0]}, catenary="shinkansen-simple", pantograph="identified-2dof")
-    figure = plot_sweep(rows, ["speed_kmh"])
-    force = figure.axes[0]
-    assert not force.texts
-    limits = [0.3 * row["mean"] for row in rows]
-    drawn = [list(line.get_ydata()) for axis in figure.axes for line in axis.lines]
-    assert any(len(values) == 2 and values == pytest.approx(limits) for values in drawn)
-    assert force.get_ylim()[1] < 200
-    assert "EN 50367's maximum of 350 N is above the axis." in force.get_title("left")
-    assert "0 N: no contact" in [text.get_text() for text in figure.legends[0].get_texts()]

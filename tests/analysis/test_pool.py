@@ -60,25 +60,13 @@ def test_each_process_is_another_one_with_one_thread_of_linear_algebra(monkeypat
     assert (os.environ["OPENBLAS_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
 
 
-@pytest.mark.parametrize(
-    ("jobs", "workers", "taken"),
-    [
-        (50, None, 3),  # one per core
-        (2, None, 2),  # but not more than there are jobs
-        (1, None, 1),
-        (0, None, 1),
-        (50, 1, 1),
-        (50, 2, 2),
-        (50, 12, 12),  # at most four per core
-        (50, 13, 12),
-        (11, 12, 11),
-    ],
-)
-def test_the_number_of_workers(monkeypatch, jobs, workers, taken):
+def test_the_number_of_workers(monkeypatch):
+    """One per core, or as many as asked for up to four per core, but not more than there are jobs."""
     monkeypatch.setattr(pool, "cores", lambda: 3)
-    assert workers_for(jobs, workers) == taken
+    given = {(50, None): 3, (2, None): 2, (0, None): 1, (50, 1): 1, (50, 12): 12, (50, 13): 12, (11, 12): 11}
+    assert {each: workers_for(*each) for each in given} == given
     with pytest.raises(InputError, match=r"^workers must be 1 or more, not 0\.$"):
-        workers_for(jobs, 0)
+        workers_for(5, 0)
 
 
 def test_each_result_is_taken_with_its_place_as_soon_as_it_is_there():

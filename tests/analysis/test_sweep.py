@@ -42,16 +42,12 @@ def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path)
     name = PAPER_3[family]
     entry = (load_catenary if family == "catenary" else load_pantograph)(name).model_dump(exclude={"sources"})
     if place:
-        changed = list(entry[key])
-        changed[int(place[0]) - 1] = value
-        entry[key] = changed
+        entry[key] = list(entry[key])
+        entry[key][int(place[0]) - 1] = value
     else:
         entry[key] = value
-    text = "\n".join(
-        f"{k} = {json.dumps(v if not isinstance(v, tuple) else list(v))}" for k, v in entry.items()
-    )
     path = tmp_path / "own.toml"
-    path.write_text(text)
+    path.write_text("\n".join(f"{k} = {json.dumps(v)}" for k, v in entry.items()))
     direct = simulate(**PAPER_3 | {family: str(path)}, speed_kmh=280)
     (row,) = sweep({parameter: [value]}, **PAPER_3, speed_kmh=280, spans=(5, 8))
     assert row[parameter] == value
@@ -109,11 +105,7 @@ def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
                 value = value[int(part) - 1] if part.isdigit() else getattr(value, part, None)
             if isinstance(value, int | float):
                 assert change(entry, name, value) == entry
-    assert "pantograph.contact_stiffness" in parameter_names(load_pantograph("three-mass"), "pantograph")
     assert "actuator.rate_limit" in parameter_names(LaggedActuator(), "actuator")
-    assert not any(
-        "holds_wire" in name for name in parameter_names(load_catenary("en50318-2002"), "catenary")
-    )
 
 
 @pytest.mark.parametrize(
@@ -223,7 +215,6 @@ def test_command_writes_the_rows_it_prints(tmp_path):
         (["speed_kmh=1:2"], "start:stop:count"),
         (["speed_kmh=200", "speed_kmh=250"], "given twice"),
         (["speed_kmh=200", "--speed", "250"], "swept already"),
-        (["pantograph.mases.1=5"], "did you mean 'pantograph.masses.1'"),
         (["pantograph.masses.1=5,-5"], "pantograph.masses.1 cannot be -5"),
         (["speed_kmh=250", "--plot", "s.doc"], "must end in one of"),
         (["speed_kmh=250", "--output", "s.json"], "must end in one of .csv, .xlsx, .parquet"),

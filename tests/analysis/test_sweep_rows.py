@@ -2,12 +2,10 @@
 
 import csv
 import math
-from types import SimpleNamespace
 
 import pytest
 
-from panto_env import InputError, simulate
-from panto_env.analysis import sweep as module
+from panto_env import simulate
 from panto_env.analysis.sweep import save, sweep
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.metrics.by_span import evaluated, near_train
@@ -60,44 +58,6 @@ def test_headings_of_a_file_have_the_units_of_what_was_swept(tmp_path):
         assert "mean (N)" in first
 
 
-@pytest.mark.parametrize(
-    ("values", "settings", "longest"),
-    [
-        ({"speed_kmh": [200.0, 100.0, 300.0]}, {}, {"speed_kmh": 100.0}),
-        ({"catenary.span_length": [50.0, 60.0, 40.0]}, {"distance": None}, {"span_length": 60.0}),
-    ],
-)
-def test_memory_is_checked_of_the_longest_pass_as_often_as_passes_run_at_once(
-    monkeypatch, values, settings, longest
-):
-    asked, built = [], []
-
-    class Cost:
-        memory = 10.0
-
-        def _replace(self, memory):
-            asked.append(memory)
-            return self
-
-        def check(self, what, less):
-            asked.append((what, less))
-            raise InputError("That is too much.")
-
-    monkeypatch.setattr(module, "workers_for", lambda jobs, workers: jobs * 10 + (workers or 0))
-    monkeypatch.setattr(
-        module, "Task", lambda given, record_droppers: built.append(given) or SimpleNamespace(cost=Cost())
-    )
-    given = {key: each for key, each in {**RUN, **settings}.items() if each is not None}
-    with pytest.raises(InputError, match=r"^That is too much\.$"):
-        sweep(values, workers=2, **given)
-    assert asked == [320.0, ("32 passes at once", ", or fewer workers")]
-    (settings,) = built
-    assert (
-        longest.items()
-        <= ({"speed_kmh": settings.speed_kmh[0], "span_length": settings.catenary.span_length}).items()
-    )
-
-
 def test_a_plot_of_one_value_and_without_figures_can_be_drawn():
     (row,) = sweep({"speed_kmh": [250.0]}, **SHORT)
     figure = plot_sweep([row], ["speed_kmh"])
@@ -109,19 +69,13 @@ def test_a_plot_of_one_value_and_without_figures_can_be_drawn():
         "pantograph three-mass, line periodic-stiffness, 250 km/h, spans 1-2 or all\n"
         "1 of 2 passes ended early and are not shown"
     )
-    maps = plot_sweep(
-        [
-            row | {"a": a, "b": b, "std": a + 10 * b, "min": math.nan}
-            for a in (1.0, 2.0, 3.0)
-            for b in (5.0, 6.0)
-        ],
-        ["a", "b"],
-    )
-    mesh = maps.axes[0].collections[0]
+    points = [
+        {"a": a, "b": b, "std": a + 10 * b, "min": math.nan} for a in (1.0, 2.0, 3.0) for b in (5.0, 6.0)
+    ]
+    maps = plot_sweep([row | point for point in points], ["a", "b"])
+    mesh, without = (maps.axes[k].collections[0] for k in (0, 2))
     assert mesh.get_array().tolist() == [[51.0, 52.0, 53.0], [61.0, 62.0, 63.0]]
-    assert (mesh.norm.vmin, mesh.norm.vmax) == (51.0, 63.0)
-    assert (maps.axes[2].collections[0].norm.vmin, maps.axes[2].collections[0].norm.vmax) == (0.0, 1.0)
-    assert (maps.get_supxlabel(), maps.get_supylabel()) == ("a", "b")
+    assert (mesh.norm.vmin, mesh.norm.vmax, without.norm.vmin, without.norm.vmax) == (51.0, 63.0, 0.0, 1.0)
 
 
 def test_a_row_says_which_requirements_are_broken_and_what_droppers_bear():

@@ -24,11 +24,9 @@ from panto_agents.settings import Training, parse_training
 from panto_agents.trainings import train_all
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_baselines.tuning.store import tune
 from panto_env import InputError
 from panto_env import cluster as tasks
 from panto_env.cluster import spread
-from panto_env.control.settings import run_settings
 
 from ..deadly import deadly
 from ..plugin import on_path
@@ -164,13 +162,6 @@ def test_a_machine_that_dies_loses_no_job(tmp_path):
         cluster.shutdown()
     assert results[0] != results[1]  # both machines had begun to work
     assert results[2:] == ["0", "1", "2", "3"]
-
-
-def test_gains_are_those_that_processes_find(two_nodes, tmp_path):
-    settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
-    given = {"speeds_kmh": (250.0, 300.0), "seeds": 1, "passes": 40}
-    on_ray = tune(tmp_path / "ray", "skyhook", settings, **given, ray=two_nodes)
-    assert on_ray == tune(tmp_path / "here", "skyhook", settings, **given, workers=1)
 
 
 def training(seed: int, **changes) -> Training:

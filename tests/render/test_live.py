@@ -7,7 +7,6 @@ import signal
 import struct
 import sys
 import termios
-import unicodedata
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +19,7 @@ from panto_env import Trajectory, simulate
 from panto_env.metrics.low_pass import low_pass
 from panto_env.render import strip as live_module
 from panto_env.render.moment import felt
-from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, _characters, _round, chart, live
+from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, chart, live
 
 from ..cli.test_cli import panto
 from .test_render import driven
@@ -172,17 +171,6 @@ def test_without_a_terminal_it_says_so_and_goes_on():
     assert "height of the head" not in told.stdout
 
 
-def test_each_dot_of_a_character_has_the_name_that_unicode_gives_it():
-    """Dots 1, 2, 3 and 7 stand on the left from above, 4, 5, 6 and 8 on the right."""
-    for (y, x), number in zip(np.ndindex(4, 2), "14253678", strict=True):
-        dots = np.zeros((8, 6), dtype=bool)
-        dots[4 + y, 2 + x] = True
-        cells = _characters(dots)
-        assert unicodedata.name(str(cells[1, 1])) == f"BRAILLE PATTERN DOTS-{number}"
-        assert (cells == "\u2800").sum() == 5
-    assert unicodedata.name(str(_characters(np.ones((4, 2), dtype=bool))[0, 0])).endswith("DOTS-12345678")
-
-
 def test_the_labels_of_a_chart_stand_at_their_rows():
     def labels(*given):
         return [line.plain.partition("│")[0] for line in chart(np.arange(3.0), np.zeros(3), *given)]
@@ -194,14 +182,6 @@ def test_the_labels_of_a_chart_stand_at_their_rows():
         "      0 ",
     ]
     assert [len(line.plain) for line in chart(np.arange(3.0), np.zeros(3), (0.0, 1.0), 2, 20)] == [29, 29]
-
-
-def test_heights_are_shown_in_tens_of_millimetres():
-    for heights, extent in (
-        ([12.0, 58.0], (10, 60)), ([20.0, 40.0], (20, 40)), ([-3.0, 4.0], (-10, 10)),
-        ([30.0, 30.0], (30, 40)), ([31.0, 32.0], (30, 40)), ([], (0, 10)),
-    ):  # fmt: skip
-        assert _round(np.array(heights)) == extent
 
 
 def test_a_live_picture_is_drawn_ten_times_a_second_and_at_the_end(monkeypatch):

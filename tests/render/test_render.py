@@ -99,14 +99,6 @@ def test_slack_droppers_are_those_without_tension():
     assert seen > 0
 
 
-def test_a_slack_dropper_is_drawn_in_another_colour():
-    task, picture = driven(), Picture(*SIZE)
-    now = calm(task)
-    slack = now.line._replace(slack=np.ones_like(now.line.slack))
-    drawn = [count(picture.draw(replace(now, line=line)), VERMILION) for line in (now.line, slack)]
-    assert drawn[1] > drawn[0] + 100  # the first has the mark of the legend
-
-
 def test_an_arrow_points_as_the_force_does():
     task, picture = driven(), Picture(*SIZE)
     now = moment(task)

@@ -39,13 +39,6 @@ def test_what_is_found_in_a_run_of_four_spans():
     assert [(k, place) for k, place, _ in one.uplifts] == [(1, 5.0), (2, 10.0), (3, 15.0)]
     assert [uplift for *_, uplift in one.uplifts] == pytest.approx([0.239, 0.139, 0.039])
     assert [k for k, *_ in alone(uplift=RUN.uplift[:, :2]).uplifts] == [1, 2]
-    # A support counts up to one and a half strides, 0.75 m, from the first sample or the last.
-    for begin, end, place, counts in (
-        (11, 39, 5.1, True), (11, 39, 4.9, False), (0, 7, 4.4, True), (0, 7, 4.6, False), (12, 13, 6.3, True)
-    ):  # fmt: skip
-        part = alone(support_position=np.array([place, 99.0, 99.0]))
-        part.__dict__["inside"] = np.isin(np.arange(40), np.arange(begin, end + 1))
-        assert [k for k, *_ in part.uplifts] == [1] * counts, (begin, end, place)
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from panto_env.cli import make_app
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.static import droppers_at_rest
-from panto_env.report import charts, save
+from panto_env.report import save
 from panto_env.report.findings import Findings
 from panto_env.report.page import LEFT_OUT, page
 
@@ -224,20 +224,3 @@ def test_runs_that_share_a_name_stay_apart(run):
     assert captions == ["300 km/h (a)", "300 km/h (c)"]
     values = re.findall(r"<code>span_length</code></th><td[^>]*>([\d.]+)<", text)
     assert values == ["60.0", "61.0"]
-
-
-def test_pictures_of_a_report_have_dashed_supports_named_losses_and_labels_off_the_peaks():
-    light = Findings(simulate("shinkansen-simple", "identified-2dof", 320.0), "light.parquet")
-    text = page([light])
-    along = charts.force_along(light, [light])
-    assert along in text
-    for words in ("contact lost", "EN 50367: at most 350 N, above the axis", "(m); dashed lines: supports"):
-        assert f"{words} -->" in along
-    assert along.count("stroke-dasharray: 4.5,3.6") >= 9  # supports
-    # In the legend of the spectrum, and no longer along its peaks.
-    spectrum = charts.spectrum({light: "it"})
-    assert "<!-- per span: 1.78 Hz -->" in spectrum
-    assert "rotate(-90)" not in spectrum.partition("<!-- per span")[2].partition("</g>")[0]
-    pair = (light, Findings(replace(light.run, contact_force=2 * light.run.contact_force), "twice"))
-    ticks = [re.findall(r"<!-- (\d+) -->", charts.force_along(each, pair)) for each in pair]
-    assert ticks[0] == ticks[1]  # one scale for all runs of a page
