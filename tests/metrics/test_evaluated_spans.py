@@ -32,7 +32,7 @@ def test_what_was_asked_for_is_kept():
     assert simulate(distance=2000.0, record_droppers=False).spans() == (10, 33)
 
 
-@pytest.mark.parametrize("speed", [250.0, 300.0])
+@pytest.mark.parametrize("speed", [pytest.param(250.0, marks=pytest.mark.slow), 300.0])
 def test_the_default_is_near_what_a_long_run_comes_to(speed):
     """With the start in it σ is much farther off."""
     (all_spans, default) = start.check_start(speed, (1, FIRST_SETTLED))

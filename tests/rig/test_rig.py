@@ -1,6 +1,7 @@
 """The rig: its parts against closed forms and SciPy, and as a whole against the line without a rig."""
 
 import copy
+from functools import cache
 from itertools import pairwise
 
 import gymnasium
@@ -39,9 +40,19 @@ def merged(first, second):
     return {key: {**first.get(key, {}), **second.get(key, {})} for key in EXACT}
 
 
-def error(data, time_step, reference, low=0.0, high=20.0, **settings):
+@cache
+def on_the_line(time_step):
+    return simulate(LINE, PANTOGRAPH, SPEED, time_step=time_step)
+
+
+@cache
+def on_a_rig(data, time_step):
+    return simulate(data, PANTOGRAPH, SPEED, time_step=time_step)
+
+
+def error(data, time_step, low=0.0, high=20.0):
     """Rms error of the contact force on a rig, as a share of the rms on the line itself, in a band."""
-    run = simulate(data, PANTOGRAPH, SPEED, time_step=time_step, **settings)
+    run, reference = on_a_rig(data, time_step), on_the_line(time_step)
     assert not run.ending
     inner = slice(len(run.time) // 4, int(0.95 * len(run.time)))
     ours, true = (in_band(each.contact_force[inner], time_step, low, high) for each in (run, reference))
@@ -173,10 +184,9 @@ def test_a_rig_without_faults_is_the_line_itself_the_closer_the_shorter_the_time
     """Whatever its sampling interval: the line is computed where the force was measured."""
     errors = {}
     for dt in (5e-4, 2.5e-4, 1.25e-4):
-        reference = simulate(LINE, PANTOGRAPH, SPEED, time_step=dt)
         for interval in (1e-3, dt):
             data = rig(**merged(EXACT, {"computer": {"interval": interval}}))
-            errors[dt, interval] = error(data, dt, reference)
+            errors[dt, interval] = error(data, dt)
     assert errors[1.25e-4, 1e-3] < 0.004
     for interval in (lambda dt: 1e-3, lambda dt: dt):
         over_step = [errors[dt, interval(dt)] for dt in (5e-4, 2.5e-4, 1.25e-4)]
@@ -185,19 +195,17 @@ def test_a_rig_without_faults_is_the_line_itself_the_closer_the_shorter_the_time
 
 def test_the_rig_as_it_stands_follows_the_flexible_line_within_a_tenth_to_20_hz():
     dt = 2.5e-4
-    reference = simulate(LINE, PANTOGRAPH, SPEED, time_step=dt)
-    usual = error(rig(), dt, reference)
+    usual = error(rig(), dt)
     assert usual < 0.05
-    assert error(rig(), dt, reference, 15, 20) < 0.12
-    assert error(rig(computer={"compensation": "none"}), dt, reference) > 3 * usual
+    assert error(rig(), dt, 15, 20) < 0.12
+    assert error(rig(computer={"compensation": "none"}), dt) > 3 * usual
 
 
 def test_a_fitted_compensation_learns_a_cylinder_that_is_not_the_assumed_one():
     dt, wrong = 2.5e-4, {"assumed_frequency": 40.0}
-    reference = simulate(LINE, PANTOGRAPH, SPEED, time_step=dt)
-    fixed = error(rig(computer=wrong), dt, reference)
-    fitted = error(rig(computer={**wrong, "compensation": "adaptive"}), dt, reference)
-    known = error(rig(), dt, reference)
+    fixed = error(rig(computer=wrong), dt)
+    fitted = error(rig(computer={**wrong, "compensation": "adaptive"}), dt)
+    known = error(rig(), dt)
     assert known < fitted < known + 0.4 * (fixed - known)
 
 
