@@ -43,9 +43,6 @@ def of_force(figures, nq, speed_kmh, system="AC"):
     return by_key(en50367.criteria(figures, nq, speed_kmh / 3.6, system, "drawing 1"))
 
 
-# --- EN 50367 ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("system", "speed", "largest", "smallest"),
     [
@@ -160,29 +157,24 @@ def test_maximum_force_and_arcing_depend_on_the_power_supply(system):
         assert (other["max"].highest, other["arcing"].highest) == (350, 0.1)
 
 
-def test_minimum_force_must_be_positive():
-    line = LineFacts()
+def of_line(line=LineFacts(), **given):  # noqa: B008
     none = np.zeros((0, 0))
+    return by_key(compliance(figures(mean=100.0, **given), 0.0, line, 70.0, 60.0, none, none))
 
-    def minimum(value):
-        return by_key(compliance(figures(mean=100.0, min=value), 0.0, line, 70.0, 60.0, none, none))["min"]
 
-    assert [minimum(value).kept for value in (-1.0, 0.0, 0.1)] == [False, False, True]
-    assert minimum(0.1).margin == pytest.approx(0.1)
-    assert limits_in_words(minimum(5.0)) == "above 0"
-    assert minimum(5.0).source == "EN 50119, recalled"
+def test_minimum_force_must_be_positive():
+    below, at, above = (of_line(min=value)["min"] for value in (-1.0, 0.0, 0.1))
+    assert (below.kept, at.kept, above.kept) == (False, False, True)
+    assert above.margin == pytest.approx(0.1)
+    assert (limits_in_words(above), above.source) == ("above 0", "EN 50119, recalled")
 
 
 def test_room_for_the_uplift_is_smaller_where_a_stop_limits_it():
     """Of 140 mm, twice is more than a room of 240 mm, and 1.5 times is not (EN 50119, recalled)."""
-    none = np.zeros((0, 0))
-
-    def uplift(stop):
-        line = LineFacts(free_uplift=0.24, free_uplift_source="drawing 2", uplift_stop=stop)
-        found = compliance(figures(mean=100.0, max_uplift=0.14), 0.0, line, 70.0, 60.0, none, none)
-        return by_key(found)["uplift"]
-
-    free, stopped = uplift(False), uplift(True)
+    line = LineFacts(free_uplift=0.24, free_uplift_source="drawing 2")
+    free, stopped = (
+        of_line(replace(line, uplift_stop=stop), max_uplift=0.14)["uplift"] for stop in (False, True)
+    )
     assert (free.name, free.value, free.kept) == ("twice the uplift", pytest.approx(280.0), False)
     assert (stopped.name, stopped.value) == ("1.5 times the uplift", pytest.approx(210.0))
     assert stopped.kept
@@ -201,9 +193,6 @@ def test_an_arc_is_a_loss_of_more_than_5_ms():
     assert contact_loss(force) == pytest.approx(100 * 10 / 40)
     assert arcing(np.full(5, 1.0), 1e-2) == 0.0
     assert arcing(np.zeros(5), 1e-2) == 100.0
-
-
-# --- criteria ------------------------------------------------------------------------------------
 
 
 def test_margin_is_to_the_nearer_limit():
@@ -226,9 +215,6 @@ def test_tables_show_limits_and_lines_the_rest():
     table = criteria_table(criteria, "title")
     assert table.cells == [("mean (N)", "101.0", "80.0 to 100.0", "-1.000", "broken", "EN 1")]
     assert remarks(criteria) == ["mean: as one reads it.", "Doppler: 0.250"]
-
-
-# --- of a run ------------------------------------------------------------------------------------
 
 
 def test_every_criterion_of_a_run(reference_run):
@@ -310,9 +296,6 @@ def test_waves_come_back_from_what_they_meet():
     assert with_arm(stiffness=1e9).reflections(1.5)[1] == pytest.approx(1.0, abs=1e-3)
     assert with_arm(mass=1e6).reflections(1.5)[1] == pytest.approx(1.0, abs=1e-3)
     assert with_arm(stiffness=0.0, mass=0.0).reflections(1.5)[1] == 0.0
-
-
-# --- commands ------------------------------------------------------------------------------------
 
 
 def printed(*arguments):
