@@ -1,4 +1,4 @@
-"""Jobs as tasks of a Ray cluster. Ray, an extra, is imported only when it is used."""
+"""Jobs in processes or on a Ray cluster, an extra, and works whose parts are files, to be continued."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import os
 import shutil
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -26,100 +26,90 @@ LOCAL = "local"
 """Address of a cluster on this machine only, which is started for the jobs and ends with them."""
 RETRIES = 5
 """Maximum number of retries of a job whose worker or machine died."""
-PATIENCE = 10.0
-"""Time (s) within which the head of a cluster must answer."""
-OBJECT_STORE = 256 * 2**20
-"""Shared memory of a local cluster (bytes): results are small; by default Ray takes a third of the memory."""
 
 
-class Home(NamedTuple):
-    """Sources and folder of the process that submits the jobs."""
-
-    sources: str  # hash of our source files
-    folder: Path  # base of relative paths in jobs
-
-
-def on_ray(
+def spread(
     jobs: Sequence[Job[T]],
-    address: str,
     *,
+    workers: int | None = None,
+    ray: str | None = None,
     progress: Progress | None = None,
     take: Take[T] | None = None,
 ) -> list[T]:
-    """Results of jobs, in the given order, that run as tasks of a Ray cluster, one on each of its CPUs.
+    """Results of jobs, in the given order; they must not depend on where a job runs.
 
-    address: of the cluster's head, e.g. "10.0.0.5:6379"; "auto" for the one on this machine; or LOCAL. A job
-    whose worker or machine dies is run again, so a repeated job must give the same result.
+    workers: processes on this machine, one per core by default. ray: address of a cluster to use instead,
+    one task on each of its CPUs: that of its head, e.g. "10.0.0.5:6379"; "auto" for the one on this machine;
+    or LOCAL. There a job whose worker or machine dies is run again, so a repeated job must give the same
+    result. take: called in this process with the index and the result of each job as soon as it is finished.
 
-    Raises a job's error, and InputError where Ray is not installed, this process is already connected to it,
-    there is no cluster, one of its machines cannot load a job or has other sources than this one, or a job
-    lost its worker more than RETRIES times. Jobs that still run are then stopped.
+    Raises a job's error, and InputError where both are given, as ``in_processes`` does, and where Ray is not
+    installed, this process is already connected to it, there is no cluster, one of its machines cannot load a
+    job or has other sources than this one, or a job lost its worker more than RETRIES times. Jobs that still
+    run are then stopped.
     """
-    ray = _ray()
-    home = Home(source_hash(), Path.cwd())
-    with _connected(ray, address):
+    if ray is None:
+        return in_processes(jobs, workers=workers, progress=progress, take=take)
+    if workers is not None:
+        raise InputError("A Ray cluster has as many workers as CPUs; leave out either workers or ray.")
+    with _connected(ray) as package:
         # An error of the job itself is final: it would be the same again.
-        task = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(_run)
+        task = package.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(_run)
         try:
-            return collect([task.remote(job, home).future() for job in jobs], progress, take)
-        except ray.exceptions.RayTaskError as error:
-            if isinstance(error.cause, ray.exceptions.RaySystemError):
+            home = source_hash(), Path.cwd()
+            return collect([task.remote(job, *home).future() for job in jobs], progress, take)
+        except package.exceptions.RayTaskError as error:
+            if isinstance(error.cause, package.exceptions.RaySystemError):
                 raise InputError(
                     f"A machine of the Ray cluster could not load a job ({_reason(error.cause)}); install "
                     "the same packages everywhere."
                 ) from error
             raise error.cause from error
-        except ray.exceptions.RayError as error:
+        except package.exceptions.RayError as error:
             raise InputError(
                 f"A job was started {RETRIES + 1} times on the Ray cluster and lost each time "
                 f"({_reason(error)}); make sure that a worker has enough memory, or run it without --ray."
             ) from error
 
 
-def _run(job: Job[T], home: Home) -> T:
-    """Run a job in a worker. Raises InputError where the worker has other sources."""
-    if source_hash() != home.sources:
+def _run(job: Job[T], sources: str, folder: Path) -> T:
+    """Run a job in a worker, in the folder of the caller. InputError where its sources are other ones."""
+    if source_hash() != sources:
         raise InputError(
             f"The machine {socket.gethostname()} of the Ray cluster has other sources of panto-env, or "
             "another Numba, than this one; install the same everywhere."
         )
     # Where the folder is not shared, a job with a relative path finds no file, and says so.
-    if home.folder.is_dir():
-        os.chdir(home.folder)
+    if folder.is_dir():
+        os.chdir(folder)
     return job()
 
 
 def _reason(error: Exception) -> str:
-    """The first line of an error message of Ray, as part of a sentence."""
     return str(error).strip().partition("\n")[0].rstrip(".")
 
 
-def _ray() -> Any:
-    """The package Ray. Raises InputError where it is not installed."""
+@contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    """Ray, connected to a cluster within the body; at the end tasks that still run are stopped."""
     try:
         import ray
     except ImportError as error:
         raise InputError(
             f"A cluster needs Ray, which is not installed ({error}); install panto-env with its extra 'ray'."
         ) from error
-    return ray
-
-
-@contextmanager
-def _connected(ray: Any, address: str) -> Iterator[None]:
-    """Within the body this process is connected to a cluster; at the end tasks that still run are stopped."""
     if ray.is_initialized():
         raise InputError("This process is connected to a Ray cluster already; call ray.shutdown() before.")
     variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # for the reason see ``in_processes``
     settings: dict[str, Any] = {"logging_level": "ERROR", "runtime_env": {"env_vars": variables}}
     if address == LOCAL:
-        # By default Ray reports each cluster to its makers.
+        # By default Ray reports each cluster to its makers, and takes a third of the memory for results.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        settings |= {"num_cpus": cores(), "include_dashboard": False, "object_store_memory": OBJECT_STORE}
+        settings |= {"num_cpus": cores(), "include_dashboard": False, "object_store_memory": 256 * 2**20}
     try:
         host, colon, port = address.rpartition(":")
         if colon and port.isdigit() and "/" not in host:  # otherwise Ray itself tries for many minutes
-            socket.create_connection((host, int(port)), PATIENCE).close()
+            socket.create_connection((host, int(port)), timeout=10.0).close()
         ray.init(address=address, **settings)
     except (ImportError, OSError, RuntimeError, ValueError) as error:  # a ConnectionError is an OSError
         raise InputError(
@@ -127,7 +117,7 @@ def _connected(ray: Any, address: str) -> Iterator[None]:
             f"`ray start --head`, or give {LOCAL!r}."
         ) from error
     try:
-        yield
+        yield ray
     finally:
         ray.shutdown()
 
@@ -141,27 +131,6 @@ RayAddress = Annotated[
     ),
 ]
 """Option of a command whose work can run on a cluster."""
-
-
-def spread(
-    jobs: Sequence[Job[T]],
-    *,
-    workers: int | None = None,
-    ray: str | None = None,
-    progress: Progress | None = None,
-    take: Take[T] | None = None,
-) -> list[T]:
-    """Results of jobs, in the given order; they must not depend on where a job runs.
-
-    workers: processes on this machine, one per core by default. ray: address of a cluster to use instead.
-    take: called in this process with the index and the result of each job as soon as it is finished. Raises
-    InputError where both are given, and as ``in_processes`` and ``on_ray`` do.
-    """
-    if ray is None:
-        return in_processes(jobs, workers=workers, progress=progress, take=take)
-    if workers is not None:
-        raise InputError("A Ray cluster has as many workers as CPUs; leave out either workers or ray.")
-    return on_ray(jobs, ray, progress=progress, take=take)
 
 
 PartJob = Callable[[Path], None]
@@ -208,7 +177,11 @@ def make_parts(
     read: reads a file, and raises InputError where it is missing or damaged; such a file is made again.
     workers, ray: as in ``spread``. progress: called with the numbers of existing and of all files.
     """
-    missing = {path: job for path, job in jobs.items() if not _whole(path, read)}
+    missing = dict(jobs)
+    for path in jobs:
+        with suppress(InputError):
+            read(path)
+            del missing[path]
     kept = len(jobs) - len(missing)
     if progress is not None:
         progress(kept, len(jobs))
@@ -237,22 +210,10 @@ def first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     before, now = ({**each, **each.get("settings", {})} for each in (old, new))
     for key in sorted(before.keys() | now.keys()):
         if key != "settings" and before.get(key) != now.get(key):
-            return f"its {key} is {_short(before.get(key))}, this is {_short(now.get(key))}"
+            texts = [json.dumps(each.get(key)) for each in (before, now)]
+            one, other = (text if len(text) <= 60 else f"{text[:57]}..." for text in texts)
+            return f"its {key} is {one}, this is {other}"
     return ""
-
-
-def _whole(path: Path, read: Callable[[Path], object]) -> bool:
-    """Whether a part exists and is not damaged."""
-    try:
-        read(path)
-        return True
-    except InputError:
-        return False
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 __all__ = ["RayAddress", "spread"]

@@ -108,14 +108,11 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
 
 def _table(entry: Settings, path: list[str], value: float) -> Any:
     """Values of an entry with another at a path; a line's droppers may be placed by a rule."""
-    if not isinstance(entry, FlexibleCatenaryData) or not _is_rule(path):
+    by_rule = path[0] == "droppers" and path[1] in RULES
+    if not (by_rule and isinstance(entry, FlexibleCatenaryData)):
         return _put(entry.model_dump(), path, value)
     table: Any = entry.model_dump(exclude_none=True)
     return table | {"droppers": droppers_of(table, {path[1]: value}, entry.span_length)}
-
-
-def _is_rule(path: list[str]) -> bool:
-    return path[0] == "droppers" and path[1] in RULES
 
 
 def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
@@ -235,12 +232,6 @@ def placed(settings: Mapping[str, Any], values: Mapping[str, float]) -> tuple[fl
         if is_distance(name):
             distances[place(name, len(several) - 1)] = value
     return run_settings({"pantographs": several, DISTANCES: distances}).distances
-
-
-def distance_label(name: str) -> str:
-    """Label of a swept distance, with its unit."""
-    _, _, number = name.partition(".")
-    return f"distance of pantograph {int(number or 1) + 1} behind the first (m)"
 
 
 def changed_train(settings: Mapping[str, Any], name: str, pantograph: PantographData) -> dict[str, Any]:

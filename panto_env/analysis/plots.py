@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import plotting as marks
-from ..base.arrays import Array
 from ..base.files import PICTURES, check_output, write_whole
 from ..base.plotting import (
     BLUE,
@@ -178,10 +177,6 @@ SHOWN = 3
 """Number of spans that are drawn of a line whose spans are all alike."""
 POINTS = 60
 """Points per span."""
-PER_INCH = 80.0
-"""Metres of line per inch of a drawing."""
-WIDEST = 40.0
-"""Maximum width of a drawing (inches)."""
 
 
 def plot_line(found: LineCheck) -> Figure:
@@ -198,7 +193,7 @@ def plot_line(found: LineCheck) -> Figure:
     parts = profiles(line, shape, len(spans))
     droppers = dropper_positions(line, len(spans))
     x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
-    width = min(max(9.0, supports[-1] / PER_INCH), WIDEST)
+    width = min(max(9.0, supports[-1] / 80.0), 40.0)
     figure = Figure(figsize=(width, 8.2), layout="constrained")
     wires, contact, elasticity = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
     for axis in (wires, contact, elasticity):
@@ -225,7 +220,8 @@ def plot_line(found: LineCheck) -> Figure:
             va="top",
             fontsize="x-small",
         )
-    wires.set(ylabel="height (m)", title=_title(found))
+    alike = "" if line.sequence else f" ({SHOWN} of {line.spans} spans, all alike)"
+    wires.set(ylabel="height (m)", title=f"line {line.name} at rest{alike}; heights are exaggerated")
     named = dict(zip(*reversed(wires.get_legend_handles_labels()), strict=True))  # each name once
     figure.legend(named.values(), named, loc="outside upper right", ncols=5, fontsize="small")
     for part, lower, _ in parts:
@@ -233,20 +229,10 @@ def plot_line(found: LineCheck) -> Figure:
         contact.plot(own, 1e3 * lower.height(own - part.begin), color=BLUE)
     contact.plot(droppers, 1e3 * bottoms, ".", color=BLUE)
     contact.set(ylabel="contact wire (mm)")
-    elasticity.plot(*_elasticity(found, supports), color=VERMILION)
+    places, yields = found.places, 1e3 * found.elasticities
+    if not line.sequence:
+        places, yields = np.add.outer(supports[:-1], places).ravel(), np.tile(yields, SHOWN)
+    elasticity.plot(places, yields, color=VERMILION)
     elasticity.set(xlabel=POSITION, ylabel=f"elasticity\nat {found.force:g} N (mm/N)", xlim=(0, supports[-1]))
     elasticity.set_ylim(bottom=0)
     return figure
-
-
-def _title(found: LineCheck) -> str:
-    line = found.line
-    alike = "" if line.sequence else f" ({SHOWN} of {line.spans} spans, all alike)"
-    return f"line {line.name} at rest{alike}; heights are exaggerated"
-
-
-def _elasticity(found: LineCheck, supports: Array) -> tuple[Array, Array]:
-    """Places along the line (m) and elasticities (mm/N)."""
-    if found.line.sequence:
-        return found.places, 1e3 * found.elasticities
-    return np.add.outer(supports[:-1], found.places).ravel(), 1e3 * np.tile(found.elasticities, SHOWN)

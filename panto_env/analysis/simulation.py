@@ -67,7 +67,8 @@ def simulate(
         raise InputError(f"seed must be a whole number from 0 up, not {shown(seed)}.")
     if not isinstance(record_droppers, bool):
         raise InputError(f"record_droppers must be True or False, not {shown(record_droppers)}.")
-    drivers = [] if policy is None else _drivers(policy)
+    several = policy if isinstance(policy, list | tuple) else [policy]
+    drivers = [] if policy is None else [find_policy(each) for each in several]
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(drivers[0] if drivers else None) | settings
     task = _ready(given, seed, trimmed_over, record_droppers)
@@ -76,7 +77,7 @@ def simulate(
     if not drivers:
         task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)
-    first = policy[0] if isinstance(policy, list | tuple) else policy
+    first = several[0]
     name = first if isinstance(first, str) else str(getattr(first, "name", type(first).__name__))
     for share in steps_of_policy(task, drivers, name):
         if progress is not None:
@@ -86,13 +87,7 @@ def simulate(
     return task.trajectory(0, policy=name, seed=seed, last=True)
 
 
-def _drivers(policy: Any) -> list[Policy]:
-    several = policy if isinstance(policy, list | tuple) else [policy]
-    return [find_policy(each) for each in several]
-
-
 def _ready(given: dict[str, Any], seed: int, trimmed_over: SpanChoice, record_droppers: bool) -> Task:
-    """A task with these settings, its lane reset under the seed."""
     random = np.random.default_rng(seed)
     checked = far_enough(on_drawn_line(run_settings(given), lambda: random))
     trim = trim_of_pass(checked, seed, trimmed_over, passive_mean)
@@ -149,15 +144,13 @@ def let_act(task: Task, row: int, driver: Policy, action: Array) -> None:
         action[:] = checked_action(driver.act(observation), action.shape)
 
 
-def _explicit() -> inspect.Signature:
-    """The signature of ``simulate`` with every setting by name."""
-    named = inspect.signature(simulate).parameters
-    first = [argument for argument in named.values() if argument.kind is not inspect.Parameter.VAR_KEYWORD]
-    others = [argument for argument in parameters() if argument.name not in named]
-    return inspect.Signature([*first, *others])
-
-
-simulate.__signature__ = _explicit()  # type: ignore[attr-defined]
+_named = inspect.signature(simulate).parameters
+simulate.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    [
+        *(each for each in _named.values() if each.kind is not inspect.Parameter.VAR_KEYWORD),
+        *(argument for argument in parameters() if argument.name not in _named),
+    ]
+)
 
 
 TOLERANCE = 0.1

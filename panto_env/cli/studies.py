@@ -23,7 +23,7 @@ from ..base.table import Table
 from ..catalog import load_catenary, load_pantograph
 from ..rig import report
 from ..rig.computer import compare, load_rig
-from ..rig.plots import plot_pairs
+from ..rig.report import plot_pairs
 from ..studies.en50318 import study
 from ..studies.en50318.plots import plot_reference
 from ..studies.throughput import study as measured

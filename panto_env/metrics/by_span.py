@@ -17,17 +17,23 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-SPAN_HEADINGS = {
-    "begin": "from (m)",
-    "length": "length (m)",
+OF_FORCE = {
     "mean": "mean force F_m (N)",
     "std": "standard deviation σ (N)",
     "max": "maximum (N)",
     "min": "minimum (N)",
     "contact_loss": "contact loss CL (%)",
-    "uplift": "maximum uplift at its first support (m)",
 }
-"""Headings of ``SpanFigures``, with units."""
+SPAN_HEADINGS = {"begin": "from (m)", "length": "length (m)", **OF_FORCE}
+SPAN_HEADINGS |= {"uplift": "maximum uplift at its first support (m)"}
+STRETCH_HEADINGS = {"stretch": "where", "distance": "distance (m)", **OF_FORCE}
+DROPPER_HEADINGS = {
+    "position": "from support (m)",
+    "largest": "maximum force (N)",
+    "smallest": "minimum force (N)",
+    "slack": "slack while the train is in its span (% of that time)",
+}
+"""Headings of the fields of ``SpanFigures``, ``StretchFigures`` and ``MovingDropper``, with units."""
 
 
 class SpanFigures(NamedTuple):
@@ -44,6 +50,12 @@ class SpanFigures(NamedTuple):
     uplift: float  # maximum at the support where it begins, at any time (m); nan at the line's start
 
 
+def _of_force(filtered: Array, raw: Array) -> dict[str, float]:
+    """Values of ``OF_FORCE`` of some samples of a force (N)."""
+    statistics = {name: float(getattr(filtered, name)()) for name in ("mean", "std", "max", "min")}
+    return statistics | {"contact_loss": contact_loss(raw)}
+
+
 def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
     """Figures of each evaluated span; of a whole run, of the spans that it covers completely.
 
@@ -53,18 +65,14 @@ def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
     filtered, found = low_pass(run.contact_force, run.time_step), []
     for span in range(first, last + 1):
         inside = run.alignment.within(run.position, (span, span))
-        force, begin = filtered[inside], run.alignment.support(span - 1)
+        begin = run.alignment.support(span - 1)
         at = np.flatnonzero(np.abs(run.support_position - begin) < 1e-6)
         found.append(
             SpanFigures(
                 span=span,
                 begin=begin,
                 length=float(run.alignment.support(span) - begin),
-                mean=float(force.mean()),
-                std=float(force.std()),
-                max=float(force.max()),
-                min=float(force.min()),
-                contact_loss=contact_loss(run.contact_force[inside]),
+                **_of_force(filtered[inside], run.contact_force[inside]),
                 uplift=float(run.uplift[:, at].max()) if at.size and run.uplift.size else math.nan,
             )
         )
@@ -73,16 +81,6 @@ def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
 
 BEHIND = 200.0
 """Distance (m) behind an overlap over which its waves are told apart."""
-STRETCH_HEADINGS = {
-    "stretch": "where",
-    "distance": "distance (m)",
-    "mean": "mean force F_m (N)",
-    "std": "standard deviation σ (N)",
-    "max": "maximum (N)",
-    "min": "minimum (N)",
-    "contact_loss": "contact loss CL (%)",
-}
-"""Headings of ``StretchFigures``, with units."""
 
 
 class StretchFigures(NamedTuple):
@@ -119,31 +117,12 @@ def by_stretch(run: Trajectory, spans: SpanChoice = None) -> list[StretchFigures
         f"up to {BEHIND:g} m behind an overlap": behind & ~inside,
         "elsewhere": ~inside & ~behind,
     }
-    found = []
-    for name, there in kinds.items():
-        own = there & evaluated
-        if own.any():
-            found.append(
-                StretchFigures(
-                    stretch=name,
-                    distance=float(run.stride * own.sum()),
-                    mean=float(force[own].mean()),
-                    std=float(force[own].std()),
-                    max=float(force[own].max()),
-                    min=float(force[own].min()),
-                    contact_loss=contact_loss(run.contact_force[own]),
-                )
-            )
-    return found
-
-
-DROPPER_HEADINGS = {
-    "position": "from support (m)",
-    "largest": "maximum force (N)",
-    "smallest": "minimum force (N)",
-    "slack": "slack while the train is in its span (% of that time)",
-}
-"""Headings of ``MovingDropper``, with units."""
+    places = {name: there & evaluated for name, there in kinds.items()}
+    return [
+        StretchFigures(name, float(run.stride * at.sum()), **_of_force(force[at], run.contact_force[at]))
+        for name, at in places.items()
+        if at.any()
+    ]
 
 
 class MovingDropper(NamedTuple):

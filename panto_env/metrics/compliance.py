@@ -1,6 +1,4 @@
-"""A requirement on a run: a figure, its limits, and their source.
-
-Limits of EN 50367 and EN 50119 on the contact force, by power supply.
+"""Requirements on a run: figures and their limits of EN 50367 and EN 50119, by power supply.
 
 Speeds are in m/s; in the standards' formulas v is in km/h. The standards themselves were not at hand: all
 limits are recalled, the formulas for AC seen in public code as well. Those of DC 600 V and 750 V are recalled
@@ -39,12 +37,9 @@ class Criterion:
     @property
     def margin(self) -> float:
         """Distance to the nearer limit, negative beyond it; nan without a limit."""
-        margins = []
-        if self.highest is not None:
-            margins.append(self.highest - self.value)
-        if self.lowest is not None:
-            margins.append(self.value - self.lowest)
-        return min(margins, default=math.nan)
+        above = [] if self.highest is None else [self.highest - self.value]
+        below = [] if self.lowest is None else [self.value - self.lowest]
+        return min([*above, *below], default=math.nan)
 
     @property
     def kept(self) -> bool | None:
@@ -166,10 +161,6 @@ SLOW = 100.0
 TOLERANCE = 0.5
 """How far beyond a limit a mean force (N) keeps it: limits are compared in whole newtons. A static force is
 trimmed to 0.05 N, and a policy with a washout moves the mean by a few tenths. Own choice."""
-SLOW_LARGEST = 300.0
-"""Maximum contact force up to FAST (N)."""
-FAST_LARGEST_AC, FAST_LARGEST_DC = 350.0, 400.0
-"""Maximum contact force above FAST (N)."""
 STD_OF_MEAN = 0.3
 """Maximum σ over F_m."""
 SOURCE = "EN 50367, recalled"
@@ -192,8 +183,8 @@ def smallest_mean(speed: float, system: PowerSystem) -> float:
 def maximum_limit(speed: float, system: PowerSystem) -> float:
     """Maximum contact force (N)."""
     if to_kmh(speed) <= FAST:
-        return SLOW_LARGEST
-    return FAST_LARGEST_AC if _is_ac(system) else FAST_LARGEST_DC
+        return 300.0
+    return 350.0 if _is_ac(system) else 400.0
 
 
 def maximum_source(system: PowerSystem) -> str:
@@ -257,12 +248,6 @@ def _is_ac(system: PowerSystem) -> bool:
     return system.startswith("AC")
 
 
-SHARE_OF_WAVE_SPEED = 0.7
-"""Maximum speed of a train relative to the wave speed of the contact wire."""
-WAVE_SOURCE = "EN 50119, seen"
-WAVE_NOTE = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
-
-
 @dataclass(frozen=True)
 class LineFacts:
     """Data of a line that the criteria of a run depend on."""
@@ -314,17 +299,11 @@ def compliance(
     return [
         *criteria(figures, arcing, speed, line.system, line.system_source),
         *of_static(static, line.system),
-        _minimum(figures),
+        replace(_force("min", figures.min, 0.0, None, "EN 50119, recalled"), strict=True),
         *_uplift(figures, line),
         *_waves(line, speed, speed / mean_span),
         *_droppers(tension, tension_near),
     ]
-
-
-def _minimum(figures: Figures) -> Criterion:
-    label = LABELS["min"]
-    source = "EN 50119, recalled"
-    return Criterion("min", label.name, label.unit, figures.min, 0.0, None, source, strict=True)
 
 
 def _uplift(figures: Figures, line: LineFacts) -> list[Criterion]:
@@ -339,10 +318,7 @@ def _uplift(figures: Figures, line: LineFacts) -> list[Criterion]:
 
 
 def uplift_factor(stopped: bool) -> float:
-    """Room for the uplift at a support that EN 50119 requires, over that uplift (recalled).
-
-    stopped: whether a stop limits the uplift.
-    """
+    """Room for the uplift at a support, with a stop or none, over that uplift (EN 50119, recalled)."""
     return 1.5 if stopped else 2.0
 
 
@@ -350,10 +326,9 @@ def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
     if math.isinf(line.wave_speed):
         return []
     ratio = speed / line.wave_speed
+    seen = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
     values = [
-        Criterion(
-            "speed", "v/c, train over wave", "", ratio, None, SHARE_OF_WAVE_SPEED, WAVE_SOURCE, WAVE_NOTE
-        ),
+        Criterion("speed", "v/c, train over wave", "", ratio, None, 0.7, "EN 50119, seen", seen),
         Criterion("doppler", "Doppler factor (c − v)/(c + v)", "", (1 - ratio) / (1 + ratio)),
     ]
     if not math.isnan(line.dropper_reflection):

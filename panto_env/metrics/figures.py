@@ -1,16 +1,10 @@
-"""Labels of figures for tables and plots: name, short name, unit, and scale from SI.
-
-The spans that the figures of a run cover: first to last, both included (EN 50318 takes 5 and 6).
-
-By default these are the spans after the start has died out and, where a sequence of spans ends, before its
-end is felt. The line's alignment knows their positions.
-"""
+"""Figures of merit with their labels, and the spans that they cover: first to last, both included."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, fields
-from typing import Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,36 +41,8 @@ class Label:
         return f"{self.short}\n({self.unit})"
 
 
-LABELS = {
-    "mean": Label("mean force F_m", "F_m", "N"),
-    "std": Label("standard deviation σ", "σ", "N"),
-    "statistical_max": Label("statistical maximum F_m + 3σ", "F_m + 3σ", "N"),
-    "statistical_min": Label("statistical minimum F_m − 3σ", "F_m − 3σ", "N"),
-    "max": Label("maximum", "max", "N"),
-    "min": Label("minimum", "min", "N"),
-    "max_uplift": Label("maximum uplift at the supports", "uplift", "mm", 1e3, "m"),
-    "contact_loss": Label("contact loss CL", "CL", "%"),
-    "cost_function": Label("cost function CF", "CF", "N m"),
-    "effort": Label("actuator force, rms", "effort", "N"),
-    "effort_rate": Label("rate of actuator force, rms", "effort rate", "N/s"),
-    "distance": Label("over a distance of", "distance", "m"),
-}
-"""Label of every field of ``Figures``, in its order."""
-
 NUMBER = "pantograph_number"
 """Column with the number of a pantograph in its train, 1 for the first, in tables of several."""
-
-HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS.items()} | {
-    "speed_kmh": "speed (km/h)",
-    "nominal_force": "nominal_force (N)",
-    "time_step": "time_step (s)",
-    "spacing": "spacing (m)",
-    "window": "window (spans)",
-    "dropper_force": "dropper_force (N)",
-    "slack": "slack (% of time)",
-}
-"""Headings with units of figures and settings, which are in SI, in files of tables."""
-
 
 SpanChoice: TypeAlias = Spans | Literal["all"] | None
 """The first and the last span, "all" for the whole run, or None for those after the start has died out."""
@@ -151,20 +117,23 @@ ARC = 5e-3
 
 @dataclass(frozen=True)
 class Figures:
-    """One run's figures; force statistics are of the filtered force, losses of the raw one."""
+    """One run's figures in SI units; force statistics are of the filtered force, losses of the raw one.
 
-    mean: float  # F_m (N)
-    std: float  # sigma (N)
-    statistical_max: float  # F_m + 3 sigma (N)
-    statistical_min: float  # F_m - 3 sigma (N)
-    max: float  # actual maximum (N)
-    min: float  # actual minimum (N)
-    max_uplift: float  # of the contact wire at the supports (m); nan where the line has none
-    contact_loss: float  # CL, Eq. 13 of paper 1 (%)
-    cost_function: float  # CF, Eq. 14 of paper 1 (N m)
-    effort: float  # rms actuator force (N)
-    effort_rate: float  # rms rate of the actuator force (N/s)
-    distance: float  # distance that the figures cover (m)
+    The uplift is that of the contact wire, nan where the line has no supports.
+    """
+
+    mean: Annotated[float, Label("mean force F_m", "F_m", "N")]
+    std: Annotated[float, Label("standard deviation σ", "σ", "N")]
+    statistical_max: Annotated[float, Label("statistical maximum F_m + 3σ", "F_m + 3σ", "N")]
+    statistical_min: Annotated[float, Label("statistical minimum F_m − 3σ", "F_m − 3σ", "N")]
+    max: Annotated[float, Label("maximum", "max", "N")]
+    min: Annotated[float, Label("minimum", "min", "N")]
+    max_uplift: Annotated[float, Label("maximum uplift at the supports", "uplift", "mm", 1e3, "m")]
+    contact_loss: Annotated[float, Label("contact loss CL", "CL", "%")]  # Eq. 13 of paper 1
+    cost_function: Annotated[float, Label("cost function CF", "CF", "N m")]  # Eq. 14 of paper 1
+    effort: Annotated[float, Label("actuator force, rms", "effort", "N")]
+    effort_rate: Annotated[float, Label("rate of actuator force, rms", "effort rate", "N/s")]
+    distance: Annotated[float, Label("over a distance of", "distance", "m")]
 
     @classmethod
     def none(cls) -> Self:
@@ -174,6 +143,21 @@ class Figures:
     def as_dict(self) -> dict[str, float]:
         """Values by name, in the order of the fields."""
         return dict(vars(self))
+
+
+_HINTS = get_type_hints(Figures, include_extras=True)
+LABELS: dict[str, Label] = {name: hint.__metadata__[0] for name, hint in _HINTS.items()}
+"""Label of every field of ``Figures``, in its order."""
+HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS.items()} | {
+    "speed_kmh": "speed (km/h)",
+    "nominal_force": "nominal_force (N)",
+    "time_step": "time_step (s)",
+    "spacing": "spacing (m)",
+    "window": "window (spans)",
+    "dropper_force": "dropper_force (N)",
+    "slack": "slack (% of time)",
+}
+"""Headings with units of figures and settings, which are in SI, in files of tables."""
 
 
 def cost_function(force: Array, nominal_force: float | Array, stride: float | Array) -> float:

@@ -1,4 +1,4 @@
-"""Check for the packages of the extra 'render', before any of them is imported."""
+"""A picture to draw on, its colours, and the check for the packages of the extra 'render'."""
 
 from __future__ import annotations
 
@@ -32,8 +32,6 @@ PARTS = 4
 """Resolution of places: 1 / 2^PARTS of a pixel."""
 SMALLEST = 8
 """Minimum size of words (px)."""
-KEPT_WORDS = 2000
-"""Number of drawings of words that are kept, since numbers repeat."""
 
 
 def rgb(colour: str) -> Colour:
@@ -48,14 +46,6 @@ class Canvas:
         """Raises InputError where OpenCV is not installed."""
         check_packages("cv2")
         self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
-
-    def start_from(self, other: Canvas) -> None:
-        """Begin a new picture with a copy of another canvas."""
-        self.pixels = other.pixels.copy()
-
-    def fill(self, colour: Colour) -> None:
-        """Fill the picture with one colour."""
-        self.pixels[...] = colour
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
         """Draw a filled rectangle."""
@@ -118,7 +108,7 @@ def _exact(points: Any) -> NDArray[np.int32]:
     return np.asarray(np.rint(near * (1 << PARTS)), dtype=np.int32)
 
 
-@lru_cache(maxsize=KEPT_WORDS)
+@lru_cache(maxsize=2000)  # numbers repeat
 def _shade(text: str, size: int, bold: bool) -> NDArray[np.float32]:
     """Opacity of drawn words, 0 to 1, (height, width, 1)."""
     from PIL import Image, ImageDraw

@@ -22,7 +22,7 @@ from ..analysis.simulation import (
 )
 from ..base.errors import InputError
 from ..control.settings import run_settings
-from ..metrics.figures import LABELS, Figures, in_words
+from ..metrics.figures import LABELS, in_words
 from ..metrics.trajectory import Trajectory
 from ..plant.state import Row
 from ..policies import check_named
@@ -94,11 +94,6 @@ def check_together(filmed: Sequence[Filmed]) -> None:
                     f"Passes above each other must have the same {name}, but {first.title} has {one:g} and "
                     f"{other.title} {two:g}; make a film of each."
                 )
-
-
-def alike(one: Trajectory, other: Trajectory) -> bool:
-    """Whether two runs differ only in their control."""
-    return _but_for_control(one) == _but_for_control(other)
 
 
 def _but_for_control(run: Trajectory) -> str:
@@ -206,15 +201,11 @@ def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
     run = filmed.run
     if run.terminated:
         return {"figures": "none: it ends early"}
-    figures, spans = _summary(run), in_words(run.common_spans())
+    figures, spans = run.controlled.summary(run.common_spans()), in_words(run.common_spans())
     values = {"mean": figures.mean, "std": figures.std}
     texts = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
-    if filmed is not first and not first.run.terminated and alike(filmed.run, first.run):
-        change = 100 * (figures.std / _summary(first.run).std - 1)
+    other = first.run
+    if filmed is not first and not other.terminated and _but_for_control(run) == _but_for_control(other):
+        change = 100 * (figures.std / other.controlled.summary(other.common_spans()).std - 1)
         texts[f"σ relative to {first.title}"] = f"{change:+.1f} %"
     return texts
-
-
-def _summary(run: Trajectory) -> Figures:
-    """Figures of the pantograph that is shown, over the spans that the last one covers."""
-    return run.controlled.summary(run.common_spans())

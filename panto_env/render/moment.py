@@ -158,14 +158,6 @@ PANTOGRAPH = 0.22
 """Share of the frame's height from the contact wire down to the roof."""
 MINIMUM_HEIGHT = 0.35
 """Minimum height that a picture shows above the contact wire (m)."""
-CHAIN = 0.55
-"""Share of the distance from wire to roof over which the pantograph's masses are spread."""
-MARGIN = 0.075
-"""Share of the frame's width to the left of the chart, for the labels of its axis."""
-OF_NOMINAL, ROUND_FORCE = 2.0, 20.0
-"""Minimum maximum of the chart's axis, of the nominal force, and what it is rounded up to (N)."""
-ARROW = 0.11
-"""Length of the maximum force's arrow, as a share of the frame's height."""
 ROUND_TO = (1, 2, 5, 10, 15, 20, 30, 50, 100, 200)
 """Possible exaggerations of heights: round numbers that are easy to remember."""
 
@@ -232,7 +224,7 @@ class Layout:
     @property
     def margin(self) -> float:
         """Left end of the chart (px from the left)."""
-        return MARGIN * self.width
+        return 0.075 * self.width
 
     def forces(self, forces: Array | float, largest: float) -> Array:
         """Pixels from the top for contact forces (N) in the chart, from 0 to ``largest``."""
@@ -244,23 +236,24 @@ class Layout:
     def chain(self, heights: Array) -> Array:
         """Pixels from the top for the pantograph's masses, (masses,), from their heights (m), head first.
 
-        In the first frame they are evenly spaced; from there they move by the change of their heights.
+        In the first frame they are evenly spaced over 55 % of the way from wire to roof; from there they move
+        by the change of their heights.
         """
         count, heights = len(heights), heights - np.array(self.rest)
-        apart = CHAIN * (self.roof - self.wire) * np.arange(count) / max(count - 1, 1)
+        apart = 0.55 * (self.roof - self.wire) * np.arange(count) / max(count - 1, 1)
         return np.asarray(self.up(heights) + apart)
 
     def arrow(self, force: float, limit: float) -> float:
-        """Length of a force's arrow (px), negative where it points down."""
-        return float(np.clip(force / limit, -1.0, 1.0)) * ARROW * self.height
+        """Length of a force's arrow (px), negative where it points down: at most 11 % of the height."""
+        return float(np.clip(force / limit, -1.0, 1.0)) * 0.11 * self.height
 
 
 def force_axis(highest: float, nominal: float, limit: float) -> float:
     """Maximum (N) of an axis for contact forces up to ``highest``; the limit is on it where it is near.
 
-    With a nominal force of 54 N, an axis up to a limit of 350 N would be two thirds empty.
+    At least twice the nominal force, in steps of 20 N: up to 350 N, 54 N would leave two thirds empty.
     """
-    maximum = ROUND_FORCE * np.ceil(max(OF_NOMINAL * nominal, highest) / ROUND_FORCE)
+    maximum = 20.0 * np.ceil(max(2.0 * nominal, highest) / 20.0)
     return float(max(maximum, limit) if limit <= NEAR * maximum else maximum)
 
 

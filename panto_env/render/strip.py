@@ -80,7 +80,6 @@ class Strip:
         )
 
     def _force_chart(self, across: Array, columns: int) -> list[Text]:
-        """The low-passed force from 0 to beyond its limit, with marks where contact was lost."""
         seen = self._felt
         highest = max(self._limit, float(seen.filtered.max(initial=0.0)))
         lines = chart(across, seen.filtered, (0.0, 1.1 * highest), FORCE_ROWS, columns, self._limit)
@@ -90,7 +89,6 @@ class Strip:
 
 
 def _rider_in_words(number: int, rider: Rider) -> str:
-    """A pantograph of a train: its place, and its force with that of the last spans."""
     if rider.filtered.size < 2:
         return f"{number}: {rider.position:.0f} m"
     near = rider.filtered[-1]

@@ -162,9 +162,7 @@ class Findings:
     @cached_property
     def by_span(self) -> list[SpanFigures]:
         """Figures of each evaluated span, or of all that the run covers, where spans differ."""
-        if not self.run.spans_differ:
-            return []
-        return by_span(self.run, self._chosen)
+        return by_span(self.run, self._chosen) if self.run.spans_differ else []
 
     @cached_property
     def by_stretch(self) -> list[StretchFigures]:

@@ -1,9 +1,10 @@
-"""Loading of the templates of pages, with escaping."""
+"""The page of a report, and the templates of all pages, with escaping."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +89,9 @@ def page(found: Sequence[Findings]) -> str:
     judged = {one: name for one, name in names.items() if one.figures is not None}
     felt = {one: charts.of_run(one, name) for one, name in names.items() if one.leads}
     lines = _different(found, "line")
+    by_key = [{each.key: each for each in one.criteria} for one in found]
+    criteria = [[each.get(key) for each in by_key] for key in dict.fromkeys(chain(*by_key))]
+    side_by_side = [(next(filter(None, own)), own) for own in criteria]  # None: a run does not have it
     return template.render(
         version=__version__,
         title=_title(found),
@@ -97,7 +101,7 @@ def page(found: Sequence[Findings]) -> str:
         found=found,
         labels=LABELS,
         figures=[[getattr(one.figures, key, math.nan) for one in found] for key in LABELS],
-        criteria=_side_by_side(found),
+        criteria=side_by_side,
         values_of=values_of,
         in_words=in_words,
         lines=lines,
@@ -145,14 +149,3 @@ def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]
     for one in found:
         alike.setdefault(getattr(one, part).model_dump_json(), []).append(one)
     return {runs[0]: list(dict.fromkeys(one.file for one in runs)) for runs in alike.values()}
-
-
-def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:
-    """Each criterion of any run, and the criteria of all runs with its key; None where a run has none."""
-    by_key = [{each.key: each for each in one.criteria} for one in found]
-    keys = dict.fromkeys(key for criteria in by_key for key in criteria)
-    rows = []
-    for key in keys:
-        own = [criteria.get(key) for criteria in by_key]
-        rows.append((next(each for each in own if each is not None), own))
-    return rows

@@ -57,12 +57,7 @@ class RigComputer:
         rig: a rig of the catalogue, its TOML file, or ``RigData``. spans: of the line; by default as many as
         it has. Raises InputError for what is not valid.
         """
-        data = load_catenary(rig)
-        if not isinstance(data, RigData):
-            raise InputError(
-                f"The computer of a rig wants a rig, such as 'rig', and '{data.name}' is a line."
-            )
-        speed = from_kmh(speed_kmh)
+        data, speed = load_rig(rig), from_kmh(speed_kmh)
         self.interval = data.computer.interval
         """Between two calls of ``step`` (s)."""
         condition = LineCondition()
@@ -231,8 +226,8 @@ class Pair:
         """A quantity of both, (samples,), over the spans, without its mean."""
         inside = self.reference.inside(self.spans)
         length = min(len(self.reference.time), len(self.rig.time))
-        values = [getattr(run, quantity)[:length][inside[:length]] for run in (self.reference, self.rig)]
-        return values[0] - values[0].mean(), values[1] - values[1].mean()
+        one, two = (getattr(run, quantity)[:length][inside[:length]] for run in (self.reference, self.rig))
+        return one - one.mean(), two - two.mean()
 
     def followed(self) -> float:
         """Highest frequency (Hz) up to which each narrow band of the force is followed within a tenth."""

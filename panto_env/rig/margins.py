@@ -1,16 +1,11 @@
-"""Stability of the rig's loop by its frequency response: what gain, delay and lag it bears.
+"""Stability of the rig's loop: what gain, delay and lag it bears.
 
-The loop is opened where the load cell is sampled. From there the computer, a linear system as long as no
-dropper goes slack, leads to a command; converter, delay, cylinder, pantograph and the load cell's filter lead
-back. The computer's response is measured: a sample of 1 N, and the commands that follow it. It differs from
-place to place along a span; what decides is the part that does not, the mean over all places: the rest
-comes back at other frequencies. (``growth`` simulates the same with the rest.)
+By its frequency response: the loop is opened where the load cell is sampled. The computer's response to a
+sample of 1 N, linear as long as no dropper goes slack, is measured as the mean over a span: the part that
+differs from place to place comes back at other frequencies.
 
-Stability of the rig's loop by simulation: whether a small disturbance grows.
-
-Two runs differ by a load cell's noise of 1e-5 N alone; the contact may pull and the limits of cylinder and
-load cell are far away, so that the loop is linear but for slack droppers. Where their difference has grown
-far beyond the noise, the loop is not stable, whatever losses of contact and limits would make of it.
+By simulation: two runs differ by a load cell's noise alone, with a contact that may pull and limits far away.
+The loop is not stable where their difference has grown far beyond the noise.
 """
 
 from __future__ import annotations
@@ -74,14 +69,13 @@ class Loop:
         """Natural frequency (Hz) of the cylinder below which the loop is not stable, if it is compensated for
         as one of the rig's own frequency.
         """
+        own = self.rig.cylinder.natural_frequency
 
-        def stable(natural_frequency: float) -> bool:
-            cylinder = self.rig.cylinder.model_copy(update={"natural_frequency": natural_frequency})
-            return is_stable(self._gain(self.rig.model_copy(update={"cylinder": cylinder})))
+        def stable(frequency: float) -> bool:
+            slower = with_values(self.rig, {"cylinder": {"natural_frequency": frequency}})
+            return is_stable(self._gain(slower))
 
-        return threshold(
-            stable, 0.05 * self.rig.cylinder.natural_frequency, self.rig.cylinder.natural_frequency
-        )
+        return threshold(stable, SLOWEST * own, own)
 
     def _gain(self, rig: RigData) -> Response:
         return analog_response(rig, self.pantograph, self.frequency) * self._computer

@@ -26,7 +26,7 @@ from panto_env.identification.record import Record
 from panto_env.plant.alignment import Alignment
 from panto_env.report import charts
 from panto_env.rig.computer import Pair
-from panto_env.rig.plots import plot_pairs
+from panto_env.rig.report import plot_pairs
 
 from ..analysis.test_line_check import of_unlike_spans
 from ..metrics.test_summary import RUN as FORCES

@@ -16,8 +16,7 @@ from panto_env.plant.state import Row
 from panto_env.render.canvas import FORCE, OTHERS
 from panto_env.render.film import excerpt, figures_in_words, frames, saved_passes
 from panto_env.render.moment import AHEAD, moment_of
-from panto_env.render.overview import SHARE, colour_of
-from panto_env.render.picture import Picture
+from panto_env.render.picture import SHARE, Picture, colour_of
 from panto_env.render.strip import Strip
 
 from .test_live import text

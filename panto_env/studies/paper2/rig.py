@@ -19,8 +19,7 @@ from ...catalog import load_pantograph
 from ...metrics.low_pass import amplitudes
 from ...rig.computer import Pair, compare, load_rig, rms
 from ...rig.margins import with_values
-from ...rig.plots import plot_pairs
-from ...rig.report import Stability, pair_facts, stability, stability_facts, stability_table
+from ...rig.report import Stability, pair_facts, plot_pairs, stability, stability_facts, stability_table
 from ..study import Comparison, Outcome, Report
 
 PANTOGRAPH, LINE, SPEED_KMH = "own-two-mass", "en50318-2002", 250.0
