@@ -14,7 +14,7 @@ pytest.importorskip("stable_baselines3")
 from typer.testing import CliRunner
 
 from panto_agents.ablation import REFERENCE, _difference, load_ablation, variants
-from panto_agents.run_folder import RunFolder
+from panto_agents.trainings import RunFolder
 from panto_configs import find, names
 from panto_env import InputError
 from panto_env.cli import make_app

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import parse_training
+from panto_agents.trainings import RunFolder
 from panto_baselines.dataset.make import LIST, verify
 from panto_env import InputError
 from panto_env.cluster import IDENTITY, open_parts
