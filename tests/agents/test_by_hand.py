@@ -23,13 +23,11 @@ from panto_agents.algorithm import MOST_KEPT, PPO, SAC
 from panto_agents.cloning import Demonstrations, demonstrate, returns
 from panto_agents.evaluation import Pair, in_words, pair, verdict
 from panto_agents.model_file import Actor, RecurrentActor, actor_of, read_model
-from panto_agents.policy import _first_difference
+from panto_agents.policy import SETTINGS, _first_difference
 from panto_agents.settings import arguments, speeds
 from panto_agents.stable_baselines import save_policy
-from panto_agents.train import EpisodeLog, EveryNSteps
 from panto_agents.trainings import RunFolder
 from panto_env import InputError, simulate
-from panto_env.base.checksums import read_checked
 from panto_env.envs import IDS
 from panto_env.metrics.figures import Figures
 from panto_env.terminal import PlainConsole
@@ -50,7 +48,6 @@ def test_a_learning_rate_goes_from_its_first_value_to_its_last_by_the_last_step(
 @pytest.mark.parametrize(
     ("lanes", "n_steps", "batch_size", "message"),
     [
-        (2, 128, 64, None),
         (2, 128, 256, None),
         (1, 2, 2, None),
         (1, 1, 1, "must be a multiple of batch_size = 1, and more than 1"),
@@ -78,7 +75,7 @@ def test_learning_starts_before_the_last_step():
             SAC(learning_starts=start).check(SimpleNamespace(total_steps=100))
 
 
-@pytest.mark.parametrize(("seed", "stored"), [(None, 0), (0, 0), (7, 7)])
+@pytest.mark.parametrize(("seed", "stored"), [(None, 0), (7, 7)])
 def test_a_model_without_a_seed_is_stored_with_seed_0(seed, stored, tmp_path):
     env = gymnasium.make("panto_env:Pantograph-v0", distance=120.0, accuracy="fast", settle=0.0)
     model = stable_baselines3.PPO("MlpPolicy", env, seed=seed, device="cpu", n_steps=64)
@@ -201,30 +198,6 @@ def test_layers_act_as_their_formula():
             assert actor.act(seen) == pytest.approx(expected)
 
 
-def test_something_is_done_where_an_interval_is_passed_and_once_at_the_end():
-    done = []
-    each = EveryNSteps(100, lambda: done.append(each.num_timesteps))
-    each.num_timesteps = 50
-    each._on_training_start()
-    for steps in (50, 99, 100, 150, 199, 250, 300, 320):
-        each.num_timesteps = steps
-        each._on_rollout_start()
-        assert each._on_step()
-    assert done == [100, 250, 300]
-    each._on_training_end()
-    each._on_training_end()
-    assert done == [100, 250, 300, 320]
-
-
-def test_figures_are_logged_of_each_episode_that_ends_where_it_has_them():
-    logged, log = [], EpisodeLog()
-    log.model = SimpleNamespace(logger=SimpleNamespace(record_mean=lambda *given: logged.append(given)))
-    infos = [{}, {"figures": {"mean": 120.0, "max": 1.0}}, {"figures": {"mean": 121.0, "std": 20.0}}]
-    log.locals = {"infos": infos}
-    assert log._on_step()
-    assert logged == [("episode/mean", 120.0), ("episode/mean", 121.0), ("episode/std", 20.0)]
-
-
 def examples(rewards, terminated, ended):
     empty = np.zeros((len(rewards), 1, 1), np.float32)
     as_bool = [np.array(each, bool)[:, None] for each in (terminated, ended)]
@@ -266,13 +239,12 @@ class Lanes:
         return after, np.full(2, -1.0 * self.steps), terminated, truncated, infos
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.5])
-def test_a_demonstration_keeps_what_was_seen_intended_done_and_followed(noise):
+def test_a_demonstration_keeps_what_was_seen_intended_done_and_followed():
     lanes, begun = Lanes(), []
     policy = SimpleNamespace(
         act=lambda seen: 0.9 + 0.0 * seen, begin=lambda which: begun.append(which.tolist())
     )
-    made = demonstrate(lanes, policy, range(7, 9), 4, noise)
+    made = demonstrate(lanes, policy, range(7, 9), 4, 0.5)
     assert lanes.seeds == [7, 8]
     assert begun == [[0, 1], [1], [0]]
     first, *_ = made
@@ -284,37 +256,21 @@ def test_a_demonstration_keeps_what_was_seen_intended_done_and_followed(noise):
     assert made[1] == pytest.approx(0.9)
     np.testing.assert_array_equal(made[2], np.array(lanes.taken))
     expected = np.random.default_rng(7).standard_normal((4, 2, 1))
-    np.testing.assert_allclose(made[2], np.clip(0.9 + noise * expected, -1, 1), rtol=1e-6)
+    np.testing.assert_allclose(made[2], np.clip(0.9 + 0.5 * expected, -1, 1), rtol=1e-6)
 
 
-NEEDS = {"channels": (0,), "force_limit": 100.0, "control_interval": 0.01, "entries": (("a", 0.0, 1.0),)}
-OTHERS = {
-    "channels": ((0, 1), "set actuator={'place': 'frame'}"),
-    "force_limit": (
-        50.0,
-        "had a force_limit of 100 N, this one has 50 N; set the actuator's force_limit to 100",
-    ),
-    "control_interval": (
-        0.02,
-        "a control_interval of 0.01 s, this task has 0.02 s; set control_interval to 0.01",
-    ),
-    "entries": ((), "trained with other observations (1: a / 1) than this task has (0: )"),
-    "washout": (2.0, "trained with washout=1.0, this task has 2.0; set it to match"),
-}
-
-
-@pytest.mark.parametrize("name", OTHERS)
-@pytest.mark.parametrize("both_ways", [False, True])
-def test_a_task_that_differs_is_named_by_its_first_difference(name, both_ways):
-    from panto_agents.policy import OBSERVATION_SETTINGS
-
-    needs = NEEDS | dict.fromkeys(OBSERVATION_SETTINGS, "same") | {"washout": 1.0}
-    value, words = OTHERS[name]
-    needed, offered = SimpleNamespace(**needs), SimpleNamespace(**needs | {name: value})
-    if both_ways:
-        assert _first_difference(offered, needed) != _first_difference(needed, offered)
-    else:
-        assert words in _first_difference(needed, offered)
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("entries", (), "trained with other observations (1: a / 1) than this task has (0: )"),
+        ("washout", 2.0, "trained with washout=1.0, this task has 2.0; set it to match"),
+    ],
+)
+def test_a_task_that_differs_is_named_by_its_first_difference(name, value, words):
+    needs = {"channels": (0,), "force_limit": 100.0, "control_interval": 0.01, "entries": (("a", 0.0, 1.0),)}
+    needs |= dict.fromkeys(SETTINGS, "same") | {"washout": 1.0}
+    told = _first_difference(SimpleNamespace(**needs), SimpleNamespace(**needs | {name: value}))
+    assert words in told
 
 
 def test_an_environment_s_speeds_are_the_ends_and_the_middle_of_its_range():
@@ -418,42 +374,6 @@ def test_a_training_says_where_its_models_are_and_how_good(
         f"best at an evaluation (step 64): best: {words}",
         "panto evaluate best",
     ]
-
-
-@pytest.mark.parametrize(("ratio", "expected"), [(0.9, 0.9), (None, math.inf)])
-def test_a_training_that_goes_on_has_the_verdict_of_its_checkpoint(ratio, expected, monkeypatch, tmp_path):
-    monkeypatch.setattr(train, "restore", lambda *_: SimpleNamespace(ratio=ratio, qualified=True))
-    seeds, dropped = [], []
-    folder = SimpleNamespace(
-        newest_checkpoint=lambda: "it",
-        best=tmp_path / "none",
-        drop_evaluations_after=dropped.append,
-    )
-    model = SimpleNamespace(num_timesteps=300, set_random_seed=seeds.append)
-    fake = SimpleNamespace(folder=folder, model=model, training=SimpleNamespace(seed=7), _seed_lanes=list)
-    train.Run.restore(fake)
-    assert fake._verdict == (expected, True)
-    assert (seeds, dropped) == ([307], [300])
-
-
-def test_a_policy_is_shown_for_as_many_steps_as_cloning_takes_in_all_lanes_together(monkeypatch, tmp_path):
-    shown = []
-    monkeypatch.setattr(train, "demonstrate", lambda *given: shown.append(given) or "examples")
-    monkeypatch.setattr(train, "PolicyLanes", lambda name, native: name)
-    monkeypatch.setattr(train, "lane_seeds", lambda training: range(3))
-    error = SimpleNamespace(model_dump=lambda mode: {"error": 0.25})
-    learner = SimpleNamespace(begin_with=lambda *_: error)
-    folder = SimpleNamespace(cloning=tmp_path / "cloning.json")
-    cloning = SimpleNamespace(steps=100, noise=0.1)
-    training = SimpleNamespace(start_from="pd", cloning=cloning, lanes=8, hyperparameters=learner)
-    env = SimpleNamespace(unwrapped=SimpleNamespace(env="native"))
-    model = SimpleNamespace(num_timesteps=0, get_env=lambda: env)
-    train.Run.begin_with_policy(
-        SimpleNamespace(training=training, model=model, folder=folder, _seed_lanes=list)
-    )
-    assert shown == [("native", "pd", range(3), 13, 0.1)]
-    told = read_checked(tmp_path / "cloning.json")
-    assert (told["policy"], told["error"]) == ("pd", 0.25)
 
 
 def test_runs_of_an_ablation_are_in_a_folder_of_its_name(monkeypatch, tmp_path):
