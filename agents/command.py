@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from .evaluation import Pair
 
 
+Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.")]
+
+
 def check_packages() -> None:
     """Raise InputError, naming them, if packages that a training needs are not installed."""
     missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if find_spec(name) is None]
@@ -224,7 +227,7 @@ def trainings(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue runs that have begun, and begin the others.")
     ] = False,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:
@@ -262,7 +265,7 @@ def ablation(
         Path | None,
         typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +19,6 @@ SETTINGS = (*OBSERVATION_SETTINGS, "washout")
 """Settings of a task that a policy asks for."""
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by the actuators that the actions drive."""
-_loading: ContextVar[tuple[Path, ...]] = ContextVar("_loading", default=())
-"""Model files that are being loaded, each as the base of the one before."""
 
 
 def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
@@ -131,17 +128,7 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 def load(path: str | Path) -> TrainedPolicy:
     """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
-    file = Path(path)
-    outer, own = _loading.get(), file.resolve()
-    if own in outer:
-        raise InputError(
-            f"The model file {path} is, through its base policies, added to itself; take another model file."
-        )
-    token = _loading.set((*outer, own))
-    try:
-        return TrainedPolicy(file, *read_model(file))
-    finally:
-        _loading.reset(token)
+    return TrainedPolicy(Path(path), *read_model(Path(path)))
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:

@@ -6,7 +6,6 @@ import csv
 import json
 import re
 import shutil
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from panto_agents.policy import TrainedPolicy, load
 from panto_agents.settings import Training, load_training, parse_training
 from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
+from panto_configs import names
 from panto_env import InputError, simulate
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -36,7 +36,6 @@ from panto_env.envs import IDS
 
 from ..plugin import install
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
 SMALL = {
     "ppo": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
@@ -93,9 +92,9 @@ def learner(training, folder):
 def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    names = {path.name for path in finished.path.iterdir()} - {".lock"}
+    files = {path.name for path in finished.path.iterdir()} - {".lock"}
     tables = {"evaluations.csv", "settings.json"}
-    assert names == {"best.safetensors", "checkpoints", "model.safetensors", "tensorboard"} | tables
+    assert files == {"best.safetensors", "checkpoints", "model.safetensors", "tensorboard"} | tables
     steps = [read_model(path)[0].steps for path in sorted(finished.checkpoints.iterdir())]
     assert steps == [128, 256]
     assert finished.read_settings() == settings(algorithm_of(finished))
@@ -199,23 +198,9 @@ class TestPolicy:
             np.testing.assert_allclose(action, expected, atol=1e-5)
             np.testing.assert_array_equal(action, policy.act(observation))
             assert action.dtype == np.float64
-
-    def test_is_a_policy_by_its_path(self, finished):
-        line = settings(algorithm_of(finished)).arguments
-        one, other = (simulate(**line, policy=str(finished.model), seed=seed) for seed in (0, 0))
-        np.testing.assert_array_equal(one.contact_force, other.contact_force)
-        assert np.abs(one.frame_force).max() > 0
-        assert one.policy == str(finished.model)
-
-    def test_takes_part_in_the_benchmark(self, finished):
-        from panto_baselines.benchmark.run import run
-        from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-
-        line = Line(distance=310.0, speeds_kmh=(300.0,), spans=(3, 5))
-        path = str(finished.best)
-        outcome = run(BenchmarkSettings(policies=(path,), lines=(line,), seeds=(0,)), workers=1)
-        assert [cell.policy for cell in outcome.cells] == ["passive", path]
-        assert outcome.cells[1].figures["effort"] > 0
+        run = simulate(**settings(algorithm_of(finished)).arguments, policy=str(finished.model))
+        assert np.abs(run.frame_force).max() > 0
+        assert run.policy == str(finished.model)
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -243,11 +228,9 @@ class TestPolicy:
 
 
 class TestSettings:
-    @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.stem)
-    def test_our_configurations_are_valid(self, path):
-        if "algorithm" not in tomllib.loads(path.read_text()):
-            pytest.skip("not a training")
-        assert load_training(path).total_steps > 0
+    @pytest.mark.parametrize("name", names("training"))
+    def test_our_configurations_are_valid(self, name):
+        assert load_training(name).total_steps > 0
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -356,9 +339,8 @@ class TestCommand:
         unknown = panto("evaluate", "nobody")
         assert isinstance(unknown.exception, InputError)
 
-    @pytest.mark.parametrize("name", ["agent-any-line", "agent-any-line-five"])
-    def test_a_stored_agent_is_evaluated_as_in_its_training(self, panto, name):
-        result = panto("evaluate", name, "--speed", 275, "--seeds", 1, "--json")
+    def test_a_stored_agent_is_evaluated_as_in_its_training(self, panto):
+        result = panto("evaluate", "agent-any-line-five", "--speed", 275, "--json")
         assert result.exit_code == 0, result.output
         (entry,) = json.loads(result.stdout)["passes"]
         assert entry["std_change_percent"] < -35
@@ -512,6 +494,17 @@ class TestResidual:
         )
         np.testing.assert_array_equal(ours, theirs)
         assert not np.array_equal(trained, theirs)
+
+    def test_takes_part_in_the_benchmark_and_asks_for_what_it_sees(self, added):
+        from panto_baselines.benchmark.run import run
+        from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+
+        line = Line(catenary="periodic-stiffness", pantograph="three-mass", speeds_kmh=(300.0,), spans=(3, 5))
+        path = str(added.best)
+        given = {"policies": (path, f"blind of {path}"), "lines": (line,), "seeds": (0,)}
+        outcome = run(BenchmarkSettings(**given, actuator="realistic"), workers=1)
+        assert outcome.cells[1].policy == path
+        assert outcome.cells[1].figures["effort"] > 0
 
 
 def test_a_train_is_evaluated_by_the_controlled_pantograph_that_swings_most():
