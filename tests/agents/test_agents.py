@@ -352,21 +352,6 @@ class TestCommand:
         assert "panto-env[agents]" in str(result.exception)
 
 
-def test_a_run_that_ends_early_does_not_qualify():
-    class Down:
-        def reset(self, context):
-            pass
-
-        def act(self, observation):
-            return -np.ones(1)
-
-    line = {"actuator": {"force_limit": 400.0}}
-    (pair,) = Comparison(line, (300.0,), range(1)).run(Down())
-    assert pair.terminated
-    assert not pair.qualified
-    assert pair.ratio == np.inf
-
-
 def test_lanes_are_seeded_one_by_one():
     training = settings("ppo", environment=LINE | {"speed_kmh": [250, 300]})
     lanes = train.make_lanes(training)
