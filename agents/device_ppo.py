@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -154,12 +153,11 @@ class ActorCritic(nn.Module):  # type: ignore[misc]
     def _layers(self, entries: int, outputs: int, gain: float) -> nn.Module:
         """Layers with orthogonal weights, which in the last one are multiplied by ``gain``."""
         layers: list[nn.Module] = []
-        for wide, narrow in pairwise((entries, *self._widths, outputs)):
-            layers += [nn.Linear(wide, narrow), self._activation()]
-        linear: Sequence[Any] = layers[::2]
-        for layer in linear:
-            nn.init.orthogonal_(layer.weight, gain if layer is linear[-1] else 2**0.5)
+        for number, (wide, narrow) in enumerate(pairwise((entries, *self._widths, outputs))):
+            layer = nn.Linear(wide, narrow)
+            nn.init.orthogonal_(layer.weight, gain if number == len(self._widths) else 2**0.5)
             nn.init.zeros_(layer.bias)
+            layers += [layer, self._activation()]
         return nn.Sequential(*layers[:-1])
 
     def actions(self, observations: torch.Tensor) -> Independent:

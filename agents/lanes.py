@@ -106,7 +106,7 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The native environment's attribute, repeated for each requested lane."""
-        return [getattr(self.env, attr_name)] * len(self._lanes(indices))
+        return [getattr(self.env, attr_name)] * len(self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused, because lanes share one environment: an attribute cannot be set for some of them only."""
@@ -114,18 +114,11 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method of the native environment once; its result, repeated for each requested lane."""
-        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
+        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(self._lanes(indices))
-
-    def _lanes(self, indices: Any) -> Sequence[int]:
-        lanes: Sequence[int] = self._get_indices(indices)
-        return lanes
-
-
-Array = NDArray[np.float64]
+        return [False] * len(self._get_indices(indices))
 
 
 class PolicyLanes:
@@ -142,12 +135,12 @@ class PolicyLanes:
             for lane in lanes.tolist():
                 self._policies[lane].reset(self._native.context(lane))
 
-    def act(self, observations: NDArray[np.float32]) -> Array:
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""
         with errors_name(self.name, "act"):
             # Copies: a policy may keep its observation.
             pairs = zip(self._policies, observations.copy(), strict=True)
-            actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
+            actions = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
         return np.clip(actions, -1.0, 1.0)
 
 
@@ -261,7 +254,7 @@ class SideBySide(VecEnv):  # type: ignore[misc]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(list(self._get_indices(indices)))
+        return [False] * len(self._get_indices(indices))
 
 
 def make_lanes(training: Training) -> Any:

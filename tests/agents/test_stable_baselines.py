@@ -162,7 +162,7 @@ def base_of(env):
 )
 def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
     more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}
-    model = trained(kind, CHAINS[chain](), policy_kwargs={"net_arch": [16]}, **more).learn(100)
+    model = trained(kind, CHAINS[chain](), policy_kwargs={"net_arch": [64, 64]}, **more).learn(100)
     env = model.get_env()
     freeze(env)
     make_lively(model, env)
