@@ -159,33 +159,6 @@ def test_a_cell_that_does_not_fit_is_refused(change, message):
         actor_of(arrays, FACTS)
 
 
-def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
-    torch = pytest.importorskip("torch")
-    from panto_agents.linear_rollout import Network
-
-    from .test_rollout import stepped
-
-    torch.manual_seed(0)
-    network = Network(4, (6, 5), torch.nn.Tanh, 3)
-    with torch.no_grad():
-        network.rest[-1].weight *= 100
-    linear = [network.first, *network.rest]
-    arrays = [[getattr(each, kind).detach().numpy() for each in linear] for kind in ("weight", "bias")]
-    actor = RecurrentActor(*map(tuple, arrays), "tanh", True, cell=network.arrays())
-    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
-    expected, state = [], None
-    with torch.no_grad():
-        for each in seen:
-            action, state = stepped(network, torch.tensor(each), state)
-            expected.append(action.item())
-    for _ in range(2):
-        actor.reset(None)
-        assert [actor.act(each)[0] for each in seen] == pytest.approx(expected, abs=1e-5)
-    assert np.std(expected) > 0.03
-    actor.reset(None)
-    assert actor.act(seen[5])[0] != pytest.approx(expected[5], abs=1e-3)  # it remembers what came before
-
-
 def test_layers_act_as_their_formula():
     weights = (np.array([[1.0, -2.0], [0.5, 0.5]]), np.array([[2.0, -1.0]]))
     biases = (np.array([0.1, -0.2]), np.array([0.3]))

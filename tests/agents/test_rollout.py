@@ -16,6 +16,7 @@ from torch import nn
 
 from panto_agents.linear_pass import Columns, LinearPass
 from panto_agents.linear_rollout import Network, Rollout, Terms, grouped
+from panto_agents.model_file import RecurrentActor
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.control.entries import AVERAGED
 
@@ -170,3 +171,25 @@ def test_the_washout_in_torch_is_that_of_the_policies():
     for each in requested:
         expected = float(known(np.array([LIMIT * each]))[0]) / LIMIT
         assert float(own(torch.tensor(each))) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
+    torch.manual_seed(0)
+    network = Network(4, (6, 5), nn.Tanh, 3)
+    with torch.no_grad():
+        network.rest[-1].weight *= 100
+    linear = [network.first, *network.rest]
+    arrays = [[getattr(each, kind).detach().numpy() for each in linear] for kind in ("weight", "bias")]
+    actor = RecurrentActor(*map(tuple, arrays), "tanh", True, cell=network.arrays())
+    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
+    expected, state = [], None
+    with torch.no_grad():
+        for each in seen:
+            action, state = stepped(network, torch.tensor(each), state)
+            expected.append(action.item())
+    for _ in range(2):
+        actor.reset(None)
+        assert [actor.act(each)[0] for each in seen] == pytest.approx(expected, abs=1e-5)
+    assert np.std(expected) > 0.03
+    actor.reset(None)
+    assert actor.act(seen[5])[0] != pytest.approx(expected[5], abs=1e-3)  # it remembers what came before
