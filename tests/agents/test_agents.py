@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
+import torch
 from safetensors.numpy import load_file, save_file
 
 from panto_agents import command, train
@@ -36,6 +37,7 @@ from panto_env.envs import IDS
 
 from ..plugin import install
 
+torch.set_num_threads(1)  # as a training does: more of them wait for each other
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
 SMALL = {
     "ppo": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
