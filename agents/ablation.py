@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,8 @@ from panto_env.base.settings import Settings, parse
 from panto_env.base.table import Table
 
 from .algorithm import Count
-from .run_folder import RunFolder
-from .settings import Training, parse_training
-from .trainings import train_all
+from .settings import Seed, Training, parse_training
+from .trainings import RunFolder, train_all
 
 REFERENCE = "as it is"
 """Name of the variant without any change."""
@@ -36,9 +35,7 @@ class Ablation(Settings):
 
     training: str = Field(description="name or path of the training that is varied")
     total_steps: Count = Field(description="environment steps of each run")
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        min_length=2, description="seeds of the runs of each variant"
-    )
+    seeds: tuple[Seed, ...] = Field(min_length=2, description="seeds of the runs of each variant")
     judged_by: str = Field(description="name or path of the benchmark that compares the runs' best models")
     judged_on: Count = Field(description="number of the benchmark's seeds")
     variants: dict[str, dict[str, Any]] = Field(
@@ -50,13 +47,12 @@ class Ablation(Settings):
     def trainings(self) -> dict[tuple[str, int], Training]:
         """Trainings by variant and seed. Raises InputError, naming the variant, if one is not valid."""
         base = read_toml(find(self.training, "training"))
-        made = {}
-        as_it_is: dict[str, dict[str, Any]] = {REFERENCE: {}}
-        for name, changes in (as_it_is | self.variants).items():
-            varied = _changed(base, changes)
-            for seed in self.seeds:
-                table = varied | {"seed": seed, "total_steps": self.total_steps}
-                made[name, seed] = parse_training(table, f"The variant '{name}'")
+        changes: dict[str, dict[str, Any]] = {REFERENCE: {}} | self.variants
+        made: dict[tuple[str, int], Training] = {}
+        for name, changed in changes.items():
+            table = _changed(base, changed) | {"total_steps": self.total_steps, "seed": self.seeds[0]}
+            training = parse_training(table, f"The variant '{name}'")
+            made |= {(name, seed): training.model_copy(update={"seed": seed}) for seed in self.seeds}
         return made
 
     def benchmark(self, models: Mapping[tuple[str, int], Path]) -> BenchmarkSettings:
@@ -92,15 +88,11 @@ def run(
     finish. workers, ray, command: see ``train_all``. Returns each run's best model, and the benchmark of all.
     """
     trainings = ablation.trainings()
-    folders = {(name, seed): _folder(output, name, seed) for name, seed in trainings}
+    folders = {(name, seed): output / name.replace(" ", "-") / f"seed{seed}" for name, seed in trainings}
     runs = {folders[key]: training for key, training in trainings.items()}
     train_all(runs, resume=True, workers=workers, ray=ray, progress=progress, command=command)
     models = {key: RunFolder(folder).best for key, folder in folders.items()}
     return models, run_benchmark(ablation.benchmark(models), workers, ray=ray)
-
-
-def _folder(output: Path, name: str, seed: int) -> Path:
-    return output / name.replace(" ", "-") / f"seed{seed}"
 
 
 def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,12 +132,13 @@ def variants(models: Mapping[tuple[str, int], Path], outcome: Benchmark) -> tupl
     disqualified = {cell.policy for cell in outcome.cells if cell.disqualified}
     for cell in outcome.cells:
         by_policy.setdefault(cell.policy, []).append(cell.change)
-    names = list(dict.fromkeys(name for name, _ in models))
-    own = {name: [str(path) for (each, _), path in models.items() if each == name] for name in names}
-    changes = {name: np.array([np.mean(by_policy[path]) for path in own[name]]) for name in names}
+    paths: dict[str, list[str]] = {}
+    for (name, _), path in models.items():
+        paths.setdefault(name, []).append(str(path))
+    changes = {name: np.array([np.mean(by_policy[path]) for path in own]) for name, own in paths.items()}
     return tuple(
-        _variant(name, changes[name], changes[REFERENCE], [path in disqualified for path in own[name]])
-        for name in names
+        _variant(name, changes[name], changes[REFERENCE], [path in disqualified for path in own])
+        for name, own in paths.items()
     )
 
 
@@ -166,34 +159,29 @@ def _difference(changes: Array, base: Array) -> Interval:
     """95 % bootstrap interval of the difference of two means, with the runs of each resampled."""
     from scipy.stats import bootstrap
 
-    found = bootstrap(
-        (changes, base),
-        lambda a, b, axis: a.mean(axis=axis) - b.mean(axis=axis),
-        vectorized=True,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    )
+    given: Any = {"vectorized": True, "method": "percentile", "rng": np.random.default_rng(0)}
+    found = bootstrap((changes, base), lambda a, b, axis: a.mean(axis=axis) - b.mean(axis=axis), **given)
     low, high = found.confidence_interval
     return float(low), float(high)
 
 
 def table(found: Sequence[Variant], title: str) -> Table:
     """The variants as a table."""
+
+    def between(interval: Interval | None) -> str:
+        return "–" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
+
     headings = ("variant", "runs", "Δσ (%)", "95 %", "loses", "worse in", "mean held")
     rows = [
         (
             each.name,
             str(len(each.changes)),
             f"{each.change:.1f}",
-            _between(each.interval),
-            _between(each.lost),
+            between(each.interval),
+            between(each.lost),
             "–" if each.worse is None else f"{100 * each.worse:.0f} %",
             f"{100 * each.qualified:.0f} %",
         )
         for each in found
     ]
     return Table(title, headings, rows)
-
-
-def _between(interval: Interval | None) -> str:
-    return "–" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
@@ -10,7 +11,7 @@ from pydantic import Field
 from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive, Settings
 
-from .actor import Actor, RecurrentActor
+from .model_file import Actor, RecurrentActor
 
 if TYPE_CHECKING:
     from .cloning import Demonstrations
@@ -26,21 +27,19 @@ MOST_UNITS, MOST_LAYERS = 4096, 16
 """Maximum width and depth of a network: larger ones take minutes per step and learn no more here."""
 Units = Annotated[int, Field(gt=0, le=MOST_UNITS, strict=True)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-
-
-_Count = Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)]
+Kept = Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)]
 
 
 class Cloning(Settings):
     """How an agent is fitted to another policy's actions."""
 
-    steps: _Count = Field(200_000, description="environment steps under the policy, summed over all lanes")
+    steps: Kept = Field(200_000, description="environment steps under the policy, summed over all lanes")
     noise: NonNegative = Field(
         0.1,
         description="rms of the noise added to its actions (-), so that the agent also sees other states",
     )
-    epochs: _Count = Field(20, description="passes over these steps")
-    batch_size: _Count = Field(1024, description="steps in a minibatch")
+    epochs: Kept = Field(20, description="passes over these steps")
+    batch_size: Kept = Field(1024, description="steps in a minibatch")
     learning_rate: Positive = Field(1e-3, description="initial learning rate; it falls to a tenth")
 
 
@@ -71,9 +70,9 @@ class Algorithm(Settings, ABC):
     def actor(self, model: Any) -> Actor:
         """The learner's deterministic policy."""
 
-    @abstractmethod
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
-        """Fit a new learner to a policy's demonstrations."""
+        """Fit a new learner to a policy's demonstrations, unless ``check`` refuses it."""
+        raise NotImplementedError
 
     def check(self, training: Training) -> None:
         """Raise InputError where the hyperparameters do not fit the rest of a training."""
@@ -85,6 +84,12 @@ class Algorithm(Settings, ABC):
         if isinstance(self.learning_rate, tuple):
             return LinearSchedule(*self.learning_rate, end_fraction=1.0)
         return self.learning_rate
+
+    def _arguments(self) -> dict[str, Any]:
+        """Arguments of a learner of Stable-Baselines3 but those that shape its networks."""
+        shaping = {"learning_rate", "net_arch", "activation", "log_std_init"}
+        rate = {"learning_rate": self.learning_rate_schedule(), "device": "cpu"}
+        return self.model_dump(exclude=shaping) | rate
 
     def policy_kwargs(self) -> dict[str, Any]:
         """Arguments that shape the networks, named as in Stable-Baselines3."""
@@ -140,24 +145,8 @@ class PPO(Algorithm):
             return DevicePPO(self, lanes, seed)
         import stable_baselines3
 
-        return stable_baselines3.PPO(
-            "MlpPolicy",
-            lanes,
-            learning_rate=self.learning_rate_schedule(),
-            n_steps=self.n_steps,
-            batch_size=self.batch_size,
-            n_epochs=self.n_epochs,
-            gamma=self.gamma,
-            gae_lambda=self.gae_lambda,
-            clip_range=self.clip_range,
-            ent_coef=self.ent_coef,
-            vf_coef=self.vf_coef,
-            max_grad_norm=self.max_grad_norm,
-            target_kl=self.target_kl,
-            policy_kwargs=self.policy_kwargs() | {"log_std_init": self.log_std_init},
-            seed=seed,
-            device="cpu",
-        )
+        kwargs = self.policy_kwargs() | {"log_std_init": self.log_std_init}
+        return stable_baselines3.PPO("MlpPolicy", lanes, policy_kwargs=kwargs, seed=seed, **self._arguments())
 
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
         """Fit a new learner's actor to a policy's actions, and its critic to the rewards that followed."""
@@ -169,14 +158,16 @@ class PPO(Algorithm):
             return policy.get_distribution(observations).distribution.mean
 
         extractor, values = policy.mlp_extractor, policy.value_net
-        own = [*extractor.policy_net.parameters(), *policy.action_net.parameters()]
-        error = clone(mean, own, examples, cloning)
+        parameters = [*extractor.policy_net.parameters(), *policy.action_net.parameters()]
+        error = clone(mean, parameters, examples, cloning)
         # An untrained critic would mislead the actor in its first updates.
         sums, known = returns(examples, self.gamma)
         if known.any():
             values.bias.data.fill_(float(sums[known].mean()))
-            own = [*extractor.value_net.parameters(), *values.parameters()]
-            regress(policy.predict_values, own, examples.observations[known], sums[known][:, None], cloning)
+            parameters = [*extractor.value_net.parameters(), *values.parameters()]
+            regress(
+                policy.predict_values, parameters, examples.observations[known], sums[known][:, None], cloning
+            )
         return error
 
     def actor(self, model: Any) -> Actor:
@@ -193,9 +184,7 @@ class SAC(Algorithm):
 
     activation: Literal["tanh", "relu"] = Field("relu", description="of the hidden layers")
     gamma: Share = Field(0.97, description="discount of a reward one control step later")
-    buffer_size: Annotated[int, Field(gt=0, le=MOST_KEPT, strict=True)] = Field(
-        200_000, description="maximum number of transitions in the replay buffer"
-    )
+    buffer_size: Kept = Field(200_000, description="maximum number of transitions in the replay buffer")
     learning_starts: Annotated[int, Field(ge=0, le=MOST_KEPT, strict=True)] = Field(
         2_000, description="steps with random actions before learning starts"
     )
@@ -218,22 +207,8 @@ class SAC(Algorithm):
         """Learner for a ``VecEnv``."""
         import stable_baselines3
 
-        return stable_baselines3.SAC(
-            "MlpPolicy",
-            lanes,
-            learning_rate=self.learning_rate_schedule(),
-            buffer_size=self.buffer_size,
-            learning_starts=self.learning_starts,
-            batch_size=self.batch_size,
-            tau=self.tau,
-            gamma=self.gamma,
-            train_freq=self.train_freq,
-            gradient_steps=self.gradient_steps,
-            ent_coef=self.ent_coef,
-            policy_kwargs=self.policy_kwargs(),
-            seed=seed,
-            device="cpu",
-        )
+        kwargs = self.policy_kwargs()
+        return stable_baselines3.SAC("MlpPolicy", lanes, policy_kwargs=kwargs, seed=seed, **self._arguments())
 
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
         """Fit a new learner's actor to a policy's actions, and fill the replay buffer with them.
@@ -242,23 +217,14 @@ class SAC(Algorithm):
         """
         from .cloning import clone
 
-        def mode(observations: Any) -> Any:
-            return model.actor(observations, deterministic=True)
-
-        own = [*model.actor.latent_pi.parameters(), *model.actor.mu.parameters()]
-        error = clone(mode, own, examples, cloning)
+        mode = partial(model.actor, deterministic=True)
+        parameters = [*model.actor.latent_pi.parameters(), *model.actor.mu.parameters()]
+        error = clone(mode, parameters, examples, cloning)
         for step in range(len(examples.rewards)):
-            model.replay_buffer.add(
-                examples.observations[step],
-                examples.following[step],
-                examples.taken[step],
-                examples.rewards[step],
-                examples.ended[step],
-                [
-                    {"TimeLimit.truncated": bool(cut)}
-                    for cut in examples.ended[step] & ~examples.terminated[step]
-                ],
-            )
+            names = ("observations", "following", "taken", "rewards", "ended")
+            cuts = examples.ended[step] & ~examples.terminated[step]
+            infos = [{"TimeLimit.truncated": bool(cut)} for cut in cuts]
+            model.replay_buffer.add(*(getattr(examples, name)[step] for name in names), infos)
         model.learning_starts = 0
         return error
 
@@ -300,15 +266,9 @@ class APG(Algorithm):
     )
     batch_size: Count = Field(16, description="passes in a step of the optimiser, in groups of eight")
 
-    def pulsing(self) -> Any:
-        """How responses are measured, as ``linear_pass`` takes it."""
-        from .linear_pass import Pulsing
-
-        return Pulsing(self.response_steps, self.pulse_spacing)
-
     def make_learner(self, lanes: Any, seed: int) -> Any:
         """Learner that takes its passes from the lanes' environments."""
-        from .apg_learner import APGLearner
+        from .apg import APGLearner
 
         return APGLearner(self, lanes, seed)
 
@@ -320,10 +280,6 @@ class APG(Algorithm):
             )
         if (training.lines, training.episodes_per_line) != (None, 1):
             raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
-
-    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
-        """Never called: ``check`` refuses it."""
-        raise NotImplementedError
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""

@@ -53,11 +53,9 @@ def demonstrate(
             policy.begin(np.flatnonzero(ended))
         made.append((observations, intended, taken, rewards, terminated, ended, following))
         observations = after
-    observed, intended, taken, rewards, ends, cuts, after = (
-        np.array(each) for each in zip(*made, strict=True)
-    )
-    return Demonstrations(
-        observed, intended.astype(np.float32), taken, rewards.astype(np.float32), ends, cuts, after
+    found = Demonstrations(*(np.array(each) for each in zip(*made, strict=True)))
+    return found._replace(
+        intended=found.intended.astype(np.float32), rewards=found.rewards.astype(np.float32)
     )
 
 
@@ -87,7 +85,12 @@ def clone(actor: Any, parameters: list[Any], examples: Demonstrations, cloning: 
     actor: actions, (n, actions), as a differentiable function of observations, (n, entries). parameters:
     torch parameters of the actor.
     """
-    (seen, intended), (unseen, unseen_intended) = _split(examples.observations, examples.intended)
+    # Steps of all lanes, (n, width): the first ones, and the last ones, which are held out of the fit.
+    first = round((1 - HELD_OUT) * len(examples.intended))
+    (seen, unseen), (intended, unseen_intended) = (
+        [part.reshape(-1, part.shape[-1]) for part in (each[:first], each[first:])]
+        for each in (examples.observations, examples.intended)
+    )
     regress(actor, parameters, seen, intended, cloning)
     with torch.no_grad():
         difference = actor(torch.as_tensor(unseen)).numpy() - unseen_intended
@@ -113,13 +116,6 @@ def regress(
             loss.backward()
             optimiser.step()
             decay.step()
-
-
-def _split(*arrays: NDArray[np.float32]) -> list[list[NDArray[np.float32]]]:
-    """Split arrays, (steps, lanes, width), into first steps and held-out ones, each as (n, width)."""
-    first = round((1 - HELD_OUT) * len(arrays[0]))
-    parts = [[each[:first] for each in arrays], [each[first:] for each in arrays]]
-    return [[each.reshape(-1, each.shape[-1]) for each in part] for part in parts]
 
 
 def _rms(values: NDArray[np.float32]) -> float:

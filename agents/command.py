@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
@@ -35,15 +34,14 @@ from panto_env.terminal import (
 
 if TYPE_CHECKING:
     from .evaluation import Pair
-    from .trainings import Outcome
 
 
-PACKAGES = ("torch", "stable_baselines3", "tensorboard")
+Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.")]
 
 
 def check_packages() -> None:
     """Raise InputError, naming them, if packages that a training needs are not installed."""
-    missing = [name for name in PACKAGES if find_spec(name) is None]
+    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if find_spec(name) is None]
     if missing:
         raise InputError(
             f"Training needs {listed(missing)} not installed; install panto-env with its "
@@ -51,20 +49,8 @@ def check_packages() -> None:
         )
 
 
-ROWS = (
-    "mean",
-    "std",
-    "max",
-    "min",
-    "cost_function",
-    "contact_loss",
-    "max_uplift",
-    "effort",
-    "effort_rate",
-)
+ROWS = ["mean", "std", "max", "min", "cost_function", "contact_loss", "max_uplift", "effort", "effort_rate"]
 """Figures that `panto evaluate` prints."""
-SHOWN = (FIRST_SETTLED, FIRST_SETTLED + 1)
-"""Spans in the plot of `panto evaluate`."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
@@ -86,9 +72,8 @@ def train(
 ) -> None:
     """Train a model; the benchmark takes its file as a policy."""
     check_packages()
-    from .run_folder import RunFolder
     from .settings import load_training
-    from .trainings import run_name
+    from .trainings import RunFolder, run_name
 
     training = load_training(config, seed=seed, total_steps=steps, device=device)
     folder = output or Path("runs") / run_name(config, training)
@@ -106,18 +91,20 @@ def train(
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({folder}).")
         raise typer.Exit(130) from error
     report: dict[str, Any] = {"output": str(paths.path), "tensorboard": str(paths.tensorboard)}
-    for name, path in (("model", paths.model), ("best", paths.best)):
+    lines = []
+    for name, label in (("model", "final model"), ("best", "best at an evaluation")):
+        path = getattr(paths, name)
         facts, _ = read_model(path)
         report |= {name: str(path)} | {f"{name}_{key}": getattr(facts, key) for key in REPORTED_FACTS}
+        ratio = facts.ratio
+        change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
+        note = "" if facts.qualified else ", F_m out of range: disqualified"
+        lines.append(f"{label} (step {facts.steps}): {path}: {change}{note}")
     if json:
         print_json(report)
         return
-    for name, label in (("model", "final model"), ("best", "best at an evaluation")):
-        ratio, steps_learnt = report[f"{name}_ratio"], report[f"{name}_steps"]
-        change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
-        note = "" if report[f"{name}_qualified"] else ", F_m out of range: disqualified"
-        console.print(f"{label} (step {steps_learnt}): {report[name]}: {change}{note}", soft_wrap=True)
-    console.print(f"panto evaluate {report['best']}", soft_wrap=True)
+    for line in (*lines, f"panto evaluate {paths.best}"):
+        console.print(line, soft_wrap=True)
 
 
 def export(
@@ -177,7 +164,7 @@ def evaluate(
 
             runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
             title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
-            picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
+            picture = plots.plot_forces(runs, (policy, "passive"), (FIRST_SETTLED, FIRST_SETTLED + 1), title)
             later(plots.save, picture, plot)
         if json:
             ratio, qualified = verdict(pairs)
@@ -209,21 +196,19 @@ def _print_pairs(pairs: list[Pair]) -> None:
         for key in ROWS:
             label = LABELS[key]
             policy, passive = (
-                label.scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
-                for column in ([pair.policy for pair in pairs_here], [pair.passive for pair in pairs_here])
+                label.scale * sum(getattr(getattr(pair, of), key) for pair in pairs_here) / len(pairs_here)
+                for of in ("policy", "passive")
             )
             change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 and math.isfinite(policy) else ""
             first = f"{speed:g}" if key == ROWS[0] else ""
             table.add_row(first, label.heading, number(policy), number(passive), change)
-        ended_early = sum(pair.terminated for pair in pairs_here)
-        passive_too = sum(pair.passive_ending != "" for pair in pairs_here)
-        out_of_range = len(pairs_here) - sum(
-            pair.qualified or pair.terminated or pair.passive_ending != "" for pair in pairs_here
-        )
-        notes = [f"{ended_early} ended early"] * (ended_early > 0)
-        notes += [f"{passive_too} without a policy did"] * (passive_too > 0)
-        notes += [f"{out_of_range} with F_m out of range"] * (out_of_range > 0)
-        if notes:
+        whole = [pair for pair in pairs_here if not (pair.terminated or pair.passive_ending)]
+        counts = {
+            "ended early": sum(pair.terminated for pair in pairs_here),
+            "without a policy did": sum(pair.passive_ending != "" for pair in pairs_here),
+            "with F_m out of range": sum(not pair.qualified for pair in whole),
+        }
+        if notes := [f"{count} {words}" for words, count in counts.items() if count]:
             table.add_row("", f"of {len(pairs_here)} passes, " + ", ".join(notes), "", "", "")
     console.print(table)
 
@@ -242,7 +227,7 @@ def trainings(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue runs that have begun, and begin the others.")
     ] = False,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:
@@ -258,27 +243,20 @@ def trainings(
     make_folder(output)  # now, and not in each worker
     try:
         with counting("trainings") as progress:
-            command = this_command()
-            outcomes = train_all(
-                planned, resume=resume, workers=workers, ray=ray, progress=progress, command=command
-            )
+            given: Any = {"resume": resume, "workers": workers, "ray": ray, "command": this_command()}
+            outcomes = train_all(planned, progress=progress, **given)
     except KeyboardInterrupt as error:
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({output}).")
         raise typer.Exit(130) from error
     if json:
         print_json([asdict(each) for each in outcomes])
         return
-    print_table(_outcome_table(outcomes))
-
-
-def _outcome_table(outcomes: Sequence[Outcome]) -> Table:
-    """Table of the best models, one row per run."""
     rows = []
     for each in outcomes:
         change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"
-        note = "" if each.qualified else "F_m out of range"
-        rows.append((each.best, str(each.best_steps), change, note))
-    return Table("best models", ("model file", "step", "σ to passive", "disqualified"), tuple(rows))
+        rows.append((each.best, str(each.best_steps), change, "" if each.qualified else "F_m out of range"))
+    headings = ("model file", "step", "σ to passive", "disqualified")
+    print_table(Table("best models", headings, tuple(rows)))
 
 
 def ablation(
@@ -287,7 +265,7 @@ def ablation(
         Path | None,
         typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    workers: Workers = None,
     ray: RayAddress = None,
     json: Json = False,
 ) -> None:

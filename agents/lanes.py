@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from threading import get_ident
 from typing import Any
 
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
-from panto_baselines.policies.repetitive import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout
 from panto_env.base.errors import InputError
-from panto_env.control.observation import Context
 from panto_env.envs import IDS, PantographVectorEnv
 from panto_env.envs.settings import Whole
 from panto_env.policies import errors_name, find_policy
@@ -80,9 +79,7 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
             else:  # next-step or no autoreset: ended lanes are reset now, as Stable-Baselines3 expects
                 last, figures = observation, info["figures"]
                 observation, _ = self.env.reset(options={"reset_mask": done})
-            names = [
-                name for name in figures if not name.startswith("_")
-            ]  # "_name" marks lanes that have one
+            names = [name for name in figures if not name.startswith("_")]  # "_name" marks lanes with one
             for lane in np.flatnonzero(done).tolist():
                 own = float(self._returns[lane]), int(self._lengths[lane]), time.time() - self._begun
                 infos[lane] = {
@@ -109,7 +106,7 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The native environment's attribute, repeated for each requested lane."""
-        return [getattr(self.env, attr_name)] * len(self._lanes(indices))
+        return [getattr(self.env, attr_name)] * len(self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused, because lanes share one environment: an attribute cannot be set for some of them only."""
@@ -117,18 +114,11 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method of the native environment once; its result, repeated for each requested lane."""
-        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._lanes(indices))
+        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(self._lanes(indices))
-
-    def _lanes(self, indices: Any) -> Sequence[int]:
-        lanes: Sequence[int] = self._get_indices(indices)
-        return lanes
-
-
-Array = NDArray[np.float64]
+        return [False] * len(self._get_indices(indices))
 
 
 class PolicyLanes:
@@ -145,67 +135,58 @@ class PolicyLanes:
             for lane in lanes.tolist():
                 self._policies[lane].reset(self._native.context(lane))
 
-    def act(self, observations: NDArray[np.float32]) -> Array:
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Actions, (lanes, actions), each in -1..1, for observations, (lanes, entries)."""
         with errors_name(self.name, "act"):
             # Copies: a policy may keep its observation.
             pairs = zip(self._policies, observations.copy(), strict=True)
-            actions: Array = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
+            actions = np.array([policy.act(seen) for policy, seen in pairs], dtype=np.float64)
         return np.clip(actions, -1.0, 1.0)
 
 
-class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]
-    """Lanes in which a base policy acts too: the agent's action is added to the base policy's."""
+class AgentLanes(VecEnvWrapper):  # type: ignore[misc]
+    """Lanes that get an agent's actions, minus their slow averages and added to a base policy's if it has
+    these.
+    """
 
-    def __init__(self, lanes: VecEnv, base: PolicyLanes, share: float) -> None:
-        """share: part of the actuator's force limit that an agent's action of 1 adds."""
+    def __init__(self, lanes: PantographVecEnv, training: Training) -> None:
+        """training: has the base policy, the share of the agent's action, and the washout."""
         super().__init__(lanes)
-        self._base, self._share = base, share
+        self._share, self._base, self._washout = training.residual_share, None, None
+        if training.residual_of is not None:
+            self._base = PolicyLanes(training.residual_of, lanes.env)
+        if training.washout is not None:
+            context, shape = lanes.env.context(0), (lanes.num_envs, *lanes.action_space.shape)
+            self._limit = context.force_limit
+            self._washout = Washout(training.washout, context.control_interval, self._limit, shape)
 
     def reset(self) -> NDArray[np.float32]:
         """Start episodes in all lanes."""
         observations: NDArray[np.float32] = self.venv.reset()
-        self._base.begin(np.arange(self.num_envs))
-        self._actions = self._base.act(observations)
+        if self._washout is not None:
+            self._washout.begin()
+        if self._base is not None:
+            self._base.begin(np.arange(self.num_envs))
+            self._actions = self._base.act(observations)
         return observations
 
-    def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Keep the sum of the base policy's and these actions, (lanes, actions), for ``step_wait``."""
-        self.venv.step_async(added(self._actions, actions, self._share))
+    def step_async(self, actions: NDArray[np.floating]) -> None:
+        """Keep what the lanes get of these actions, (lanes, actions), for ``step_wait``."""
+        if self._washout is not None:
+            actions = self._washout(actions.astype(np.float64) * self._limit) / self._limit
+        if self._base is not None:
+            actions = added(self._actions, actions, self._share)
+        self.venv.step_async(actions)
 
     def step_wait(self) -> Any:
         """Step all lanes: observations, rewards, dones and one info per lane."""
         observations, rewards, dones, infos = self.venv.step_wait()
-        if dones.any():
-            self._base.begin(np.flatnonzero(dones))
-        self._actions = self._base.act(observations)
-        return observations, rewards, dones, infos
-
-
-class WashoutVecEnv(VecEnvWrapper):  # type: ignore[misc]
-    """Lanes that get an agent's actions minus their slow averages."""
-
-    def __init__(self, lanes: VecEnv, context: Context, settings: WashoutSettings) -> None:
-        """context: of any of the lanes."""
-        super().__init__(lanes)
-        self._limit = context.force_limit
-        shape = (lanes.num_envs, *lanes.action_space.shape)
-        self._washout = Washout(settings, context.control_interval, self._limit, shape)
-
-    def reset(self) -> NDArray[np.float32]:
-        """Start episodes in all lanes."""
-        self._washout.begin()
-        observations: NDArray[np.float32] = self.venv.reset()
-        return observations
-
-    def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Keep these actions, (lanes, actions), minus their slow averages for ``step_wait``."""
-        self.venv.step_async(self._washout(actions.astype(np.float64) * self._limit) / self._limit)
-
-    def step_wait(self) -> Any:
-        """Step all lanes: observations, rewards, dones and one info per lane."""
-        observations, rewards, dones, infos = self.venv.step_wait()
-        self._washout.begin(dones)
+        if self._washout is not None:
+            self._washout.begin(dones)
+        if self._base is not None:
+            if dones.any():
+                self._base.begin(np.flatnonzero(dones))
+            self._actions = self._base.act(observations)
         return observations, rewards, dones, infos
 
 
@@ -273,7 +254,7 @@ class SideBySide(VecEnv):  # type: ignore[misc]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(list(self._get_indices(indices)))
+        return [False] * len(self._get_indices(indices))
 
 
 def make_lanes(training: Training) -> Any:
@@ -283,36 +264,30 @@ def make_lanes(training: Training) -> Any:
     arguments are not valid.
     """
     if isinstance(training.hyperparameters, APG):
-        from .pass_lanes import PassLanes
+        from .apg import PassLanes
+        from .linear_pass import Pulsing
 
-        return PassLanes(training, training.hyperparameters.pulsing())
+        settings = training.hyperparameters
+        return PassLanes(training, Pulsing(settings.response_steps, settings.pulse_spacing))
     if training.device is not None:
         from .device_ppo import DeviceLanes
 
         return DeviceLanes(training)
-    parts = [_part(training, changes) for changes in training.variants or ({},)]
+    parts: list[Any] = []
+    for changes in training.variants or ({},):
+        native = gymnasium.make_vec(
+            training.environment["id"],
+            num_envs=training.lanes // max(1, len(training.variants)),
+            lines=training.lines,
+            episodes_per_line=training.episodes_per_line,
+            autoreset_mode="SameStep",
+            **{key: value for key, value in (training.environment | changes).items() if key != "id"},
+        )
+        assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
+        lanes = PantographVecEnv(native)
+        alone = training.residual_of is None and training.washout is None
+        parts.append(lanes if alone else AgentLanes(lanes, training))
     return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
-
-
-def _part(training: Training, changes: Mapping[str, Any]) -> Any:
-    """Lanes of one variant."""
-    arguments = {key: value for key, value in {**training.environment, **changes}.items() if key != "id"}
-    native = gymnasium.make_vec(
-        training.environment["id"],
-        num_envs=training.lanes // max(1, len(training.variants)),
-        lines=training.lines,
-        episodes_per_line=training.episodes_per_line,
-        autoreset_mode="SameStep",
-        **arguments,
-    )
-    assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
-    lanes: Any = PantographVecEnv(native)
-    if training.residual_of is not None:
-        base = PolicyLanes(training.residual_of, native)
-        lanes = ResidualVecEnv(lanes, base, training.residual_share)
-    if training.washout is not None:
-        lanes = WashoutVecEnv(lanes, native.context(0), training.washout)
-    return lanes
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:

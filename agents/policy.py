@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextvars import ContextVar
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,12 @@ from panto_env.base.errors import InputError, shown
 from panto_env.control.observation import OBSERVATION_SETTINGS, Context
 from panto_env.policies import Policy, check_named, find_policy
 
-from .actor import Actor
-from .model_file import Facts, Needs, Step, read_model
+from .model_file import Actor, Facts, Needs, Step, read_model
+
+SETTINGS = (*OBSERVATION_SETTINGS, "washout")
+"""Settings of a task that a policy asks for."""
+PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
+"""Place of the actuator, by the actuators that the actions drive."""
 
 
 def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
@@ -59,12 +62,6 @@ class WashedOut:
         return action
 
 
-PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
-"""Place of the actuator, by the actuators that the actions drive."""
-_loading: ContextVar[tuple[Path, ...]] = ContextVar("_loading", default=())
-"""Model files that are being loaded, each as the base of the one before."""
-
-
 class TrainedPolicy:
     """Deterministic policy of a model file; it runs only in tasks that match its training."""
 
@@ -74,9 +71,8 @@ class TrainedPolicy:
             check_named(facts.residual_of, path)
         self.path, self.facts = path, facts
         self._policy = policy_of(actor, facts)
-        needs = facts.needs
-        for name in (*OBSERVATION_SETTINGS, "washout"):
-            setattr(self, name, getattr(needs, name))
+        for name in SETTINGS:
+            setattr(self, name, getattr(facts.needs, name))
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""
@@ -132,22 +128,12 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 def load(path: str | Path) -> TrainedPolicy:
     """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
-    file = Path(path)
-    outer, own = _loading.get(), file.resolve()
-    if own in outer:
-        raise InputError(
-            f"The model file {path} is, through its base policies, added to itself; take another model file."
-        )
-    token = _loading.set((*outer, own))
-    try:
-        return TrainedPolicy(file, *read_model(file))
-    finally:
-        _loading.reset(token)
+    return TrainedPolicy(Path(path), *read_model(Path(path)))
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
     """First property that differs, and what to do about it; "" if none differs."""
-    for name in (*OBSERVATION_SETTINGS, "washout"):
+    for name in SETTINGS:
         needed, here = getattr(needs, name), getattr(offered, name)
         if needed != here:
             return f"it was trained with {name}={shown(needed)}, this task has {shown(here)}; set it to match"
@@ -167,15 +153,14 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
             f"it was trained with a control_interval of {needs.control_interval:g} s, this task has "
             f"{offered.control_interval:g} s; set control_interval to {needs.control_interval:g}"
         )
+    counted = [
+        f"{len(each.entries)}: " + ", ".join(f"{name} / {scale:g}" for name, _, scale in each.entries)
+        for each in (needs, offered)
+    ]
     return (
-        f"it was trained with other observations ({len(needs.entries)}: {_entries(needs)}) than this "
-        f"task has ({len(offered.entries)}: {_entries(offered)}); use the pantograph of its training "
-        "or train another model"
+        f"it was trained with other observations ({counted[0]}) than this task has ({counted[1]}); use the "
+        "pantograph of its training or train another model"
     )
-
-
-def _entries(needs: Needs) -> str:
-    return ", ".join(f"{name} / {scale:g}" for name, _, scale in needs.entries)
 
 
 class Ensemble:
@@ -187,7 +172,7 @@ class Ensemble:
         if any(member.facts.needs != self.facts.needs for member in members):
             raise ValueError("the members of an ensemble must need the same task")
         self._members = members
-        for name in (*OBSERVATION_SETTINGS, "washout"):
+        for name in SETTINGS:
             setattr(self, name, getattr(self.facts.needs, name))
 
     def reset(self, context: Context) -> None:

@@ -15,10 +15,10 @@ pytest.importorskip("stable_baselines3")
 
 from panto_agents import train
 from panto_agents.model_file import read_model
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, parse_training
-from panto_agents.trainings import plan, train_all
+from panto_agents.trainings import RunFolder, plan, train_all
 from panto_env import InputError
+from panto_env.base.files import alone_in
 
 from ..deadly import deadly
 from ..plugin import on_path
@@ -121,7 +121,7 @@ def test_a_training_killed_while_its_folder_was_made_begins_anew(tmp_path):
 def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
     folder = train.train(settings(total_steps=128), tmp_path / "run", progress=False)
     before = folder.model.read_bytes(), folder.settings.read_text()
-    with folder.alone(), pytest.raises(InputError, match="Another process trains into"):
+    with alone_in(folder.path, "trains into"), pytest.raises(InputError, match="Another process trains into"):
         train.train(settings(), folder.path, resume=True, progress=False)
     assert (folder.model.read_bytes(), folder.settings.read_text()) == before
     train.train(settings(), folder.path, resume=True, progress=False)

@@ -12,9 +12,9 @@ import numpy as np
 
 from panto_agents.ablation import load_ablation
 from panto_agents.model_file import read_model
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER as MODELS
+from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark import actions
 from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import load_benchmark
