@@ -8,9 +8,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from panto_agents.model_file import read_model
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import parse_training
 from panto_agents.stored import FOLDER
+from panto_agents.trainings import RunFolder
 from panto_baselines.dataset.make import LIST, verify
 from panto_baselines.oracle import stored
 from panto_baselines.report.result import read_result

@@ -6,7 +6,7 @@ import pytest
 
 from panto_agents.model_file import read_model
 from panto_agents.policy import load
-from panto_agents.settings import load_training, parse_training
+from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER
 from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark.run import run as benchmark
