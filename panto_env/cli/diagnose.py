@@ -108,7 +108,7 @@ def diagnose(
     with written_last() as later:
         if plot is not None:
             from ..analysis.plots import save
-            from ..diagnosis.plots import plot_diagnosis
+            from ..diagnosis.diagnosis import plot_diagnosis
 
             later(save, plot_diagnosis(found, title), plot)
         if json:

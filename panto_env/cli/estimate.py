@@ -99,8 +99,7 @@ def estimate(
     from ..catalog import load_pantograph
     from ..estimation.estimate import estimate as run
     from ..estimation.model import EstimatorSettings
-    from ..estimation.motion import read_motion
-    from ..estimation.plausibility import rezeroed
+    from ..estimation.motion import read_motion, rezeroed
 
     known = load_pantograph(pantograph)
     metres = None if speed is None else from_kmh(speed)
@@ -139,7 +138,7 @@ def estimate(
             later(write_table, _sheet(found), output)
         if plot is not None:
             from ..analysis.plots import save
-            from ..estimation.plots import plot_estimate
+            from ..estimation.estimate import plot_estimate
 
             title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
             later(save, plot_estimate(found, title, motion.contact_force), plot)

@@ -149,7 +149,7 @@ def fit(
             later(lambda: store(knowledge(found, every), keep))
         if plot is not None:
             from ..analysis.plots import save
-            from ..fitting.plots import plot_fit
+            from ..fitting.tables import plot_fit
 
             later(save, plot_fit(found, f"{every}: {riding.name} on {design.name}"), plot)
         _print(found, json)
@@ -228,7 +228,7 @@ def drift(
             afterwards(write_rows, rows, values)
         if plot is not None:
             from ..analysis.plots import save
-            from ..fitting.plots import plot_drift
+            from ..fitting.tables import plot_drift
 
             afterwards(save, plot_drift(found, f"Changes from {earlier.name} to {later.name}"), plot)
         if json:

@@ -111,7 +111,7 @@ def identify(
             )
             later(write, chosen, output)
         if plot is not None and chosen is not None:
-            from ..identification.plots import plot_matches
+            from ..identification.performance import plot_matches
 
             title = f"{file.name}, model by {chosen.method}"
             first, last = float(record.time[0]), float(record.time[-1])

@@ -135,7 +135,7 @@ def record(
 
             later(save, plot_record(found, title), plot)
         if html is not None:
-            from ..records.page import save_record_page
+            from ..records.plots import save_record_page
 
             later(partial(save_record_page, found, title), html)
         if json:
@@ -198,7 +198,7 @@ def compare(
 
             later(save, plot_comparison(found, title), plot)
         if html is not None:
-            from ..records.page import save_comparison_page
+            from ..records.plots import save_comparison_page
 
             later(partial(save_comparison_page, found, title), html)
         if json:

@@ -39,7 +39,6 @@ HEAD, SUPPORT, HEAD_SPEED, SUPPORT_SPEED, PLATE = range(5)
 
 
 def _range(field: str) -> tuple[float, float]:
-    """Lowest and highest value that a pantograph may have."""
     (between,) = set(ranges_of(PantographData.model_fields[field].rebuild_annotation()))
     return between.low, between.high
 

@@ -1,4 +1,4 @@
-"""What an odometer says of a train: where it was reset, where the train stands or runs back, even steps."""
+"""Time and place of samples: what an odometer says, where a run is cut, and its pieces of even steps."""
 
 from __future__ import annotations
 
@@ -279,13 +279,11 @@ def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part
 
 
 def _between(reason: str, axes: Axes, where: NDArray[np.bool_]) -> Break:
-    """Breaks between a sample and the next, (n - 1,)."""
     first = int(np.argmax(where)) if where.size else 0
     return Break(reason, int(where.sum()), float(axes.position[first]), float(axes.time[first]))
 
 
 def _stretches(reason: str, axes: Axes, where: NDArray[np.bool_]) -> Break:
-    """Stretches of samples, (n,), that are left out."""
     begins = np.flatnonzero(where & ~np.concatenate([[False], where[:-1]]))
     first = int(begins[0]) if begins.size else 0
     return Break(reason, len(begins), float(axes.position[first]), float(axes.time[first]))

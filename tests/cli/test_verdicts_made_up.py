@@ -61,7 +61,9 @@ def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
         "panto_env.diagnosis.diagnosis.findings_table", lambda found: Table("where", ("m",), (("93",),))
     )
     titles = []
-    monkeypatch.setattr("panto_env.diagnosis.plots.plot_diagnosis", lambda found, title: titles.append(title))
+    monkeypatch.setattr(
+        "panto_env.diagnosis.diagnosis.plot_diagnosis", lambda found, title: titles.append(title)
+    )
     monkeypatch.setattr("panto_env.analysis.plots.save", lambda plot, path: None)
     assert "where" not in done.stdout
     found.findings = (SimpleNamespace(begin=93.0),)

@@ -16,8 +16,11 @@ from panto_env.diagnosis import diagnose
 from panto_env.diagnosis.diagnosis import judge
 from panto_env.diagnosis.features import (
     KINDS,
+    LONG,
     OFFSETS,
+    SHORT,
     TRAINED,
+    WORN,
     Classifier,
     Evidence,
     Sort,
@@ -31,25 +34,33 @@ from panto_env.diagnosis.features import (
 from panto_env.diagnosis.healthy import FLOOR, Healthy, _whiten
 from panto_env.diagnosis.passes import Passes, side_by_side
 from panto_env.diagnosis.training import (
+    BEYOND,
     BROKEN,
+    FIRST,
     NEAR,
+    SEVERITIES,
+    SPANS,
     TENSION,
     Defect,
     Track,
     draw_defect,
     drive,
+    every_defect,
     examples,
     fit,
     save,
 )
 from panto_env.plant.alignment import Alignment
+from panto_env.plant.line_condition import LineCondition
 from panto_env.studies.paper2.diagnosis_tables import within_interval
 from panto_env.terminal import console
 
-SPAN, PER_SPAN, SPANS = 60.0, 120, 40
+from .conftest import TRACK
+
+SPAN, PER_SPAN, COUNT = 60.0, 120, 40
 
 
-def made_up(count, random, spans=SPANS):
+def made_up(count, random, spans=COUNT):
     """Passes over a line that differ by one pattern and by coloured noise whose size goes with the span."""
     x = np.arange(spans * PER_SPAN) * SPAN / PER_SPAN
     mean, pattern = 100 + 20 * np.cos(2 * np.pi * x / SPAN), 8 * np.sin(2 * np.pi * x / 37)
@@ -101,7 +112,7 @@ def test_threshold_has_the_false_alarms_that_it_is_asked_for(rate):
     """Scores whose spans' largest are Gumbel's in the logarithm, on lines that it has not seen."""
     random = np.random.default_rng(0)
     shape = np.exp(-np.linspace(0, 8, PER_SPAN))
-    largest = np.exp(random.gumbel(0.5, 0.3, (400, SPANS)))
+    largest = np.exp(random.gumbel(0.5, 0.3, (400, COUNT)))
     seen = (largest[:20, :, None] * shape).reshape(20, -1)
     level = threshold(seen, PER_SPAN, SPAN, rate)
     measured = (largest[20:] > level).sum() / (largest[20:].size * SPAN / 1e3)
@@ -206,7 +217,7 @@ def evidence_of(score, rest=None):
     rest = np.sin(x) if rest is None else rest
     droppers = np.add.outer(np.arange(12) * SPAN, [5, 17, 30, 43, 55]).ravel()
     return Evidence(
-        x, rest, np.asarray(score, dtype=float), 5.0, Alignment.equal(SPAN, SPANS), droppers, 70.0, 120.0, 2.0
+        x, rest, np.asarray(score, dtype=float), 5.0, Alignment.equal(SPAN, COUNT), droppers, 70.0, 120.0, 2.0
     )
 
 
@@ -267,12 +278,34 @@ def test_an_interval_reaches_to_the_next_droppers():
     assert not within_interval(42.0, 55.0, droppers)
 
 
-TRACK = Track("en50318-2002", "dsa250", 220.0, seed=31)
+UNEVEN = Track("en50318-2002", "dsa380", 200.0, 1, 0.0)
+MOST = {SHORT: 0.02, LONG: 0.01, WORN: 0.3, TENSION: 0.2, "hard spot": 10.0}
 
 
-@pytest.fixture(scope="module")
-def healthy_runs():
-    return [drive(TRACK, k) for k in range(12)]
+@pytest.mark.parametrize("kind", SEVERITIES)
+def test_severities_rise_by_little_and_each_can_be_simulated(kind):
+    each = SEVERITIES[kind]
+    steps = np.array(each[1:]) / np.array(each[:-1])
+    assert ((steps > 1.0) & (steps <= 2.5)).all()
+    assert each[-1] <= MOST.get(kind, 1.0 if kind == BROKEN else 0.1 if each[-1] < 1 else 10.0)
+    for severity in each:
+        for span in (FIRST, BEYOND - 1):
+            made = draw_defect(UNEVEN, kind, severity, span, np.random.default_rng(0))
+            assert (made.kind, made.severity) == (kind, severity)
+            LineCondition(**made.condition)
+            begin, end = (UNEVEN.data.alignment().support(each) for each in (span - 1, span))
+            assert np.isnan(made.position) if kind == TENSION else begin <= made.position <= end + 10.0
+
+
+@pytest.mark.parametrize(("given", "broken"), [((), 1), ((1,), 1), ((8,), 8)])
+def test_there_is_one_of_each_severity_and_as_many_broken_droppers_as_wanted(given, broken):
+    defects = every_defect(UNEVEN, np.random.default_rng(0), *given)
+    assert sum(defect.kind == BROKEN for defect in defects) == broken
+    others = [(defect.kind, defect.severity) for defect in defects if defect.kind != BROKEN]
+    assert others == [
+        (kind, each) for kind, several in SEVERITIES.items() if kind != BROKEN for each in several
+    ]
+    assert FIRST < BEYOND < SPANS
 
 
 @pytest.fixture(scope="module")

@@ -11,17 +11,14 @@ from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose, estimated_force
 from panto_env.diagnosis.passes import ESTIMATOR, RATE, known_pantograph
-from panto_env.diagnosis.training import Track, drive
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
 from panto_env.metrics.low_pass import zero_phase_low_pass
 
-TRACK = Track("en50318-2002", "dsa250", 220.0, seed=32)
-
 
 @pytest.fixture(scope="module")
-def runs():
-    return [drive(TRACK, k) for k in range(4)]
+def runs(healthy_runs):
+    return healthy_runs[:4]
 
 
 def error_of(run, seed=0, pantograph=None):
@@ -109,7 +106,7 @@ REFUSED = {
     ),
     "position in km": (
         lambda r: replace(r, position=r.position / 1e3),
-        r"positions go at 0.2195 km/h in the mean, not evenly at the 219.5 km/h that it states",
+        r"positions go at {slow:.4g} km/h in the mean, not evenly at the {speed:.4g} km/h that it states",
     ),
     "position slips": (
         lambda r: replace(r, position=r.position + 20.0 * (r.time > 9)),
@@ -140,6 +137,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_runs_that_no_force_can_be_estimated_from_are_refused(runs, case):
     spoil, message = REFUSED[case]
+    message = message.format(slow=runs[0].speed_kmh / 1e3, speed=runs[0].speed_kmh)
     with pytest.raises(InputError, match=f"^Run 1: .*{message}") as refused:
         diagnose([spoil(runs[0])], runs[1:])
     told = str(refused.value)
@@ -157,7 +155,7 @@ def test_a_run_shorter_than_a_span_says_how_far_to_run(runs):
         name: getattr(runs[0], name)[:400]
         for name in ("time", "position", "contact_force", "head", "frame", "frame_force", "head_force")
     }
-    with pytest.raises(InputError, match=r"ends at 48.79 m, .* run 610 m or more"):
+    with pytest.raises(InputError, match=rf"ends at {cut['position'][-1]:.4g} m, .* run 610 m or more"):
         diagnose([replace(runs[0], **cut)], runs[1:])
 
 

@@ -8,7 +8,7 @@ from scipy.stats import chi2, kstest, multivariate_normal, norm
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
-from panto_env.estimation.innovations import consistency, log_likelihood, nis, normalise, whiteness
+from panto_env.estimation.innovations import consistency, log_likelihood, nis, whiteness
 from panto_env.estimation.kalman import (
     Gains,
     force_variance,
@@ -191,22 +191,6 @@ def test_a_true_model_passes_and_wrong_ones_fail():
     assert wrong.nis > 1.2
 
 
-def test_whiteness_is_that_of_numbers_whose_correlation_is_known():
-    random = np.random.default_rng(3)
-    white = random.standard_normal((20_000, 2))
-    assert abs(whiteness(white).largest) < whiteness(white).bound
-    coloured = white.copy()
-    for k in range(1, len(coloured)):
-        coloured[k, 1] += 0.3 * coloured[k - 1, 1]
-    found = whiteness(coloured)
-    assert found.largest == pytest.approx(0.3, abs=0.03)
-    assert found.probability < 1e-9
-    refused = [
-        abs(whiteness(each).largest) > whiteness(each).bound for each in random.standard_normal((300, 800, 2))
-    ]
-    assert np.mean(refused) < 0.04  # 1 % are refused, though all are white
-
-
 def test_whiteness_is_ljung_and_box_s_sum_term_by_term():
     """Of so few samples that each factor counts: n (n + 2) / (n - lag), and the number of quantities."""
     values = np.random.default_rng(0).standard_normal((60, 2))
@@ -233,20 +217,8 @@ def test_the_size_of_innovations_is_judged_piece_by_piece():
     assert found.nis == pytest.approx(2.0)
 
 
-def test_normalised_innovations_are_independent():
-    model = built(step=1e-3)
-    measured, _ = simulated(model, 20_000, 8)
-    filtered = run_filter(model, steady_gains(model), measured, np.zeros((20_000, 2)), np.zeros(6))
-    np.testing.assert_allclose(np.cov(normalise(filtered)[1000:].T), np.eye(4), atol=0.05)
-
-
 def test_what_has_no_steady_gain_is_told():
     model = built()
     blind = model._replace(observed=0 * model.observed)
     with pytest.raises(InputError, match="no steady gain"):
         steady_gain(*blind.linear)
-
-
-def test_gains_of_samples_beyond_the_last_are_the_last():
-    gains = time_varying_gains(built(), 5)
-    np.testing.assert_array_equal(gains.of(np.array([4, 5, 900])).gain, gains.gain[[4, 4, 4]])

@@ -6,10 +6,9 @@ from threadpoolctl import threadpool_limits
 
 from panto_env.base.machine import CAN_CHOOSE_CORES, on_cores
 from panto_env.fitting.fit import fit
-from panto_env.fitting.plots import plot_fit
 from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import STEPS
-from panto_env.fitting.tables import parts_table, plain
+from panto_env.fitting.tables import parts_table, plain, plot_fit
 from panto_env.fitting.values import TOLERANCES
 
 from .test_problem import moved

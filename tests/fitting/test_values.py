@@ -77,18 +77,6 @@ def test_tolerances(plan):
     assert own["sine of waves of 5 m"] == WAVES[1][1] / np.sqrt(2)
 
 
-def test_the_design_is_the_variant_of_zeros(plan):
-    values = everything(plan)
-    variant = values.variant(np.zeros(len(values)), 70.0)
-    assert variant.catenary == plan.catenary
-    assert variant.pantograph == plan.pantograph
-    assert variant.static_force == 70.0
-    assert variant.line.tensions == (1.0, 1.0)
-    assert not variant.line.scatter.any()
-    assert not variant.line.heights.any()
-    assert not variant.line.waves[:, 0].any()
-
-
 def test_a_variant_has_each_value_in_its_place(plan):
     values = everything(plan)
 
@@ -106,8 +94,10 @@ def test_a_variant_has_each_value_in_its_place(plan):
     masses = variant("masses 2 of the pantograph", 0.1).pantograph.masses
     assert masses == pytest.approx((7.12, 6.6, 5.8))
     assert variant("stiffnesses 1 of the pantograph", -0.1).pantograph.stiffnesses[0] == pytest.approx(8487)
-    for name in ("masses 2 of the pantograph", "damping beta"):
-        assert not variant(name, 0.1).line.scatter.any()
+    bare = values.variant(np.zeros(len(values)), 70.0)
+    assert (bare.catenary, bare.pantograph, bare.static_force) == (plan.catenary, plan.pantograph, 70.0)
+    assert bare.line.tensions == (1.0, 1.0)
+    assert not any(each.any() for each in (bare.line.scatter, bare.line.heights, bare.line.waves[:, 0]))
 
 
 def test_waves_have_their_cosine_and_sine_parts(plan):
@@ -128,16 +118,6 @@ def test_waves_are_those_of_a_line_as_built(plan):
     amplitudes, turns, _ = drawn.waves.T
     np.testing.assert_allclose(WAVES, np.stack([1 / turns, amplitudes], axis=1))
     assert everything(plan).variant(np.zeros(len(everything(plan))), 70.0).line.waves.shape == (4, 3)
-
-
-def test_but_for_damping_usual_values_leave_line_and_pantograph_as_they_are(plan):
-    """So one plant serves all variants that share their damping."""
-    values = Values(plan, USUAL, (0.0, 900.0))
-    differences = values.tolerances.copy()
-    differences[values.of_kind("damping")] = 0.0
-    variant = values.variant(differences, 70.0)
-    assert variant.catenary is plan.catenary
-    assert variant.pantograph is plan.pantograph
 
 
 def test_damping_comes_first_of_what_acts_everywhere(plan):

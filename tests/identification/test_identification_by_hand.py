@@ -1,5 +1,7 @@
 """What the identification says beside its values, worked out another way, and every bound of a record."""
 
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,14 +10,13 @@ from scipy.stats import norm
 
 from panto_env import InputError
 from panto_env.analysis.pool import one_by_one
-from panto_env.catalog import load_pantograph
 from panto_env.identification import (
     EXPERIMENTS,
     FILTERED,
     FREQUENCY_SWEEP,
     IDENTIFIED,
-    MEASURED,
     OUTPUT_ERROR,
+    PRINTED,
     Fit,
     Identification,
     Match,
@@ -24,23 +25,27 @@ from panto_env.identification import (
     band_limited,
     clean_record,
     equations,
+    excited_band,
     fit_equation_error,
-    parameters_of,
+    fit_output_error,
+    identify,
     run_trials,
     write_pantograph,
+    write_record,
 )
 from panto_env.identification import experiments as coverage
 from panto_env.identification.methods import Misfit, solve
-from panto_env.identification.plausibility import _check_time, check_record
+from panto_env.identification.record import _check_time, check_record
 
-from ..command import panto
-from .test_identification_files import MEASURED as MEASURED_WORDS
-from .test_identification_files import sweep as sweep
+from ..command import panto as command
+from .test_identification import ALL, KNOWN, TRUE, TRUTH, name_of
 
-TRUTH = parameters_of(load_pantograph("identified-2dof"))
-KNOWN = {name: TRUTH[name] for name in MEASURED}
-TRUE = np.array([TRUTH[name] for name in IDENTIFIED])
-RECORD = add_noise(clean_record(FREQUENCY_SWEEP, TRUTH, duration=5.0), np.random.default_rng(0))
+
+def noisy(excitation, duration=20.0):
+    return add_noise(clean_record(excitation, TRUTH, duration=duration), np.random.default_rng(0))
+
+
+RECORD = noisy(FREQUENCY_SWEEP)
 
 
 @pytest.mark.parametrize("free_offset", [False, True])
@@ -173,27 +178,6 @@ def test_a_model_must_explain_the_displacements_that_it_was_identified_from(
     assert path.exists() == (driven_by == "force" or channel == "force" or share > 0.5)
 
 
-def identified():
-    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, TRUE, 0.01 * TRUE, 10.0, 10.0)
-    return Identification(4.0, {OUTPUT_ERROR: fit}, {})
-
-
-@pytest.mark.parametrize("options", [[], ["--plot", "a.png"], ["--output", "a.toml"]])
-def test_a_model_that_cannot_be_simulated_is_said_unless_a_file_needs_it(
-    options, sweep, monkeypatch, tmp_path
-):
-    def unstable(*_):
-        raise InputError("The model is not stable.")
-
-    found = identified()
-    monkeypatch.setattr("panto_env.identification.identify", lambda *_, **__: found)
-    monkeypatch.setattr("panto_env.identification.matches", unstable)
-    done = panto("identify", sweep, *MEASURED_WORDS, *options, cwd=tmp_path)
-    assert done.returncode == (2 if options else 0)
-    assert "The model is not stable." in (done.stderr if options else done.stdout)
-    assert list(tmp_path.iterdir()) == []
-
-
 def made(n=2000, step=1e-3, plate=2e-3, head=1.8e-3, support=1.5e-3, force=1.0, **other):
     """A record of a sine, swings in m from end to end; head_with, support_with: correlations."""
     angle = 2 * np.pi * other.get("periods", 1) * np.arange(n) / n
@@ -260,3 +244,97 @@ def test_two_million_samples_are_the_most():
     _check_time(SimpleNamespace(plate=range(2_000_000), time_step=1e-3))
     with pytest.raises(InputError, match="2,000,000 at most"):
         _check_time(SimpleNamespace(plate=range(2_000_001), time_step=1e-3))
+
+
+@pytest.mark.parametrize("excitation", ALL, ids=name_of)
+def test_records_of_the_rig_pass(excitation):
+    check_record(noisy(excitation), KNOWN)
+    check_record(replace(noisy(excitation), force=None), KNOWN)
+
+
+def test_a_fit_of_what_is_no_motion_of_such_a_model_ends():
+    """Time in s read as ms: the motion is a thousand times as quick as any such pantograph's."""
+    record = replace(RECORD, time_step=1e-3 * RECORD.time_step)
+    with pytest.raises(InputError, match=r"output-error fit (diverges|does not settle)"):
+        fit_output_error(record, KNOWN, band=excited_band(record))
+
+
+@pytest.fixture
+def panto(tmp_path):
+    """A function that runs `panto identify` on a record, and gives its status and all that it said."""
+
+    def run(record, *arguments):
+        write_record(record, tmp_path / "rig.csv")
+        done = command(
+            "identify", "rig.csv", "--measured", "k1T=32992 m2=5 k2=14544", *arguments, cwd=tmp_path
+        )
+        assert done.returncode in (0, 2)
+        assert done.returncode == 0 or sorted(tmp_path.iterdir()) == [tmp_path / "rig.csv"]
+        return done.returncode, done.stdout + " ".join(done.stderr.split())
+
+    return run
+
+
+@pytest.mark.parametrize("options", [(), ("--plot", "a.png"), ("--output", "a.toml")])
+def test_a_model_that_cannot_be_simulated_is_said_unless_a_file_needs_it(options, panto, monkeypatch):
+    def unstable(*_):
+        raise InputError("The model is not stable.")
+
+    fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, TRUE, 0.01 * TRUE, 10.0, 10.0)
+    found = Identification(4.0, {OUTPUT_ERROR: fit}, {})
+    monkeypatch.setattr("panto_env.identification.identify", lambda *_, **__: found)
+    monkeypatch.setattr("panto_env.identification.matches", unstable)
+    status, said = panto(RECORD, *options)
+    assert status == (2 if options else 0)
+    assert "The model is not stable." in said
+
+
+def test_what_a_record_cannot_determine_is_marked_and_said(panto):
+    """One sine cannot tell the spring from the mass."""
+    sine = noisy(EXPERIMENTS[0])
+    found = identify(sine, KNOWN)
+    assert set(found.fits[PRINTED].impossible) == {"c1T", "c2", "m3"}  # a frame of 0.1 kg, negative dampers
+    assert found.fits[OUTPUT_ERROR].impossible == ()
+    told = json.loads(panto(sine, "--json")[1].partition("\n}")[0] + "\n}")
+    assert set(told["fits"]["equation-error"]["impossible"]) == {"c1T", "c2", "m3"}
+    _, shown = panto(sine, "--free-offset")
+    for words in ("impossible: -", "no pantograph has that", "k3 not determined, the 95 % interval holds 0"):
+        assert words in " ".join(shown.split())
+
+
+def test_a_method_that_finds_nothing_hides_no_other_unless_its_fit_is_wanted(panto, monkeypatch):
+    failing = identify(RECORD, KNOWN)
+    del failing.fits[OUTPUT_ERROR]
+    failing.failures[OUTPUT_ERROR] = "it does not settle."
+    monkeypatch.setattr("panto_env.identification.identify", lambda *_, **__: failing)
+    assert "low-passed" in panto(RECORD)[1]
+    for arguments in (("--output", "mine.toml"), ()):
+        status, said = panto(RECORD, *arguments)
+        assert status == 2
+        assert "Output error: it does not settle" in said
+        failing.fits.clear()
+
+
+OTHER = replace(
+    RECORD,
+    support=0.05
+    + 0.5e-3 * np.sin(2 * np.pi * 0.77 * RECORD.time + 1.0)
+    + 0.5e-3 * np.sin(2 * np.pi * 3.1 * RECORD.time),
+)
+"""With the frame of another rig: its motion has nothing to do with this plate's."""
+
+
+@pytest.mark.parametrize(
+    ("record", "arguments", "message"),
+    [
+        (OTHER, ("--output", "mine.toml", "--method", "low-passed"), "so none is written"),
+        (RECORD, ("--measured", "m2=6"), "m2 is given twice, as 5 and as 6"),
+        (RECORD, ("--output", "a.toml", "--static-force", "-5"), "must be a number from 0 to 1000 N"),
+        (RECORD, ("--band", "nan"), "The band must be a frequency above 0 Hz"),
+        (RECORD, ("--band", "0"), "The band must be a frequency above 0 Hz"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(record, arguments, message, panto):
+    status, said = panto(record, *arguments)
+    assert status == 2
+    assert message in said

@@ -129,7 +129,6 @@ def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
     [
         ["--measured", "k1T=32992", "--measured", "m2=5", "--measured", "k2=14544"],
         ["--measured", "k1T=32992, m2=5 k2=14544"],
-        MEASURED,
     ],
 )
 def test_measured_values_in_three_spellings_print_one_table(measured, sweep):

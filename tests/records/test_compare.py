@@ -175,12 +175,6 @@ def test_another_line_is_not_accepted(record, other_run):
     assert "another line" in found.notes[-1]
 
 
-def test_forces_that_hardly_resemble_each_other(run, record):
-    noise = 130 + 30 * np.random.default_rng(0).standard_normal(len(record.longest.force))
-    (note,) = compare(changed(record, force=lambda _: noise), run).notes
-    assert note.startswith("Record and run hardly resemble each other (correlation 0.")
-
-
 def test_a_run_that_is_too_short(record, run):
     short = replace(run, terminated=True, ending="It left its range.")
     with pytest.raises(InputError, match="It left its range"):
