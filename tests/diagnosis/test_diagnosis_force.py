@@ -112,21 +112,7 @@ REFUSED = {
         lambda r: replace(r, position=r.position + 20.0 * (r.time > 9)),
         "not evenly at the",
     ),
-    "head is no number": (
-        lambda r: with_value(r, "head", slice(6000, 6100), np.nan),
-        "Column head holds no number at 12.00",
-    ),
-    "no displacements": (lambda r: replace(r, frame=0 * r.frame), "Column frame stays at one value .* dead"),
     "dead": (lambda r: with_value(r, "head", slice(6000, 6100), 0.03), "Column head stays .* dead"),
-    "saturated": (
-        lambda r: replace(r, head=np.minimum(r.head, np.quantile(r.head, 0.5))),
-        "Column head stays .* saturated",
-    ),
-    "mm for m": (
-        lambda r: replace(r, frame=1e3 * r.frame),
-        "Column frame holds heights of .* mm in a column",
-    ),
-    "another zero": (lambda r: replace(r, head=r.head + 0.3), "heights seem to count from another zero"),
     "pantograph is not known": (
         lambda r: unknown(r),
         "not hold the masses and springs of its pantograph 'mine', .* its TOML file with --pantograph",

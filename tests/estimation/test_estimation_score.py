@@ -118,10 +118,8 @@ def test_an_unknown_input_is_found_whatever_it_does(driven):
     assert np.abs(found - middle)[100:].max() < 0.5
 
 
-def test_settings_of_an_unknown_input_are_those_given_or_the_usual_ones(driven):
+def test_an_unknown_input_needs_what_its_settings_observe(driven):
     motion, pantograph = driven
-    usual = unknown_input(motion, pantograph)
-    np.testing.assert_array_equal(usual, unknown_input(motion, pantograph, EstimatorSettings()))
     bare = dataclasses.replace(motion, head_velocity=None, frame_velocity=None)
     unknown_input(bare, pantograph, EstimatorSettings(observation="displacements"))
     with pytest.raises(InputError, match="no velocities"):

@@ -42,15 +42,9 @@ def test_names_and_places(plan):
     assert by_name["tension of the messenger wire"].place is None
     # The DSA 380's upper dampers are 0, so no share of them can be found.
     assert {name for name in by_name if name.startswith("dampings")} == {"dampings 3 of the pantograph"}
+    along = {value.name: value.index for value in everything(replace(plan, first_span=40)).all}
+    assert (along["dropper 4 of span 52"], along["support 53"]) == ((11 * 9 + 3,), (12,))
     assert [value.kind for value in values.all] == sorted((v.kind for v in values.all), key=FREE.index)
-
-
-def test_names_count_along_the_whole_line(plan):
-    values = everything(replace(plan, first_span=40))
-    names = {value.name: value.index for value in values.all}
-    assert names["dropper 4 of span 52"] == (11 * 9 + 3,)
-    assert names["support 53"] == (12,)
-    assert "dropper 4 of span 12" not in names
 
 
 def test_only_those_within_the_stretch_are_freed(plan):

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from panto_env import InputError
-from panto_env.analysis.pool import one_by_one
+from panto_env.catalog import load_pantograph
 from panto_env.identification import (
     EXPERIMENTS,
     FILTERED,
@@ -29,19 +29,17 @@ from panto_env.identification import (
     fit_equation_error,
     fit_output_error,
     identify,
-    run_trials,
     write_pantograph,
     write_record,
 )
-from panto_env.identification import experiments as coverage
-from panto_env.identification.methods import Misfit, solve
+from panto_env.identification.methods import solve
 from panto_env.identification.record import _check_time, check_record
 
 from ..command import panto as command
 from .test_identification import ALL, KNOWN, TRUE, TRUTH, name_of
 
 
-def noisy(excitation, duration=20.0):
+def noisy(excitation, duration=10.0):
     return add_noise(clean_record(excitation, TRUTH, duration=duration), np.random.default_rng(0))
 
 
@@ -93,16 +91,6 @@ def test_an_interval_holds_95_per_cent_and_says_whether_0_is_in_it():
     assert (told["value"], told["low"], told["high"]) == (-2.0, low[1], high[1])
 
 
-@pytest.mark.parametrize("band", [0.5, 1.5, 4.0, 10.0, 60.0])
-def test_the_model_is_simulated_with_200_samples_per_period_of_the_band_or_all_there_are(band):
-    record = clean_record(EXPERIMENTS[0], TRUTH, duration=2.0)
-    misfit = Misfit(record, KNOWN, dict(zip(IDENTIFIED, TRUE, strict=True)), 0.1, band, False)
-    thin = round(misfit.time_step / record.time_step)
-    assert thin == 1 or 1 / (band * misfit.time_step) >= 200
-    assert 1 / (band * (thin + 1) * record.time_step) < 200
-    assert misfit.target.shape[0] == len(record.head[::thin][misfit.rows])
-
-
 def test_a_band_is_limited_around_its_middle_and_keeps_the_time_of_its_samples():
     """A cosine at the band's edge comes out as it went in, sample for sample; one of thrice that is gone."""
     time = 1e-3 * np.arange(6000)
@@ -119,63 +107,29 @@ def test_a_band_is_limited_around_its_middle_and_keeps_the_time_of_its_samples()
     assert stride == 166  # 1,000 samples a second over six per second, of noise up to 3 Hz
 
 
-def test_trials_count_in_which_the_truth_lies_inside_the_interval(monkeypatch):
-    """Records by seed, in their order; a method that finds nothing misses."""
-    seen, excitation = [], EXPERIMENTS[0]
-    monkeypatch.setattr(coverage, "in_processes", lambda jobs, progress: one_by_one(jobs, progress=progress))
-    monkeypatch.setattr(coverage, "TRIALS_PER_JOB", 2)
-    off = np.array([[0, 3, -3, 1, -1], [1.9, 2, -1.9, -2, 0], [0.0] * 5, [9, 9, 9, 9, 0], [-9, 0, 0, 0, 9]])
-
-    def fake(record, known, *, free_offset):
-        number = len(seen) % 5
-        seen.append((record, known, free_offset))
-        fit = Fit("one", KNOWN, IDENTIFIED, TRUE + 0.1 * off[number], np.full(5, 0.1), 1.0, 1.0)
-        return Identification(1.0, {"one": fit}, {"other": "it found nothing"})
-
-    monkeypatch.setattr(coverage, "identify", fake)
-    done = []
-    first, second = run_trials(
-        [(excitation, True), (EXPERIMENTS[1], False)], TRUTH, 5, progress=lambda *n: done.append(n)
-    )
-    assert [free for *_, free in seen] == [True] * 5 + [False] * 5
-    assert done[-1] == (6, 6)
-    for seed, (record, known, _) in enumerate(seen[:5]):
-        wanted = add_noise(clean_record(excitation, TRUTH), np.random.default_rng(seed))
-        np.testing.assert_array_equal(record.head, wanted.head)
-        assert known == KNOWN
-    for trials in (first, second):
-        np.testing.assert_allclose(trials["one"].values, TRUE + 0.1 * off)
-        np.testing.assert_allclose(trials["one"].std, 0.1)
-        np.testing.assert_allclose(trials["one"].coverage, 20 * (np.abs(off) < 1.96).sum(axis=0))
-        assert np.isnan(trials["other"].values).all()
-        assert np.isnan(trials["other"].std).all()
-        np.testing.assert_array_equal(trials["other"].coverage, 0.0)
-
-
 WRITTEN = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
 
 
-@pytest.mark.parametrize("driven_by", ["plate", "force"])
-@pytest.mark.parametrize("channel", ["y_p2", "y_p3", "force"])
-@pytest.mark.parametrize("share", [0.49, 0.51])
-def test_a_model_must_explain_the_displacements_that_it_was_identified_from(
-    driven_by, channel, share, tmp_path
-):
+@pytest.mark.parametrize("channel", ["y_p2", "y_p3"])
+def test_a_model_must_explain_the_displacements_that_it_was_identified_from(channel, tmp_path):
     """By half or more; what the force drives, and the force itself, are not what was fitted."""
     fit = Fit(OUTPUT_ERROR, KNOWN, IDENTIFIED, TRUE, 0.01 * TRUE, 10.0, 10.0)
     recorded = np.sin(np.arange(100.0))
     recorded -= recorded.mean()
-    matches = [
-        Match("y_p2", "plate", recorded, recorded),
-        Match(channel, driven_by, recorded, share * recorded),
-    ]
     path = tmp_path / "mine.toml"
-    if driven_by == "plate" and channel != "force" and share < 0.5:
-        with pytest.raises(InputError, match=f"does not explain the motion of {channel} "):
-            write_pantograph(fit, path, matches=matches, **WRITTEN)
-    else:
-        write_pantograph(fit, path, matches=matches, **WRITTEN)
-    assert path.exists() == (driven_by == "force" or channel == "force" or share > 0.5)
+
+    def write(channel, driven_by, share):
+        matches = [Match("y_p2", "plate", recorded, recorded)]
+        matches.append(Match(channel, driven_by, recorded, share * recorded))
+        told = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
+        write_pantograph(fit, path, matches=matches, **told)
+
+    with pytest.raises(InputError, match=f"does not explain the motion of {channel} "):
+        write(channel, "plate", 0.49)
+    assert not path.exists()
+    for explained in ((channel, "plate", 0.51), (channel, "force", 0.49), ("force", "plate", 0.49)):
+        write(*explained)
+    assert load_pantograph(str(path)).masses == (5.0, TRUTH["m3"])
 
 
 def made(n=2000, step=1e-3, plate=2e-3, head=1.8e-3, support=1.5e-3, force=1.0, **other):

@@ -208,14 +208,6 @@ def test_the_way_of_several_runs_counts_once():
     assert samples.way(samples.run > 2) == 0
 
 
-def test_a_span_that_two_runs_begin_is_not_covered():
-    once = steady(50.0, 19.9, run="once")  # 995 m: 35 m of the 17th span
-    again = steady(50.0, 19.9, 1.1 * once.force, run="again")
-    found = judge(Record("a", (once, again)), span=60.0)
-    assert [part.where.partition(":")[0] for part in found.of("span")] == [str(k) for k in range(1, 17)]
-    assert found.of("span")[15].figures.distance == pytest.approx(120, abs=1)
-
-
 def ended():
     """A line of 20 spans that ends, so it has no others."""
     table = load_catenary(LINE).model_dump(exclude={"sources", "spans"}, exclude_none=True)
