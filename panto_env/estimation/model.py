@@ -58,7 +58,6 @@ ESTIMATORS: dict[str, EstimatorSettings] = {
     "usual": EstimatorSettings(),
     "displacements": EstimatorSettings(observation="displacements"),
 }
-"""By name."""
 
 
 START_HEIGHT, START_VELOCITY, START_SUSPENSION = 1.0, 1.0, 10.0

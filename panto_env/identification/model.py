@@ -118,8 +118,7 @@ def matrices(parameters: Parameters) -> tuple[Array, Array]:
     return a, b
 
 
-CONFIDENCE = 0.95
-Z = 1.959963984540054  # of the normal distribution, two-sided, at CONFIDENCE
+Z = 1.959963984540054  # of the normal distribution, two-sided, at 95 %
 
 
 @dataclass(frozen=True)

@@ -117,12 +117,9 @@ def _parquet(
             f"{path} is a saved run of `panto simulate`, not a record: give it to `panto compare` as the "
             "run, or write the run as .csv to judge it like a record."
         )
-    values: dict[str, Any] = {}
     refuse = partial(_refuse_sensor, path)
     places = places_of(path, table.column_names, COLUMNS, units, refuse, headings)
-    for name, (place, scale) in places.items():
-        values[name] = _cells(path, name, table.column(place), scale)
-    return values
+    return {name: _cells(path, name, table.column(at), scale) for name, (at, scale) in places.items()}
 
 
 def _cells(path: str | Path, name: str, cells: Any, scale: float) -> Any:
@@ -250,7 +247,8 @@ def write_record(record: Record, path: str | Path) -> None:
 
 def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
     force, notes = contact_force(values, mass)
-    check_motion({key: each for key in ("height", "uplift") if (each := _known(values, key)) is not None})
+    seen = (key for key in ("height", "uplift") if key in values)
+    check_motion({key: values[key] for key in seen if not np.isnan(values[key]).all()})
     raised = values.get("raised")
     kept = np.isfinite(force) & (True if raised is None else raised > 0.5)
     if kept.sum() < 2:
@@ -333,8 +331,3 @@ def _sentences(breaks: Sequence[Break]) -> list[str]:
         left = "it is left out" if reason.startswith("a piece") else left
         found.append(f"{reason[0].upper()}{reason[1:]} {how}; {left}.")
     return found
-
-
-def _known(values: Mapping[str, Array], key: str) -> Array | None:
-    each: Array | None = values.get(key)
-    return None if each is None or np.isnan(each).all() else each

@@ -11,15 +11,15 @@ python -m tests.fitting.coverage FOLDER --table
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from panto_env import simulate
 from panto_env.base.files import write_whole
@@ -214,13 +214,6 @@ def known(path: Path) -> list[dict[str, Any]]:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
 
 
-def write(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write what was found of lines of a group, a row for each line."""
-    text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
-    with write_whole(path) as temporary:
-        temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
-
-
 def groups(folder: Path) -> Iterator[tuple[tuple[int, int, int], list[Any]]]:
     """What was found, by number of the line's kind, number of what is wrong, and number of passes."""
     found: dict[tuple[int, int, int], list[Any]] = {}
@@ -246,13 +239,9 @@ def table(folder: Path) -> Iterator[str]:
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
-        unlike = np.mean([_unlike_noise(each) for each in own])
+        unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
         cells = [line, model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
-
-
-def _unlike_noise(row: dict[str, Any]) -> bool:
-    return bool(min(row["as_noise"]) < WHITE)
 
 
 def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
@@ -270,7 +259,7 @@ def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
             kinds["both"] = [each for own in kinds.values() for each in own]
             yield "both", number, passes, kinds["both"]
             for name, own in kinds.items():
-                good = [each for each in own if each["settled"] and not _unlike_noise(each)]
+                good = [each for each in own if each["settled"] and not min(each["as_noise"]) < WHITE]
                 if good:
                     yield f"{name}, settled and like noise", number, passes, good
 
@@ -286,30 +275,29 @@ def diagnosed(folder: Path) -> Iterator[str]:
             yield f"| {' | '.join([LINES[line], model_of(number), f'{len(own)}', *cells])} |"
 
 
-def main() -> None:
-    """Judge lines that are missing, or print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--lines", type=int, default=20)
-    parser.add_argument("--passes", type=int, default=4, choices=range(1, len(SPEEDS) + 1))
-    parser.add_argument("--line", choices=LINES, default=LINES[0])
-    parser.add_argument("--wrong", choices=WRONG, default=WRONG[0])
-    parser.add_argument("--diagnose", action="store_true")
-    parser.add_argument("--table", action="store_true")
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    if not given.table:
-        path = given.folder / f"{given.line}-{given.wrong}-{given.passes}.json"
-        done = {row["seed"] for row in known(path) if "later" in row or not given.diagnose}
-        for seed in sorted(set(range(given.lines)) - done):
-            row = judge(seed, given.passes, given.wrong, given.line, given.diagnose)
-            write(path, [*(other for other in known(path) if other["seed"] != seed), row])
-            print(f"line {seed + 1} of {given.lines}", flush=True)
-    for text in (*table(given.folder), "", *diagnosed(given.folder)):
+def main(
+    folder: Path,
+    lines: int = 20,
+    passes: int = len(SPEEDS),
+    line: str = LINES[0],
+    wrong: str = WRONG[0],
+    diagnose: bool = False,
+    only_table: Annotated[bool, typer.Option("--table")] = False,
+) -> None:
+    """Judge lines that are missing, and print the table."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{line}-{wrong}-{passes}.json"
+    done = {row["seed"] for row in known(path) if "later" in row or not diagnose}
+    for seed in [] if only_table else sorted(set(range(lines)) - done):
+        rows = [other for other in known(path) if other["seed"] != seed]
+        rows.append(judge(seed, passes, wrong, line, diagnose))
+        text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
+        with write_whole(path) as temporary:
+            temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
+        print(f"line {seed + 1} of {lines}", flush=True)
+    for text in (*table(folder), "", *diagnosed(folder)):
         print(text)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)
