@@ -9,10 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from panto_env import InputError
-from panto_env.base.record_columns import LENGTHS, TIME
+from panto_env.base.record_columns import LENGTHS
 from panto_env.cli.estimate import _scores_table
 from panto_env.estimation.estimate import Score, phases
-from panto_env.estimation.motion import COLUMNS, FORCES, SHORTEST, SPEEDS, measure, read_motion, write_motion
+from panto_env.estimation.motion import FORCES, SHORTEST, SPEEDS, measure, read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
 from ..command import panto
@@ -183,12 +183,6 @@ def test_each_column_is_read_in_its_unit(tmp_path, length, speed, force):
         np.testing.assert_allclose(getattr(motion, name), expected, rtol=1e-12)
     assert motion.time_step == pytest.approx(0.01)
     assert (motion.start, motion.lift, motion.speed, motion.span) == (0.5, 100.0, 70.0, 60.0)
-
-
-def test_all_units_are_known_here():
-    assert LENGTHS | SPEEDS | FORCES == FACTORS
-    assert {name for name, column in COLUMNS.items() if column.required} == {"time", "head", "frame"}
-    assert TIME.example in TIME.units
 
 
 def test_what_is_not_measured_is_none_or_no_force(tmp_path):

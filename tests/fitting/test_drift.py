@@ -161,16 +161,15 @@ def test_the_command(folder):
 
 
 def test_the_command_as_json_and_without_changes(folder):
-    done = panto("drift", "month0.safetensors", "month1.safetensors", "--json", cwd=folder)
-    rows = {row["name"]: row for row in json.loads(done.stdout)["values"]}
-    assert [name for name, row in rows.items() if row["changed"]] == ["dropper 4"]
-    same = panto("drift", "month0.safetensors", "month0.safetensors", cwd=folder)
-    assert "Nothing has changed that these records would tell." in same.stdout
-    loose = panto(
-        "drift", "month0.safetensors", "month1.safetensors", "--tolerance", "dropper=0.01", cwd=folder
+    first, second = "month0.safetensors", "month1.safetensors"
+    rows = json.loads(panto("drift", first, second, "--json", cwd=folder).stdout)["values"]
+    assert [row["name"] for row in rows if row["changed"]] == ["dropper 4"]
+    assert (
+        "Nothing has changed that these records would tell."
+        in panto("drift", first, first, cwd=folder).stdout
     )
-    assert loose.returncode == 2
-    assert "--tolerance of unknown 'dropper'" in loose.stderr
+    loose = panto("drift", first, second, "--tolerance", "dropper=0.01", cwd=folder)
+    assert (loose.returncode, "--tolerance of unknown 'dropper'" in loose.stderr) == (2, True)
 
 
 def test_waves_of_spans_that_begin_elsewhere_are_the_same_waves():

@@ -24,31 +24,21 @@ def state():
     return State(random.standard_normal(30), np.array([70.0, 71.0]), random.uniform(size=(2, 6)), 7)
 
 
-def test_a_state_is_read_back(tmp_path, record, state):
-    path = tmp_path / "a.fit"
-    keep(path, state, identity_of([record], SETTINGS))
-    found = kept(path, identity_of([record], SETTINGS))
-    assert found.steps == 7
+def test_a_state_is_read_back_and_another_fit_s_is_not_taken(tmp_path, record, state):
+    path, identity = tmp_path / "a.fit", identity_of([record], SETTINGS)
+    keep(path, state, identity)
+    keep(path, replace(state, steps=8), identity)
+    found = kept(path, identity)
+    assert found.steps == 8
     for name in ("x", "static_forces", "noise"):
         np.testing.assert_array_equal(getattr(found, name), getattr(state, name))
-    keep(path, replace(state, steps=8), identity_of([record], SETTINGS))
-    assert kept(path, identity_of([record], SETTINGS)).steps == 8
-
-
-def test_another_fit_s_state_is_not_taken(tmp_path, record, state):
-    path = tmp_path / "a.fit"
-    keep(path, state, identity_of([record], SETTINGS))
     one, two = record.pieces
     force = two.force.copy()
     force[50] += 1e-9
-    for other in (
-        identity_of([replace(record, pieces=(one, replace(two, force=force)))], SETTINGS),
-        identity_of([replace(record, pieces=(one, replace(two, position=two.position + 1)))], SETTINGS),
-        identity_of([replace(record, pieces=(one,))], SETTINGS),
-        identity_of([record], SETTINGS | {"tolerances": {}}),
-        identity_of([record], SETTINGS | {"free": ["droppers", "tensions"]}),
-    ):
-        assert kept(path, other) is None
+    for pieces in ((one, replace(two, force=force)), (one, replace(two, position=two.position + 1)), (one,)):
+        assert kept(path, identity_of([replace(record, pieces=pieces)], SETTINGS)) is None
+    for other in ({"tolerances": {}}, {"free": ["droppers", "tensions"]}):
+        assert kept(path, identity_of([record], SETTINGS | other)) is None
     assert kept(path, identity_of([replace(record, name="b")], SETTINGS)) is not None  # the same samples
 
 
@@ -57,12 +47,6 @@ def test_a_damaged_file_is_not_taken(tmp_path, record, state):
     assert kept(path, identity) is None
     keep(path, state, identity)
     whole = path.read_bytes()
-    assert kept(path, identity) is not None
-    flipped = bytearray(whole)
-    flipped[-5] ^= 1
-    for content in (whole[:-9], b"", b"no such file", bytes(flipped)):
+    for content in (whole[:-9], b"", whole[:-5] + bytes([whole[-5] ^ 1]) + whole[-4:]):
         path.write_bytes(content)
         assert kept(path, identity) is None
-    path.unlink()
-    path.mkdir()
-    assert kept(path, identity) is None

@@ -125,16 +125,6 @@ def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
     assert np.linalg.norm(derivatives[0][:, number] - actual) < 0.02 * np.linalg.norm(actual)
 
 
-def test_derivatives_of_a_shift(ready, derivatives):
-    """What is left falls by the derivative times the shift."""
-    (part,) = ready.fitting.parts
-    target = part.measured.coefficients(part.measured.force(0.02))
-    change = part.measured.coefficients(part.measured.force(-0.02)) - target
-    column = derivatives[0][:, -3]
-    assert np.linalg.norm(column - change / 0.04) < 0.05 * np.linalg.norm(column)
-    assert part.measured.std(column) > 1
-
-
 @pytest.mark.parametrize("which", [-2, -1])
 def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     """What is left falls by the derivative times either, with the static force that follows the mean."""

@@ -5,11 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from panto_env.fitting import problem as preparing
 from panto_env.fitting.passes import BANDS
-from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import SURE, Solution, normal
-from panto_env.plant.numerics import Numerics
 
 LEFT = 0.7
 """Noise of a coefficient (N), as a record of these tests has it."""
@@ -45,26 +42,6 @@ def test_droppers_that_are_far_off_jump_back(ready, true, by):
 
 def test_no_dropper_jumps_where_that_makes_nothing_better(ready, true):
     assert ready.fitting._jumped(ended(ready.fitting, true), lambda doing: None) is None
-
-
-def test_derivatives_from_other_passes_are_like_those_from_fine_ones(record, design, pantograph):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "NUMERICS", Numerics())
-        fitting = problem([record], design, pantograph, free=("tensions", "supports")).fitting
-    small, found, left = np.diag(0.1 * fitting.values.tolerances), {}, {}
-    for grid in ("fine", "fair", "coarse"):
-        _, (found[grid],), (left[grid],) = fitting.derivatives(
-            fitting.start(), small, grid, lambda doing: None
-        )
-        np.testing.assert_array_equal(left[grid], left["fine"])  # of the fine passes
-        np.testing.assert_array_equal(found[grid][:, -3], found["fine"][:, -3])  # by the shift
-    assert np.linalg.norm(left["fine"]) > 0
-    away = {
-        grid: np.linalg.norm(found[grid] - found["fine"], axis=0) / np.linalg.norm(found["fine"], axis=0)
-        for grid in ("fair", "coarse")
-    }
-    fair, coarse = (np.median(away[grid][:-3]) for grid in ("fair", "coarse"))
-    assert 0.0 < fair < 0.7 * coarse < 0.36
 
 
 def test_a_dropper_jumps_for_which_others_make_up(ready, true):
