@@ -211,33 +211,23 @@ def place(finding: Finding) -> str:
 
 def findings_table(diagnosis: Diagnosis) -> Table:
     """A row for each finding."""
-    rows = []
-    for finding in diagnosis.findings:
-        others = sorted(finding.shares, key=lambda kind: -finding.shares[kind])
-        second = next(kind for kind in others if kind != finding.kind)
-        rows.append(
-            (
-                finding.kind,
-                f"{100 * finding.shares[finding.kind]:.0f}",
-                f"{second} ({100 * finding.shares[second]:.0f})",
-                place(finding),
-                diagnosis.evidence.alignment.span_name(finding.span),
-                f"{finding.offset:.1f}",
-                f"{finding.position:.0f}",
-                f"{finding.score:.1f}",
-            )
-        )
-    headings = (
-        "what",
-        "%",
-        "or (%)",
-        "where",
-        "span",
-        "from its support (m)",
-        "position (m)",
-        "score/threshold",
-    )
-    return Table("Defects found", headings, tuple(rows), text_columns=4)
+
+    def next_kind(finding: Finding) -> str:
+        others = [kind for kind in finding.shares if kind != finding.kind]
+        second = max(others, key=lambda kind: finding.shares[kind])
+        return f"{second} ({100 * finding.shares[second]:.0f})"
+
+    columns = {
+        "what": lambda finding: finding.kind,
+        "%": lambda finding: f"{100 * finding.shares[finding.kind]:.0f}",
+        "or (%)": next_kind,
+        "where": place,
+        "span": lambda finding: diagnosis.evidence.alignment.span_name(finding.span),
+        "from its support (m)": lambda finding: f"{finding.offset:.1f}",
+        "position (m)": lambda finding: f"{finding.position:.0f}",
+        "score/threshold": lambda finding: f"{finding.score:.1f}",
+    }
+    return Table.of("Defects found", diagnosis.findings, columns, text_columns=4)
 
 
 def verdict(diagnosis: Diagnosis) -> list[str]:

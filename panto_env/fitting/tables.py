@@ -72,34 +72,23 @@ def values_table(differing: Sequence[Found], unlike: str, most: int = 20) -> Tab
 
 def parts_table(fit: Fit) -> Table:
     """A row for each piece of a record: what the fit explains of it, and whether the rest is noise."""
-    rows = []
-    shifts = fit.shifts + np.array(fit.problem.shifts)
-    own = zip(fit.parts, fit.left, fit.whiteness, shifts.tolist(), fit.gains.tolist(), strict=True)
-    for part, (before, after), white, shift, gain in own:
-        probability = f"{white.probability:.2g}"
-        rows.append(
-            (
-                part.name,
-                f"{part.measured.piece.speed_kmh:.1f}",
-                f"{shift + 0.0:+.2f}",
-                f"{100 * gain + 0.0:+.2f}",
-                number(before, 2),
-                number(after, 2),
-                f"{100 * (1 - (after / before) ** 2):.1f}",
-                Alarm(probability) if white.probability < WHITE else probability,
-            )
-        )
-    headings = (
-        "record",
-        "speed (km/h)",
-        "shift (m)",
-        "gain (%)",
-        "σ compared (N)",
-        "σ left (N)",
-        "explained (%)",
-        "as noise, p",
-    )
-    return Table("What is left of each record", headings, rows)
+    shifts, gains, left = fit.shifts + np.array(fit.problem.shifts), fit.gains, fit.left
+
+    def as_noise(k: int) -> str:
+        probability = fit.whiteness[k].probability
+        return Alarm(f"{probability:.2g}") if probability < WHITE else f"{probability:.2g}"
+
+    columns = {
+        "record": lambda k: fit.parts[k].name,
+        "speed (km/h)": lambda k: f"{fit.parts[k].measured.piece.speed_kmh:.1f}",
+        "shift (m)": lambda k: f"{shifts[k] + 0.0:+.2f}",
+        "gain (%)": lambda k: f"{100 * gains[k] + 0.0:+.2f}",
+        "σ compared (N)": lambda k: number(left[k][0], 2),
+        "σ left (N)": lambda k: number(left[k][1], 2),
+        "explained (%)": lambda k: f"{100 * (1 - (left[k][1] / left[k][0]) ** 2):.1f}",
+        "as noise, p": as_noise,
+    }
+    return Table.of("What is left of each record", range(len(fit.parts)), columns)
 
 
 def rows_of(found: Sequence[Found], before: float = 0.0) -> list[dict[str, Any]]:

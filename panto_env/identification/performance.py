@@ -116,13 +116,18 @@ def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
 
 def matches_table(matches: Sequence[Match], method: str) -> Table:
     """The model that a method identified, beside the record."""
-    rows = []
-    for match in matches:
+
+    def error(match: Match) -> str:
         force = match.channel == "force"
-        error = f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
-        rows.append((match.channel, match.driven_by, number(match.performance), error))
-    headings = ("series", "driven by", "fitting performance (%)", "mean error")
-    return Table(f"Model by {method} beside the record", headings, rows, text_columns=len(headings))
+        return f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
+
+    columns = {
+        "series": lambda match: match.channel,
+        "driven by": lambda match: match.driven_by,
+        "fitting performance (%)": lambda match: number(match.performance),
+        "mean error": error,
+    }
+    return Table.of(f"Model by {method} beside the record", matches, columns, text_columns=4)
 
 
 EXPLAINS = 50.0
