@@ -38,9 +38,9 @@ class Table:
         title: str,
         items: Iterable[Any],
         columns: Mapping[str, Callable[[Any], str | float]],
-        text: int = 1,
+        text_columns: int = 1,
     ) -> Self:
-        """A row for each item, with a cell of it for each heading; text: ``text_columns``."""
+        """A row for each item, with a cell of it under each heading."""
         rows = [tuple(cell(item) for cell in columns.values()) for item in items]
         return cls(title, tuple(columns), rows, text_columns)
 
