@@ -173,7 +173,7 @@ def write_motion(motion: Motion, path: str | Path) -> None:
 
 
 SAMPLING = (50.0, 50e3)  # 1/s
-LEAST_DURATION = 2.0
+MINIMUM = 2.0
 """Length of a record (s) at least, and a span where its length is known."""
 MOST_SAMPLES = 2_000_000
 FARTHEST = 3.0  # m: no pantograph reaches higher
@@ -253,9 +253,9 @@ def _check_time(motion: Motion) -> None:
         )
     if samples > MOST_SAMPLES:
         raise InputError(f"The record has {samples:,} samples; give a part of {MOST_SAMPLES:,} at most.")
-    if duration < LEAST_DURATION:
+    if duration < MINIMUM:
         raise InputError(
-            f"The record is {beside(duration, SHORTEST, '.3g')} s long; give {SHORTEST:g} s at least."
+            f"The record is {beside(duration, MINIMUM, '.3g')} s long; give {MINIMUM:g} s at least."
         )
     if motion.speed and motion.span and duration * motion.speed < motion.span:
         raise InputError(
