@@ -28,7 +28,6 @@ from .kalman import (
     force_variance,
     run_filter,
     smooth_force,
-    smoothed_variance,
     steady_gains,
     time_varying_gains,
 )
@@ -72,14 +71,13 @@ def estimate(
     filtered = filter_motion(model, gains, motion)
     lag = round(settings.lag / motion.time_step)
     force = smooth_force(model, filtered, lag) if lag else filtered.state @ model.force
-    variance = smoothed_variance(model, gains, lag) if lag else force_variance(model, gains)
     first = first_settled(motion)
     tested = consistency(filtered, motion.time, first)
     suspension_error = -float(filtered.state[-1, -1]) if settings.suspension_drift > 0 else 0.0
     return Estimate(
         time=motion.time,
         force=force,
-        deviation=math.sqrt(max(variance, 0.0)),
+        deviation=math.sqrt(max(force_variance(model, gains, lag), 0.0)),
         first=first,
         filtered=filtered,
         model=model,

@@ -110,18 +110,6 @@ def respond(a: Array, b: Array, inputs: Array, time_step: float, initial: Array)
     return states
 
 
-def rest_on_plate(parameters: Parameters, plate: float) -> Array:
-    """State, (4,), at rest on a plate that stands at ``plate`` (m)."""
-    a, b = matrices(parameters)
-    return np.asarray(np.linalg.solve(a, -b[:, 0] * plate))
-
-
-def under_plate(parameters: Parameters, plate: Array, time_step: float, initial: Array) -> Array:
-    """States [y_p2, y_p3, y_p2', y_p3'], (n, 4), while the plate moves as recorded (m)."""
-    a, b = matrices(parameters)
-    return respond(a, b, polynomials(plate, time_step), time_step, initial)
-
-
 def contact_force(parameters: Parameters, plate: Array, states: Array, time_step: float) -> Array:
     """Contact force (N), (n,), between a plate (m) and the pan head, as the model has it."""
     inputs = polynomials(plate, time_step)

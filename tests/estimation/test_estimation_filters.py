@@ -14,7 +14,6 @@ from panto_env.estimation.kalman import (
     force_variance,
     run_filter,
     smooth_force,
-    smoothed_variance,
     steady_covariance,
     steady_gain,
     steady_gains,
@@ -161,7 +160,7 @@ def test_steady_filter_and_smoother_are_those_of_a_record_that_begins_as_it_stay
     filter_error = (steady.state @ model.force - true).std()
     smoother_error = (smooth_force(model, steady, 20) - true)[:-20].std()
     assert filter_error == pytest.approx(np.sqrt(force_variance(model, steady.gains)), rel=0.08)
-    assert smoother_error == pytest.approx(np.sqrt(smoothed_variance(model, steady.gains, 20)), rel=0.08)
+    assert smoother_error == pytest.approx(np.sqrt(force_variance(model, steady.gains, 20)), rel=0.08)
     assert smoother_error < 0.75 * filter_error
 
 
