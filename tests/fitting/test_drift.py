@@ -1,4 +1,4 @@
-"""What has changed between two fits: against least squares on both records at once, and as a command."""
+"""Fits in files: what has changed between two, against least squares on both records; where one goes on."""
 
 import json
 from dataclasses import replace
@@ -8,10 +8,14 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.fitting.drift import SMALLER, drift
-from panto_env.fitting.stored import Stored, store, stored, turned
+from panto_env.fitting.misfit import State
+from panto_env.fitting.stored import Stored, identity_of, keep, kept, store, stored, turned
 from panto_env.fitting.values import WAVES, Value
+from panto_env.records.record import Piece, Record
 
 from ..command import panto
+from ..documents import ROOT
+from .coverage import diagnosed, table
 
 COUNT, TOLERANCE = 12, 5e-3
 
@@ -191,3 +195,56 @@ def test_waves_of_spans_that_begin_elsewhere_are_the_same_waves():
             return of[2 * k + 1] * np.cos(angle) + of[2 * k + 2] * np.sin(angle)
 
         np.testing.assert_allclose(height(seen, x), height(parts, x + 137.0), atol=1e-12)
+
+
+SETTINGS = {"free": ["droppers"], "tolerances": {"droppers": 0.01}, "line": "{}"}
+
+
+@pytest.fixture
+def record():
+    x = np.arange(100.0)
+    return Record("a", (Piece("", 0.002, 0.0, x, 120 + np.sin(x)), Piece("", 0.002, 1.0, x + 200, 120 - x)))
+
+
+@pytest.fixture
+def state():
+    random = np.random.default_rng(0)
+    return State(random.standard_normal(30), np.array([70.0, 71.0]), random.uniform(size=(2, 6)), 7)
+
+
+def test_a_state_is_read_back_and_another_fit_s_is_not_taken(tmp_path, record, state):
+    path, identity = tmp_path / "a.fit", identity_of([record], SETTINGS)
+    keep(path, state, identity)
+    keep(path, replace(state, steps=8), identity)
+    found = kept(path, identity)
+    assert found.steps == 8
+    for name in ("x", "static_forces", "noise"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(state, name))
+    one, two = record.pieces
+    force = two.force.copy()
+    force[50] += 1e-9
+    for pieces in ((one, replace(two, force=force)), (one, replace(two, position=two.position + 1)), (one,)):
+        assert kept(path, identity_of([replace(record, pieces=pieces)], SETTINGS)) is None
+    for other in ({"tolerances": {}}, {"free": ["droppers", "tensions"]}):
+        assert kept(path, identity_of([record], SETTINGS | other)) is None
+    assert kept(path, identity_of([replace(record, name="b")], SETTINGS)) is not None  # the same samples
+
+
+def test_a_damaged_file_is_not_taken(tmp_path, record, state):
+    path, identity = tmp_path / "a.fit", identity_of([record], SETTINGS)
+    assert kept(path, identity) is None
+    keep(path, state, identity)
+    whole = path.read_bytes()
+    for content in (whole[:-9], b"", whole[:-5] + bytes([whole[-5] ^ 1]) + whole[-4:]):
+        path.write_bytes(content)
+        assert kept(path, identity) is None
+
+
+STORED = ROOT / "docs" / "records-coverage"
+
+
+def test_the_documents_have_the_table_of_the_stored_lines():
+    text = (ROOT / "docs" / "records.md").read_text(encoding="utf-8")
+    for rows in (list(table(STORED)), list(diagnosed(STORED))):
+        assert len(rows) > 2
+        assert [row for row in rows if row not in text] == []
