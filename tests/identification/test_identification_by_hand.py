@@ -245,7 +245,7 @@ def test_a_model_that_cannot_be_simulated_is_said_unless_a_file_needs_it(options
 
 def test_what_a_record_cannot_determine_is_marked_and_said(panto):
     """One sine cannot tell the spring from the mass."""
-    sine = noisy(EXPERIMENTS[0])
+    sine = noisy(EXPERIMENTS[0], 20.0)
     found = identify(sine, KNOWN)
     assert set(found.fits[PRINTED].impossible) == {"c1T", "c2", "m3"}  # a frame of 0.1 kg, negative dampers
     assert found.fits[OUTPUT_ERROR].impossible == ()
