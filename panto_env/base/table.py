@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -31,6 +31,18 @@ class Table:
     rows: Sequence[tuple[str | float, ...]]
     text_columns: int = 1  # number of columns, from the left, that are aligned left; the others right
     section_ends: tuple[int, ...] = ()  # rows, counted from 0, after which a line is drawn
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        items: Iterable[Any],
+        columns: Mapping[str, Callable[[Any], str | float]],
+        text_columns: int = 1,
+    ) -> Self:
+        """A row for each item, with a cell of it under each heading."""
+        rows = [tuple(cell(item) for cell in columns.values()) for item in items]
+        return cls(title, tuple(columns), rows, text_columns)
 
     @property
     def cells(self) -> list[tuple[str, ...]]:

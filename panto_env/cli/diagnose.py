@@ -11,9 +11,8 @@ from ..analysis.plots import save
 from ..base.errors import InputError
 from ..diagnosis import diagnose as judge
 from ..diagnosis import diagnose_records
-from ..diagnosis.diagnosis import findings_table, verdict
+from ..diagnosis.diagnosis import findings_table, plot_diagnosis, verdict
 from ..diagnosis.features import FALSE_ALARMS
-from ..diagnosis.plots import plot_diagnosis
 from ..fitting.stored import stored
 from ..metrics.trajectory import Trajectory
 from ..records.record_file import read_record

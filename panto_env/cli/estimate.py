@@ -14,14 +14,12 @@ from ..base.errors import InputError
 from ..base.settings import parse
 from ..base.table import TABLES, Alarm, Sheet, Table, write_table
 from ..catalog import load_pantograph
-from ..estimation.estimate import BANDS, Estimate, Score, score
+from ..estimation.estimate import BANDS, Estimate, Score, plot_estimate, score
 from ..estimation.estimate import estimate as run
 from ..estimation.estimate import tune as find
 from ..estimation.innovations import nis
 from ..estimation.model import EstimatorSettings
-from ..estimation.motion import Motion, read_motion
-from ..estimation.plausibility import rezeroed
-from ..estimation.plots import plot_estimate
+from ..estimation.motion import Motion, read_motion, rezeroed
 from ..metrics.figures import LABELS
 from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData

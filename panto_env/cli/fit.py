@@ -16,10 +16,18 @@ from ..fitting.drift import FALSE
 from ..fitting.drift import drift as between
 from ..fitting.fitted_line import check_design, write_line, write_pantograph
 from ..fitting.misfit import State
-from ..fitting.plots import plot_drift, plot_fit
 from ..fitting.stored import SUFFIX, identity_of, kept, knowledge, store, stored
 from ..fitting.stored import keep as keep_state
-from ..fitting.tables import parts_table, plain, remarks, rows_of, summary_table, values_table
+from ..fitting.tables import (
+    parts_table,
+    plain,
+    plot_drift,
+    plot_fit,
+    remarks,
+    rows_of,
+    summary_table,
+    values_table,
+)
 from ..fitting.values import FREE, USUAL
 from ..records.record_file import read_record
 from ..terminal import (

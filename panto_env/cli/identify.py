@@ -15,8 +15,13 @@ from .. import identification
 from ..analysis.plots import save
 from ..base.errors import InputError
 from ..identification import METHODS, Identification, Match
-from ..identification.performance import SUFFIXES, check_possible, matches_table, parameters_table
-from ..identification.plots import plot_matches
+from ..identification.performance import (
+    SUFFIXES,
+    check_possible,
+    matches_table,
+    parameters_table,
+    plot_matches,
+)
 from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable, written_last
 
 T = TypeVar("T")

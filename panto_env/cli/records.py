@@ -34,8 +34,7 @@ from ..records.judge import (
     rows_of,
     whole_table,
 )
-from ..records.page import save_comparison_page, save_record_page
-from ..records.plots import plot_comparison, plot_record
+from ..records.plots import plot_comparison, plot_record, save_comparison_page, save_record_page
 from ..records.record_file import read_record
 from ..terminal import (
     ALARM,

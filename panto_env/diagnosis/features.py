@@ -1,15 +1,11 @@
-"""What passes show along a line, and the places of it whose score is beyond the threshold.
+"""Where a score along the line is beyond its threshold, and which kind of defect that is.
 
-The score from which on a place is called defective: by false alarms per kilometre.
+The threshold is set by false alarms per kilometre: the maximum log score of a span is taken to have Gumbel's
+distribution, the limit of maxima of many values, fitted to the spans of healthy passes, each held against
+the others. Where passes are few, another one may differ by more than they do from one another.
 
-The maximum log score of a span is taken to have Gumbel's distribution, the limit of maxima of many values.
-It is fitted to the spans of healthy passes, each held against the others, and reaches to spans rarer than any
-of them. Where passes are few, another one may differ by more than they do from one another.
-
-Which kind of defect it is, and at which candidate: a small neural network, kept as plain arrays.
-
-scikit-learn trains it (``training.py``); here is only its sum. For each candidate
-about a maximum of the score it estimates whether a defect is there, and of which kind; the surest counts.
+For each candidate about a maximum a small neural network estimates whether a defect is there, and of which
+kind; the surest counts. scikit-learn trains it (``training.py``); here is only its sum, of plain arrays.
 """
 
 from __future__ import annotations
@@ -71,7 +67,6 @@ def regions(evidence: Evidence) -> list[Region]:
 
 
 def _echo(region: Region, greater: Region, evidence: Evidence) -> bool:
-    """Whether a region may be the waves of a greater one."""
     apart = abs(np.diff(evidence.alignment.in_spans(evidence.position[[region.peak, greater.peak]]))[0])
     share = next((share for within, share in ECHOES if apart <= within), 0.0)
     return bool(evidence.score[region.peak] < share * evidence.score[greater.peak])

@@ -16,8 +16,7 @@ from ..base.record_columns import equal_step
 from ..estimation.estimate import filter_motion, gains_of, model_of
 from ..estimation.kalman import smooth_force
 from ..estimation.model import EstimatorSettings
-from ..estimation.motion import Motion, measure, on_frame, warn_of_wind
-from ..estimation.plausibility import check_motion
+from ..estimation.motion import Motion, check_motion, measure, on_frame, warn_of_wind
 from ..metrics.figures import FIRST_SETTLED
 from ..metrics.low_pass import CUTOFF, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
@@ -76,19 +75,7 @@ def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | Non
     """
     known = known_pantograph(run) if pantograph is None else pantograph
     warn_of_wind(run)
-    check_motion(_as_recorded(run), known)  # before there is noise, which would hide a dead sensor
-    none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
-    seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
-    motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
-    model = model_of(motion, known, ESTIMATOR)
-    filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
-    force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
-    return zero_phase_low_pass(np.interp(run.time, motion.time, force), run.time_step)
-
-
-def _as_recorded(run: Trajectory) -> Motion:
-    """A run's own samples, of displacements alone."""
-    return Motion(
+    recorded = Motion(
         time_step=run.time_step,
         head=run.head,
         frame=run.frame,
@@ -101,6 +88,14 @@ def _as_recorded(run: Trajectory) -> Motion:
         span=run.alignment.mean_length,
         start=float(run.time[0]),
     )
+    check_motion(recorded, known)  # before there is noise, which would hide a dead sensor
+    none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
+    seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
+    motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
+    model = model_of(motion, known, ESTIMATOR)
+    filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
+    force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
+    return zero_phase_low_pass(np.interp(run.time, motion.time, force), run.time_step)
 
 
 STEP = 0.5
@@ -229,7 +224,6 @@ def side_by_side(
 
 @contextmanager
 def _named(run: str) -> Iterator[None]:
-    """Say which run it is that an InputError is about."""
     try:
         yield
     except InputError as error:

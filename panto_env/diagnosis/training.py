@@ -151,13 +151,8 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
         accuracy="fast",
         record_droppers=False,
     )
-    return replace(run, dropper_position=_droppers(data))
-
-
-def _droppers(data: FlexibleCatenaryData) -> Array:
-    return np.asarray(
-        np.add.outer(data.alignment().support(np.arange(SPANS)), data.droppers.positions).ravel()
-    )
+    begins = data.alignment().support(np.arange(SPANS))
+    return replace(run, dropper_position=np.add.outer(begins, data.droppers.positions).ravel())
 
 
 LINES = ("en50318-2002", "beijing-shanghai", "re250")

@@ -1,38 +1,42 @@
-"""From the motion of a pantograph to the contact force, with what to think of it.
+"""From the motion of a pantograph to the contact force: filtered, judged, scored, drawn.
 
-Noise intensities by maximum likelihood from healthy runs, not by hand.
-
-The likelihood of a record is that of its innovations (F. C. Schweppe, IEEE Trans. Information Theory 11:61,
-1965, recalled); the true force is not needed, so that a train in service can be tuned.
+Noise intensities are found by maximum likelihood from healthy runs: that of a record is that of its
+innovations (F. C. Schweppe, IEEE Trans. Information Theory 11:61, 1965, recalled), so the true force is not
+needed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError, suggest
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
 from ..base.settings import Between, ranges_of
+from ..metrics.low_pass import zero_phase_low_pass
 from ..plant.pantograph.schema import PantographData
-from .innovations import Consistency, Verdict, consistency, judge, log_likelihood
+from .innovations import Consistency, Verdict, consistency, judge, log_likelihood, window_bound
 from .kalman import (
     Filtered,
     Gains,
     force_variance,
     run_filter,
     smooth_force,
-    smoothed_variance,
     steady_gains,
     time_varying_gains,
 )
 from .model import EstimatorSettings, Model, build_model
-from .motion import Motion
-from .plausibility import check_motion
+from .motion import Motion, check_motion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 SETTLING = 1.0
 """Time (s) after which a record's start is forgotten; figures and tests are of what comes later."""
@@ -67,14 +71,13 @@ def estimate(
     filtered = filter_motion(model, gains, motion)
     lag = round(settings.lag / motion.time_step)
     force = smooth_force(model, filtered, lag) if lag else filtered.state @ model.force
-    variance = smoothed_variance(model, gains, lag) if lag else force_variance(model, gains)
     first = first_settled(motion)
     tested = consistency(filtered, motion.time, first)
     suspension_error = -float(filtered.state[-1, -1]) if settings.suspension_drift > 0 else 0.0
     return Estimate(
         time=motion.time,
         force=force,
-        deviation=math.sqrt(max(variance, 0.0)),
+        deviation=math.sqrt(max(force_variance(model, gains, lag), 0.0)),
         first=first,
         filtered=filtered,
         model=model,
@@ -145,13 +148,30 @@ def tune(
         raise InputError("Tuning needs at least one healthy run.")
     for motion in motions:
         check_motion(motion, pantograph)
-    ranges = [_range(settings, name) for name in names]
-    bounds = [(math.log(each.low), math.log(each.high)) for each in ranges]
-    begin = np.array([math.log(_get(settings, name)) for name in names])
+    known = _numbers(settings)
+    for name in names:
+        if name not in known:
+            raise InputError(f"Unknown value '{name}' to tune: {suggest(name, list(known))}.")
+    first = {name: attrgetter(name)(settings) for name in names}
+    for name, value in first.items():
+        if value <= 0:
+            raise InputError(f"'{name}' is {value:g}, which can't be tuned; begin with a value above 0.")
+    highs = [known[name].high for name in names]
+    lows = [max(known[name].low, 1e-6 * high) for name, high in zip(names, highs, strict=True)]
+    bounds = [(math.log(low), math.log(high)) for low, high in zip(lows, highs, strict=True)]
+    begin = np.array([math.log(value) for value in first.values()])
     samples = sum(len(motion.head) - first_settled(motion) for motion in motions)
 
+    def settings_of(logarithms: Array) -> EstimatorSettings:
+        return _changed(settings, dict(zip(names, map(math.exp, logarithms), strict=True)))
+
     def cost(logarithms: Array) -> float:
-        return -_log_likelihood(motions, pantograph, _changed(settings, names, logarithms)) / samples
+        tried, total = settings_of(logarithms), 0.0
+        for motion in motions:
+            model = model_of(motion, pantograph, tried)
+            filtered = filter_motion(model, steady_gains(model), motion)
+            total += log_likelihood(filtered, first_settled(motion))
+        return -total / samples
 
     before = -cost(begin)
     found = minimize(
@@ -165,69 +185,32 @@ def tune(
         raise InputError(
             f"The search for the most likely settings does not end ({found.message}); name fewer."
         )
-    tuned = _changed(settings, names, found.x)
+    tuned = settings_of(found.x)
     ends = zip(names, found.x, bounds, strict=True)
     return Tuning(
         settings=tuned,
-        values={name: _get(tuned, name) for name in names},
+        values={name: attrgetter(name)(tuned) for name in names},
         log_likelihood=-float(found.fun),
         before=before,
         at_bounds=tuple(name for name, x, (low, high) in ends if min(x - low, high - x) < FINE),
     )
 
 
-def _log_likelihood(
-    motions: Sequence[Motion], pantograph: PantographData, settings: EstimatorSettings
-) -> float:
-    total = 0.0
-    for motion in motions:
-        model = model_of(motion, pantograph, settings)
-        filtered = filter_motion(model, steady_gains(model), motion)
-        total += log_likelihood(filtered, first_settled(motion))
-    return total
+def _numbers(settings: EstimatorSettings) -> dict[str, Between]:
+    """Ranges of all numbers that can be tuned, by name."""
+    found = {}
+    for prefix, holder in (("", settings), ("force_model.", settings.force_model)):
+        for key, field in type(holder).model_fields.items():
+            if ranges := list(ranges_of(field.rebuild_annotation())):
+                (found[prefix + key],) = ranges
+    return found
 
 
-def _table(settings: EstimatorSettings, name: str) -> tuple[Any, str]:
-    """The settings that hold a name, and its last part. Raises InputError for an unknown name."""
-    holder: Any = settings.force_model if name.startswith("force_model.") else settings
-    key = name.removeprefix("force_model.")
-    field = type(holder).model_fields.get(key)
-    if field is None or not list(ranges_of(field.rebuild_annotation())):
-        known = [key for key, each in _numbers(settings)] + [
-            f"force_model.{key}" for key, each in _numbers(settings.force_model)
-        ]
-        raise InputError(f"Unknown value '{name}' to tune: {suggest(name, known)}.")
-    return holder, key
-
-
-def _numbers(settings: Any) -> list[tuple[str, Any]]:
-    fields = type(settings).model_fields.items()
-    return [(key, field) for key, field in fields if list(ranges_of(field.rebuild_annotation()))]
-
-
-def _range(settings: EstimatorSettings, name: str) -> Between:
-    """The range of a value, above 0."""
-    holder, key = _table(settings, name)
-    (between,) = ranges_of(type(holder).model_fields[key].rebuild_annotation())
-    return Between(max(between.low, 1e-6 * between.high), between.high)
-
-
-def _get(settings: EstimatorSettings, name: str) -> float:
-    holder, key = _table(settings, name)
-    value: float = getattr(holder, key)
-    if value <= 0:
-        raise InputError(f"'{name}' is {value:g}, which can't be tuned; begin with a value above 0.")
-    return value
-
-
-def _changed(settings: EstimatorSettings, names: Sequence[str], logarithms: Array) -> EstimatorSettings:
-    outer: dict[str, Any] = {}
-    inner: dict[str, float] = {}
-    for name, logarithm in zip(names, logarithms, strict=True):
-        holder, key = _table(settings, name)
-        (inner if holder is settings.force_model else outer)[key] = math.exp(logarithm)
-    force = settings.force_model.model_copy(update=inner)
-    return settings.model_copy(update=outer | {"force_model": force})
+def _changed(settings: EstimatorSettings, values: Mapping[str, float]) -> EstimatorSettings:
+    inner = {name: value for name, value in values.items() if name.startswith("force_model.")}
+    outer: dict[str, Any] = {name: value for name, value in values.items() if name not in inner}
+    update = {name.removeprefix("force_model."): value for name, value in inner.items()}
+    return settings.model_copy(update=outer | {"force_model": settings.force_model.model_copy(update=update)})
 
 
 BANDS = (2.0, 5.0, 20.0)
@@ -317,7 +300,6 @@ def _in_band(values: Array, band: float, time_step: float) -> Array:
 
 
 def _delay(true: Array, estimated: Array, time_step: float, left_out: int) -> float:
-    """Shift (s) of the estimate at which the two resemble each other most, between samples by a parabola."""
     most = min(round(MAXIMUM_DELAY / time_step), left_out)
     inner = slice(left_out, len(true) - left_out)
     shifts = np.arange(-most, most + 1)
@@ -338,3 +320,42 @@ def _phase_delay(true: Array, estimated: Array, time_step: float, band: float, a
     if not used.any():
         return float("nan")
     return float(np.average(found.delay[used], weights=found.weight[used]))
+
+
+SHOWN = 10.0
+"""Seconds drawn of a record at most, from when its start has been forgotten."""
+
+
+def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None) -> Figure:
+    """Estimated contact force, low-passed at 20 Hz in place, and the size of innovations, of at most 10 s.
+
+    measured: contact force of the record (N), (n,), drawn beside it.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 6), layout="constrained")
+    force, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    begin = estimate.time[estimate.first]
+    end = min(begin + SHOWN, estimate.time[-1])
+    shown = (estimate.time >= begin) & (estimate.time <= end)
+    step = float(estimate.time[1] - estimate.time[0])
+    time = estimate.time[shown]
+    if measured is not None:
+        drawn = zero_phase_low_pass(measured, step)[shown]
+        force.plot(time, drawn, color=ORANGE, linewidth=3, label="recorded")
+    drawn = zero_phase_low_pass(estimate.force, step)[shown]
+    force.plot(time, drawn, color="black", linewidth=1, label="estimated")
+    force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
+    legend_above(force, 2)
+    tested = estimate.consistency
+    innovations.plot(tested.window_time, tested.window_nis, "o-", color=BLUE, markersize=3, label="found")
+    innovations.axhline(1.0, color="0.4", linestyle=":", label="expected")
+    bound = window_bound(tested.nis)
+    innovations.axhline(bound, color=LIMIT, linestyle="--", linewidth=0.9, label="doubted above")
+    rest = f"; the record ends at {estimate.time[-1]:.4g} s" if end < estimate.time[-1] else ""
+    innovations.set(xlabel=f"time (s){rest}", ylabel="squared\ninnovations (-)")
+    legend_above(innovations)
+    for axis in (force, innovations):
+        axis.grid(color="0.9")
+    figure.suptitle(title, fontsize="medium", x=0.01, ha="left")
+    return figure

@@ -104,7 +104,6 @@ FORCE_MODELS: dict[str, type[ForceModel]] = {
     "shaped": Shaped,
     "periodic": Periodic,
 }
-"""By name."""
 
 
 def as_force_model(value: Any) -> ForceModel:

@@ -1,10 +1,7 @@
-"""Whether a filter's innovations are what its model says: white, and as large as their covariance.
+"""Whether a filter's innovations are what its model says, and whether an estimate is to be believed.
 
-Where they are not, the model, its noise or the record is wrong, and so may be the estimate. The converse does
-not hold: what no measured motion shows, above all a wrong mass of the collector head, they cannot show
-either.
-
-Whether an estimate is to be believed, from its innovations.
+Where they are not white and as large as their covariance, the model, its noise or the record is wrong. What
+no measured motion shows, above all a wrong mass of the collector head, they cannot show either.
 
 The bounds are effect sizes, not those of a test: of thousands of samples a test refuses every real
 pantograph. They are set from simulated records (own choice): parameters 5 % wrong at 150 to 350 km/h stay

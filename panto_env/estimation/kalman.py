@@ -127,15 +127,15 @@ def run_filter(model: Model, gains: Gains, measured: Array, inputs: Array, start
     return Filtered(predicted, state, innovations, gains)
 
 
-def force_variance(model: Model, gains: Gains) -> float:
-    """Variance (N^2) of the filtered contact force by the model, after the last of the gains.
+def force_variance(model: Model, gains: Gains, lag: int = 0) -> float:
+    """Variance (N^2) of the contact force by the model, from ``lag`` later samples too, with the last gains.
 
     It knows of noise, not of wrong parameters.
     """
-    ahead = gains.force[-1]
-    seen = model.observed @ ahead
-    known = seen @ np.linalg.solve(gains.innovation[-1], seen)
-    return float(model.force @ ahead - known)
+    variance = float(model.force @ gains.force[-1])
+    for seen in _seen_later(model, gains, lag):
+        variance -= float(seen @ np.linalg.solve(gains.innovation[-1], seen))
+    return variance
 
 
 def _gains(model: Model, covariance: Array) -> Gains:
@@ -191,29 +191,18 @@ def smooth_force(model: Model, filtered: Filtered, lag: int) -> Array:
         force[block] += np.einsum("ki,ki->k", filtered.gains.of(block).force, adjoint)
     if n > settled:
         news = np.vstack([filtered.innovations[settled:], np.zeros((lag, len(model.observed)))])
-        for own, weights in zip(news.T, _settled_weights(model, filtered.gains, lag).T, strict=True):
+        innovation, seen = filtered.gains.innovation[-1], _seen_later(model, filtered.gains, lag)
+        each_weight = np.array([np.linalg.solve(innovation, each) for each in seen])  # of an innovation (N)
+        for own, weights in zip(news.T, each_weight.T, strict=True):
             force[settled:] += np.correlate(own, weights, "valid")
     return np.asarray(force)
 
 
-def _settled_weights(model: Model, gains: Gains, lag: int) -> Array:
-    """What each of the next innovations adds to the force, (lag + 1, m), with the last of the gains (N)."""
-    gain, innovation = gains.gain[-1], gains.innovation[-1]
-    left = model.transition @ (np.eye(len(model.force)) - gain @ model.observed)
-    ahead, weights = gains.force[-1], []
+def _seen_later(model: Model, gains: Gains, lag: int) -> Array:
+    """What each of the next samples sees of a force's error, (lag + 1, m), with the last of the gains."""
+    left = model.transition @ (np.eye(len(model.force)) - gains.gain[-1] @ model.observed)
+    ahead, seen = gains.force[-1], []
     for _ in range(lag + 1):
-        weights.append(np.linalg.solve(innovation, model.observed @ ahead))
+        seen.append(model.observed @ ahead)
         ahead = left @ ahead
-    return np.array(weights)
-
-
-def smoothed_variance(model: Model, gains: Gains, lag: int) -> float:
-    """Variance (N^2) of the smoothed contact force by the model, with the last of the gains."""
-    gain, innovation = gains.gain[-1], gains.innovation[-1]
-    left = model.transition @ (np.eye(len(model.force)) - gain @ model.observed)
-    seen, variance = gains.force[-1], force_variance(model, gains)
-    for _ in range(lag):
-        seen = left @ seen
-        part = model.observed @ seen
-        variance -= float(part @ np.linalg.solve(innovation, part))
-    return variance
+    return np.array(seen)

@@ -1,4 +1,4 @@
-"""What a user may choose of an estimator."""
+"""What a user may choose of an estimator, and the model that it filters with."""
 
 from __future__ import annotations
 
@@ -58,7 +58,6 @@ ESTIMATORS: dict[str, EstimatorSettings] = {
     "usual": EstimatorSettings(),
     "displacements": EstimatorSettings(observation="displacements"),
 }
-"""By name."""
 
 
 START_HEIGHT, START_VELOCITY, START_SUSPENSION = 1.0, 1.0, 10.0
@@ -125,9 +124,11 @@ def build_model(
     known = np.zeros((total, 2))
     known[:size] = forces[:, 1:]
     transition, inputs, process_noise = _discretise(drift, known, noise, time_step)
-    rows = _observed(size, settings)
-    rms = [settings.displacement_noise] * 2 + [settings.velocity_noise] * 2
     masses = size // 2
+    rows = [0, masses - 1, masses, size - 1]  # of the first and the last mass
+    if settings.observation == "displacements":
+        rows = rows[:2]
+    rms = [settings.displacement_noise] * 2 + [settings.velocity_noise] * 2
     start = block_diag(
         START_HEIGHT**2 * np.eye(masses),
         START_VELOCITY**2 * np.eye(masses),
@@ -144,14 +145,6 @@ def build_model(
         force=np.concatenate([np.zeros(size), force.output, np.zeros(suspension)]),
         start_covariance=start,
     )
-
-
-def _observed(size: int, settings: EstimatorSettings) -> list[int]:
-    """Places in the state of what is measured: of the first and the last mass."""
-    masses = size // 2
-    if settings.observation == "displacements":
-        return [0, masses - 1]
-    return [0, masses - 1, masses, size - 1]
 
 
 def _discretise(drift: Array, inputs: Array, noise: Array, step: float) -> tuple[Array, Array, Array]:

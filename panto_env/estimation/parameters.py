@@ -19,8 +19,7 @@ from ..plant.pantograph.schema import PantographData
 from .estimate import filter_motion, first_settled, model_of
 from .kalman import corrected, correction, steady_gains
 from .model import PAPER2, EstimatorSettings, Model
-from .motion import Motion
-from .plausibility import check_motion
+from .motion import Motion, check_motion
 
 HEAD_MASS = "masses.1"
 LIFT = "lift"

@@ -1,11 +1,8 @@
-"""The contact force without any filter's model: what the head's suspension carries, less the head's inertia.
+"""The contact force without a belief about it: inertia-corrected, or a minimum-variance unbiased input.
 
-This is how a load cell below the strips is corrected, with the suspension as the load cell.
-
-The contact force as an input of which nothing at all is believed: a minimum-variance unbiased filter.
-
-S. Gillijns and B. De Moor, Automatica 43:111, 2007 (recalled): at each sample, the force over the step before
-is what least squares needs to explain it.
+The first is what the head's suspension carries less the head's inertia, as a load cell below the strips is
+corrected. The second is S. Gillijns and B. De Moor's filter (Automatica 43:111, 2007, recalled): the force
+over the step before each sample is what least squares needs to explain it.
 """
 
 from __future__ import annotations
@@ -22,8 +19,7 @@ from .estimate import model_of
 from .force import RandomWalk
 from .kalman import corrected, correction
 from .model import EstimatorSettings, Model
-from .motion import Motion
-from .plausibility import check_motion
+from .motion import Motion, check_motion
 
 CUTOFF, ORDER = 60.0, 2
 """Of a causal Butterworth low-pass, for estimates that are too noisy without one. The cut-off frequency (Hz)
@@ -70,11 +66,6 @@ SETTLED = 1e-10
 _HELD = RandomWalk(intensity=0.01)  # hardly moves: what the force does over a step is no noise of the state
 
 
-class _Gain(NamedTuple):
-    state: Array  # (N, m)
-    force: Array  # (m,)
-
-
 def unknown_input(
     motion: Motion,
     pantograph: PantographData,
@@ -91,17 +82,17 @@ def unknown_input(
     system = _system(model_of(motion, pantograph, settings.model_copy(update={"force_model": _HELD})))
     measured, known = motion.measured(len(system.observed)), motion.inputs @ system.inputs.T
     state, covariance = system.observed.T @ measured[0], system.start_covariance
-    gain, settled = None, False
+    settled = False
     raw = np.empty(len(measured))
     for k, sample in enumerate(measured):
-        if gain is None or not settled:
-            gain, after = _gain(system, covariance)
+        if not settled:
+            gain, of_force, after = _gain(system, covariance)
             following = system.transition @ after @ system.transition.T + system.process_noise
             settled = bool(np.abs(following - covariance).max() <= SETTLED * np.abs(covariance).max())
             covariance = following
         innovation = sample - system.observed @ state
-        raw[k] = gain.force @ innovation
-        state = system.transition @ (state + gain.state @ innovation) + known[k]
+        raw[k] = of_force @ innovation
+        state = system.transition @ (state + gain @ innovation) + known[k]
     raw[0] = motion.lift  # of the step before the first sample nothing is known
     return raw if cutoff is None else low_pass(raw, motion.time_step, cutoff, ORDER)
 
@@ -132,12 +123,12 @@ def _system(model: Model) -> _System:
     )
 
 
-def _gain(system: _System, covariance: Array) -> tuple[_Gain, Array]:
-    """Gains for a sample, and covariance of the corrected state, for that of the predicted one, (N, N)."""
+def _gain(system: _System, covariance: Array) -> tuple[Array, Array, Array]:
+    """Gains of state, (N, m), and force, (m,); covariance of the corrected state, by the predicted one's."""
     observed, contact = system.observed, system.contact
     known, innovation = correction(covariance, observed, system.measurement_noise)
     through = observed @ contact
     weight = np.linalg.solve(innovation, through)
     force = weight / (through @ weight)
     gain = known + np.outer(contact - known @ through, force)
-    return _Gain(gain, force), corrected(covariance, gain, observed, system.measurement_noise)
+    return gain, force, corrected(covariance, gain, observed, system.measurement_noise)

@@ -1,4 +1,4 @@
-"""Changes in the text of a TOML file that keep all else as it is, comments too."""
+"""A fitted line or pantograph as a TOML file: the design's text with other values, its comments kept."""
 
 from __future__ import annotations
 
@@ -88,7 +88,6 @@ def _flat(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
 
 
 SUFFIXES = (".toml",)
-"""Of the files that a line and a pantograph are written to."""
 
 
 def check_design(line: CatenaryData, base: str | Path, free: Sequence[str]) -> None:
@@ -199,7 +198,6 @@ def source(found: list[Found], records: str) -> str:
 
 
 def _write(path: str | Path, text: str, what: str, parse: Callable[[dict[str, Any], Path], Any]) -> None:
-    """Write the text of a line or a pantograph, unless it is one that could not be read back."""
     try:
         parse(tomllib.loads(text), Path(path))
     except InputError as error:

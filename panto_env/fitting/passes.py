@@ -1,9 +1,8 @@
-"""The measured side of a fit: a piece of a record as cosine coefficients of its low-passed force.
+"""The two sides of a fit: a piece of a record as cosine coefficients of its force, and simulated passes.
 
 Forces are compared by place, low-passed at 20 Hz without delay. The cosine transform of white noise is white,
-so each coefficient tells something of its own; coefficients of one band of frequencies have one variance,
-which is estimated from what the fit leaves over. Slow ones are left out, for what moves a force slowly is no
-dropper: drift of a sensor, wind, the driver.
+so each coefficient tells something of its own; those of one band of frequencies have one variance, which is
+estimated from what the fit leaves over. Slow ones are left out: drift of a sensor, wind, the driver.
 """
 
 from __future__ import annotations
@@ -66,17 +65,13 @@ class Measured:
     @cached_property
     def kept(self) -> Index:
         """Numbers of the coefficients that are compared."""
-        frequency = self._frequencies
+        frequency = np.arange(len(self.place)) * PER_SECOND / (2 * len(self.place))
         return np.flatnonzero((frequency >= self.lowest) & (frequency <= HIGHEST))
 
     @cached_property
     def band(self) -> Index:
         """Band of each coefficient that is compared, (coefficients,)."""
         return np.arange(len(self.kept)) * BANDS // len(self.kept)
-
-    @property
-    def _frequencies(self) -> Array:
-        return np.arange(len(self.place)) * PER_SECOND / (2 * len(self.place))
 
     def coefficients(self, force: Array) -> Array:
         """Cosine coefficients that are compared, (..., coefficients), of forces, (..., places) (N)."""
@@ -183,22 +178,23 @@ class Passes:
         self.position = speed * self.time_step * (np.arange(self.steps) + 0.5)
         """Of the samples, (steps,) (m)."""
 
-    def _plant(self, catenary: FlexibleCatenaryData) -> Plant:
-        return Plant(
-            catenary,
-            Train.of(self._pantograph),
-            spans=self._spans,
-            lanes=LANES,
-            numerics=self._numerics,
-            runs=self._runs,
-            varied=True,
-        )
-
     @contextmanager
     def _lent(self, catenary: FlexibleCatenaryData) -> Iterator[Plant]:
         """A plant of a line, for one thread at a time; one that was given back where there is one."""
         idle = self._idle[catenary]
-        plant = idle.pop() if idle else self._plant(catenary)
+        plant = (
+            idle.pop()
+            if idle
+            else Plant(
+                catenary,
+                Train.of(self._pantograph),
+                spans=self._spans,
+                lanes=LANES,
+                numerics=self._numerics,
+                runs=self._runs,
+                varied=True,
+            )
+        )
         yield plant
         idle.append(plant)
 
@@ -231,8 +227,6 @@ class Passes:
     def _side_by_side(
         self, shares: Sequence[tuple[list[int], Kept | None]], variants: Sequence[Variant], found: Array
     ) -> None:
-        """Compute shares of the variants, from a kept state on or from the line's start."""
-
         def run(share: tuple[list[int], Kept | None]) -> Array:
             (own, kept) = share
             with self._lent(variants[own[0]].catenary) as plant:
@@ -243,7 +237,6 @@ class Passes:
                 found[own, self.steps - force.shape[1] :] = force
 
     def _kept(self, variant: Variant, steps: Sequence[int]) -> list[Kept]:
-        """States of a variant's pass after numbers of steps, in rising order."""
         kept, done = [], 0
         with self._lent(variant.catenary) as plant:
             self._start(plant, [variant])
@@ -281,7 +274,6 @@ class Passes:
         return force
 
     def _samples(self, plant: Plant) -> Samples:
-        """Arrays in which a plant records its contact forces and nothing along the line."""
         return Samples(
             rows=np.zeros((plant.lanes, self.steps + 1, 1, SAMPLE_ROWS)),
             uplift=np.zeros((plant.lanes, self.steps + 1, 0)),

@@ -1,6 +1,4 @@
-"""The condition of a line that is fitted: what is known of it, and room for what is freed.
-
-Where the simulated pass of a fit begins: at rest at the line's first support, or well before the records.
+"""What a fit begins with: the line's condition with room for what is freed, and where simulated passes begin.
 
 A simulated pass begins pressed to the wire at rest, and 20 spans on, its force is still 2.4 N off what it
 settles to, 0.5 N after 40 (``en50318-2002``, ``dsa380``, 220 km/h). A measured train comes from elsewhere:
@@ -244,7 +242,6 @@ def problem(
 
 
 def _refuse_twice(records: Sequence[Record]) -> None:
-    """Refuse a pass that is there twice: it would count as two, and intervals would be too narrow."""
     known: dict[bytes, str] = {}
     for record in records:
         for piece in record.pieces:

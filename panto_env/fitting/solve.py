@@ -1,6 +1,4 @@
-"""Normal equations of a fit, and the noise that they leave.
-
-Gauss-Newton with tolerances as priors, and the noise of each band of frequencies found on the way.
+"""The iteration of a fit: Gauss-Newton with tolerances as priors, and the noise of each band of frequencies.
 
 Noise is found with the values: from what is left over, counted with as many degrees of freedom as the values
 leave (MacKay, 1992, "Bayesian interpolation"). At first that is nearly everything that a record has, so that
@@ -164,7 +162,9 @@ class Fitting(Misfit):
             if best.settled and jumped is None:
                 break
             found = settle(jumped or best.state, best.covariance)
-            if jumped and not self._sum(found, best) < self._sum(best, best) - BETTER:
+            noise = best.state.noise  # for both: of what each has left, they would not compare
+            sums = [self.sum_of(each.left, noise, each.state.x) for each in (found, best)]
+            if jumped and not sums[0] < sums[1] - BETTER:
                 break
             best = found
         return settle(best.state, best.covariance, fine=True)
@@ -214,10 +214,6 @@ class Fitting(Misfit):
                     coarse = coarse and (cooling or bool(np.isnan(held).any()))
                     sets += sure
                     break
-
-    def _sum(self, solution: Solution, usual: Solution) -> float:
-        """What is minimised, at a solution, with the noise of another one."""
-        return self.sum_of(solution.left, usual.state.noise, solution.state.x)
 
     def _jumped(self, solution: Solution, working: Callable[[str], None]) -> State | None:
         """The state after single droppers have jumped; None where that makes nothing better.

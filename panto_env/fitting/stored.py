@@ -1,4 +1,4 @@
-"""Why a fit is less sure than it says."""
+"""What a fit knows, in a file: where it was broken off, or its end with its covariance and doubts."""
 
 from __future__ import annotations
 
@@ -127,7 +127,10 @@ def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
     fitting, before = fit.problem.fitting, fit.before
     design, count = fitting.values.design, len(fitting.values)
-    values = tuple(along(each, before) for each in fitting.values.all)
+    values = tuple(
+        value if value.place is None else replace(value, place=value.place + before)
+        for value in fitting.values.all
+    )
     difference, covariance = fit.solution.state.x[:count], fit.solution.covariance[:count, :count]
     if before:
         turn = turned(values, -before)
@@ -148,16 +151,10 @@ def knowledge(fit: Fit, records: str) -> Stored:
 
 def store(known: Stored, path: str | Path) -> None:
     """Write what a fit knows, whole or not at all. Raises InputError where it cannot be written."""
-    table = {
-        "name": known.name,
-        "line": known.line,
-        "pantograph": known.pantograph,
-        "values": [asdict(value) for value in known.values],
-        "compared": list(known.compared),
-        "notes": list(known.notes),
-    }
-    arrays = {name: getattr(known, name) for name in ARRAYS}
-    write_arrays(path, table, {name: np.ascontiguousarray(array) for name, array in arrays.items()})
+    table = {name: getattr(known, name) for name in ("name", "line", "pantograph")}
+    table["values"] = [asdict(value) for value in known.values]
+    table |= {"compared": list(known.compared), "notes": list(known.notes)}
+    write_arrays(path, table, {name: np.ascontiguousarray(getattr(known, name)) for name in ARRAYS})
 
 
 def stored(path: str | Path) -> Stored:
@@ -179,7 +176,6 @@ def stored(path: str | Path) -> Stored:
 
 
 def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
-    """Raise ValueError, with a clause, for arrays that are not those of a fit of these values."""
     count, tolerances = len(values), np.array([value.tolerance for value in values])
     if len({value.name for value in values}) < count:
         raise ValueError("two values have one name")
@@ -193,11 +189,6 @@ def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
     usable = np.abs(relative).max() < 2 and np.allclose(relative, relative.T, rtol=0.0, atol=1e-6)
     if not (usable and (sizes := np.linalg.eigvalsh(relative))[0] > 1e-14 and sizes[-1] < 1.001):
         raise ValueError("its covariance is not symmetric and positive, or wider than its tolerances")
-
-
-def along(value: Value, before: float) -> Value:
-    """A value with its place on the line, of which some way lies before what was simulated (m)."""
-    return value if value.place is None else replace(value, place=value.place + before)
 
 
 def turned(values: Sequence[Value], further: float) -> Array:

@@ -11,9 +11,9 @@ import numpy as np
 from ..analysis.pool import Progress, in_processes
 from ..base.arrays import Array
 from .methods import identify
-from .model import HEAD, IDENTIFIED, MEASURED, SUPPORT, Parameters
+from .model import HEAD, IDENTIFIED, MEASURED, SUPPORT, Parameters, matrices
 from .record import Record
-from .response import contact_force, rest_on_plate, under_plate
+from .response import contact_force, polynomials, respond
 
 SAMPLING = 1000.0
 """Samples per second. Own choice: the paper doesn't say."""
@@ -73,7 +73,9 @@ def clean_record(
     count = round(duration / time_step) + 1
     time = time_step * np.arange(-before, count)
     plate = excitation.plate(time, duration)
-    states = under_plate(parameters, plate, time_step, rest_on_plate(parameters, excitation.offset))
+    a, b = matrices(parameters)
+    at_rest = np.asarray(np.linalg.solve(a, -b[:, 0] * excitation.offset))
+    states = respond(a, b, polynomials(plate, time_step), time_step, at_rest)
     force = contact_force(parameters, plate, states, time_step)
     return Record(time_step, plate[before:], states[before:, HEAD], states[before:, SUPPORT], force[before:])
 
@@ -86,17 +88,11 @@ def add_noise(
 ) -> Record:
     """The record with white noise on every sensor: of displacements (rms, m), and FORCE_NOISE."""
     noise = displacement * generator.standard_normal((3, len(record.plate)))
+    plate, head, support = np.array([record.plate, record.head, record.support]) + noise
     force = record.force
     if force is not None:
         force = force + FORCE_NOISE * generator.standard_normal(len(force))
-    return Record(
-        record.time_step,
-        record.plate + noise[0],
-        record.head + noise[1],
-        record.support + noise[2],
-        force,
-        record.start,
-    )
+    return Record(record.time_step, plate, head, support, force, record.start)
 
 
 TRIALS_PER_JOB = 10

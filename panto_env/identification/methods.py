@@ -1,11 +1,8 @@
-"""Paper 1's identification: derivatives by three points, A X = Y, linear least squares (Eqs 3-8).
+"""Paper 1's identification: derivatives by three points, A X = Y, least squares (Eqs 3-8); output error.
 
-Beyond the paper: the parameters under which the simulated motion is the recorded one.
-
-The equation-error fit differentiates noise and then regresses on it, which biases it. Here the model is
-simulated under the recorded plate motion and its displacements are fitted to the recorded ones, weighted
-with the residuals' own covariance (maximum likelihood; R. E. Maine and K. W. Iliff, NASA RP-1168, 1986,
-recalled). The start of the motion is identified along with the parameters.
+Noise in the derivatives biases the equation-error fit. The output-error fit simulates the model under the
+recorded plate and fits its displacements, weighted with the residuals' own covariance (maximum likelihood;
+R. E. Maine and K. W. Iliff, NASA RP-1168, 1986, recalled), with the start of the motion as unknowns.
 """
 
 from __future__ import annotations
@@ -19,8 +16,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .model import IDENTIFIED, Fit, Parameters, check_known, free_names, matrices
-from .plausibility import check_record
-from .record import Record
+from .record import Record, check_record
 from .response import band_limited, excited_band, polynomials, respond
 
 DEPENDENT = 1e8
@@ -159,14 +155,15 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     guess = {n: max(v, START[n]) for n, v in zip(start.names, start.values, strict=True)}
     misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
-    bounds = (misfit.lowest(), np.inf)
+    # No spring, damper or mass is below 0; a model that grows by itself would fit noise.
+    lowest = np.where(np.arange(len(solution)) < len(start.names), 0.0, -np.inf)
     for _ in range(PASSES):
         try:
             fitted = least_squares(
                 misfit.residuals,
                 solution,
                 misfit.jacobian,
-                bounds=bounds,
+                bounds=(lowest, np.inf),
                 x_scale="jac",
                 max_nfev=MOST_EVALUATIONS,
             )
@@ -184,16 +181,8 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
         )
     p = len(start.names)
     values = np.where(fitted.active_mask[:p] == -1, 0.0, solution[:p]) * misfit.scale
-    std = np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / length
-    return Fit(
-        OUTPUT_ERROR,
-        known,
-        start.names,
-        values,
-        std[:p] * misfit.scale,
-        dependence,
-        dependence,
-    )
+    std = (np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / length)[:p] * misfit.scale
+    return Fit(OUTPUT_ERROR, known, start.names, values, std, dependence, dependence)
 
 
 class Misfit:
@@ -228,12 +217,6 @@ class Misfit:
         slope = (self.target[1] - self.target[0]) / (self.time_step * self.rows.step)
         values = np.array([guess[name] for name in self.names]) / self.scale
         return np.concatenate([values, self.target[0], slope, np.zeros(self.offsets)])
-
-    def lowest(self) -> Array:
-        """Bounds: no spring, damper or mass is below 0; a model that grows by itself would fit noise."""
-        bounds = np.full(len(self.names) + 4 + self.offsets, -np.inf)
-        bounds[: len(self.names)] = 0.0
-        return bounds
 
     def simulated(self, solution: Array) -> Array:
         """Displacements of head and support, (rows, 2)."""

@@ -39,7 +39,6 @@ HEAD, SUPPORT, HEAD_SPEED, SUPPORT_SPEED, PLATE = range(5)
 
 
 def _range(field: str) -> tuple[float, float]:
-    """Lowest and highest value that a pantograph may have."""
     (between,) = set(ranges_of(PantographData.model_fields[field].rebuild_annotation()))
     return between.low, between.high
 
@@ -119,8 +118,7 @@ def matrices(parameters: Parameters) -> tuple[Array, Array]:
     return a, b
 
 
-CONFIDENCE = 0.95
-Z = 1.959963984540054  # of the normal distribution, two-sided, at CONFIDENCE
+Z = 1.959963984540054  # of the normal distribution, two-sided, at 95 %
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How well a model's displacements match the recorded ones (paper 1, Eqs 9 and 10)."""
+"""How a model's displacements match the recorded ones (paper 1, Eqs 9 and 10): tables, pictures, a file."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
+from ..base.plotting import BLUE, ORANGE
 from ..base.settings import ranges_of
 from ..base.table import Alarm, Table
 from ..plant.pantograph.schema import PantographData
@@ -19,6 +21,9 @@ from ..terminal import number
 from .model import HEAD, PLATE, SUPPORT, UNITS, Fit, Parameters, matrices
 from .record import Record
 from .response import contact_force, fitted_response, force_matrices
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -32,13 +37,8 @@ class Match:
 
     def as_dict(self) -> dict[str, str | float]:
         """What was compared and how well it matches, without the series."""
-        return {
-            "channel": self.channel,
-            "driven_by": self.driven_by,
-            "performance": self.performance,
-            "mean_error": self.mean_error,
-            "squared_error": self.squared_error,
-        }
+        names = ("channel", "driven_by", "performance", "mean_error", "squared_error")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def performance(self) -> float:
@@ -74,9 +74,7 @@ def matches(record: Record, parameters: Parameters) -> list[Match]:
         return under_plate
     force = contact_force(parameters, record.plate, states, step)
     under_plate.append(Match("force", "plate", record.force, force))
-    if parameters["c1T"] > 0:
-        return under_plate + force_matches(record, parameters)
-    return under_plate
+    return under_plate + (force_matches(record, parameters) if parameters["c1T"] > 0 else [])
 
 
 def force_matches(record: Record, parameters: Parameters) -> list[Match]:
@@ -118,13 +116,18 @@ def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
 
 def matches_table(matches: Sequence[Match], method: str) -> Table:
     """The model that a method identified, beside the record."""
-    rows = []
-    for match in matches:
+
+    def error(match: Match) -> str:
         force = match.channel == "force"
-        error = f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
-        rows.append((match.channel, match.driven_by, number(match.performance), error))
-    headings = ("series", "driven by", "fitting performance (%)", "mean error")
-    return Table(f"Model by {method} beside the record", headings, rows, text_columns=len(headings))
+        return f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
+
+    columns = {
+        "series": lambda match: match.channel,
+        "driven by": lambda match: match.driven_by,
+        "fitting performance (%)": lambda match: number(match.performance),
+        "mean error": error,
+    }
+    return Table.of(f"Model by {method} beside the record", matches, columns, text_columns=4)
 
 
 EXPLAINS = 50.0
@@ -133,7 +136,6 @@ EXPLAINS = 50.0
 MOST_FORCE = _FORCE.high
 """Maximum lifting force (N) of a pantograph."""
 SUFFIXES = (".toml",)
-"""Of the file that a pantograph is written to."""
 
 
 def check_possible(fit: Fit) -> None:
@@ -181,14 +183,13 @@ def write_pantograph(
 
     p = fit.parameters
 
+    rsd = dict(zip(fit.names, fit.rsd, strict=True))
+
     def source(*names: str) -> str:
-        parts = []
-        for name in names:
-            if name in fit.names:
-                parts.append(f"{name} identified from {record} (RSD {fit.rsd[fit.names.index(name)]:.3g} %)")
-            else:
-                parts.append(f"{name} measured")
-        return "; ".join(parts)
+        return "; ".join(
+            f"{name} identified from {record} (RSD {rsd[name]:.3g} %)" if name in rsd else f"{name} measured"
+            for name in names
+        )
 
     description = f"Identified from {record} by {fit.method}; two masses, no aerodynamic uplift."
     lines = [
@@ -213,3 +214,65 @@ def _entry(key: str, value: float | list[float], source: str) -> str:
 def _text(text: str) -> str:
     """A TOML string: JSON's escapes are TOML's."""
     return json.dumps(text, ensure_ascii=False)
+
+
+SHOWN = 2000
+"""Points drawn of a series at most: more cannot be seen and make files large."""
+
+
+def plot_record(record: Record, title: str, seconds: float) -> Figure:
+    """Contact force and displacements over the first ``seconds``, as paper 1's Figs 6 to 8."""
+    from matplotlib.figure import Figure
+
+    inside = record.time <= record.start + seconds
+    step = max(1, int(inside.sum()) // SHOWN)
+    time = record.time[inside][::step]
+    series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
+    if record.force is not None:
+        series = {"force": record.force} | series
+    figure = Figure(figsize=(7, 6.2), layout="constrained")
+    axes = figure.subplots(len(series), 1, sharex=True)
+    for axis, (name, values) in zip(axes, series.items(), strict=True):
+        symbol, unit, scale = _axis_of(name)
+        axis.plot(time, scale * values[inside][::step], color=BLUE, linewidth=1)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
+        axis.grid(color="0.9")
+    axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
+    figure.suptitle(title)
+    return figure
+
+
+def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float, last: float) -> Figure:
+    """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
+    from matplotlib.figure import Figure
+
+    inside = (time >= first) & (time <= last)
+    step = max(1, int(inside.sum()) // SHOWN)
+    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(matches)), layout="constrained")
+    axes = figure.subplots(len(matches), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, match in zip(axes, matches, strict=True):
+        symbol, unit, scale = _axis_of(match.channel)
+        recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))
+        axis.plot(time[inside][::step], recorded, color=ORANGE, linewidth=3)
+        axis.plot(time[inside][::step], modelled, color="black", linewidth=0.8)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
+        axis.set_title(
+            f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
+            f"mean error {scale * match.mean_error:.3g} {unit}",
+            loc="right",
+            fontsize="small",
+        )
+        axis.grid(color="0.9")
+    axes[0].plot([], [], color=ORANGE, linewidth=3, label="record")
+    axes[0].plot([], [], color="black", linewidth=0.8, label="model")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
+    axes[-1].set(xlabel="time (s)", xlim=(first, last))
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _axis_of(channel: str) -> tuple[str, str, float]:
+    """Symbol and unit of a record's channel, and the scale from SI to this unit."""
+    if channel == "force":
+        return "f_1", "N", 1.0
+    return f"y_{{{channel.removeprefix('y_')}}}", "mm", 1e3

@@ -1,10 +1,7 @@
-"""The band of the excitation, and a record limited to it by a linear-phase low-pass.
+"""The band of the excitation, and records limited to it by a linear-phase low-pass; the model's response.
 
-The low-pass is the same for all sensors, so that the filtered record still obeys the equations of motion.
-
-Noise outside the band of the excitation carries no information, but ruins derivatives (and excites the
-model's own resonance). A linear filter commutes with a linear model, so the same filter on every channel
-changes nothing else. Both ends are cut off, not padded.
+Noise outside the band carries no information, but ruins derivatives and excites the model's resonance. The
+same linear filter on all channels commutes with a linear model. Both ends are cut off, not padded.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ from ..backend import kernel
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .model import HEAD, HEAD_SPEED, Parameters, matrices
-from .record import Record
+from .record import Record, frequency_below
 
 ATTENUATION = 60.0
 """Of noise above twice the band (dB)."""
@@ -29,10 +26,7 @@ ROWS = 10
 
 def excited_band(record: Record) -> float:
     """Highest frequency (Hz) of the plate's motion: below it lies 99.9 % of the power about the mean."""
-    plate = (record.plate - record.plate.mean()) * np.hanning(len(record.plate))
-    power = np.cumsum(np.abs(np.fft.rfft(plate)) ** 2)
-    place = int(np.searchsorted(power, POWER * power[-1]))
-    return float(np.fft.rfftfreq(len(plate), record.time_step)[max(place, 1)])
+    return frequency_below(record, POWER, first=1)
 
 
 def band_limited(record: Record, band: float) -> tuple[Record, int]:
@@ -71,15 +65,10 @@ def band_limited(record: Record, band: float) -> tuple[Record, int]:
         mean = values.mean()
         return np.asarray(mean + oaconvolve(values - mean, window, mode="valid"))
 
-    half = taps // 2
-    return Record(
-        record.time_step,
-        smooth(record.plate),
-        smooth(record.head),
-        smooth(record.support),
-        None if record.force is None else smooth(record.force),
-        record.start + half * record.time_step,
-    ), stride
+    force = None if record.force is None else smooth(record.force)
+    plate, head, support = (smooth(each) for each in (record.plate, record.head, record.support))
+    start = record.start + taps // 2 * record.time_step
+    return Record(record.time_step, plate, head, support, force, start), stride
 
 
 @kernel
@@ -119,18 +108,6 @@ def respond(a: Array, b: Array, inputs: Array, time_step: float, initial: Array)
     states[0] = initial
     recur(whole[:size, :size].copy(), inputs @ whole[:size, size:].T, states)
     return states
-
-
-def rest_on_plate(parameters: Parameters, plate: float) -> Array:
-    """State, (4,), at rest on a plate that stands at ``plate`` (m)."""
-    a, b = matrices(parameters)
-    return np.asarray(np.linalg.solve(a, -b[:, 0] * plate))
-
-
-def under_plate(parameters: Parameters, plate: Array, time_step: float, initial: Array) -> Array:
-    """States [y_p2, y_p3, y_p2', y_p3'], (n, 4), while the plate moves as recorded (m)."""
-    a, b = matrices(parameters)
-    return respond(a, b, polynomials(plate, time_step), time_step, initial)
 
 
 def contact_force(parameters: Parameters, plate: Array, states: Array, time_step: float) -> Array:

@@ -1,4 +1,4 @@
-"""What an odometer says of a train: where it was reset, where the train stands or runs back, even steps."""
+"""Time and place of samples: what an odometer says, where a run is cut, and its pieces of even steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
 from .record import Piece
@@ -238,12 +238,12 @@ def cut(
     reset = resets(axes.time, axes.position, axes.step, axes.gap)
     back = runs_back(axes.position, axes.gap | reset)
     breaks = [
-        _between("samples are missing", axes, axes.gap),
-        _between("the position jumps, as an odometer that is reset", axes, reset & ~axes.gap),
-        _stretches("the force is missing", axes, empty),
-        _stretches("the pantograph is down", axes, down),
-        _stretches("the train stands", axes, still),
-        _stretches(RUNS_BACK, axes, back),
+        _break("samples are missing", axes, np.flatnonzero(axes.gap)),
+        _break("the position jumps, as an odometer that is reset", axes, np.flatnonzero(reset & ~axes.gap)),
+        _break("the force is missing", axes, _begins(empty)),
+        _break("the pantograph is down", axes, _begins(down)),
+        _break("the train stands", axes, _begins(still)),
+        _break(RUNS_BACK, axes, _begins(back)),
     ]
     good = ~(still | back | down | empty)
     apart = axes.gap | reset | (good[1:] != good[:-1])
@@ -252,11 +252,8 @@ def cut(
     long = [
         each for each in parts if axes.time[each.stop - 1] - axes.time[each.start] >= SHORTEST - axes.step
     ]
-    short = [each for each in parts if each not in long]
-    if short:
-        first = short[0].start
-        words = f"a piece is shorter than {SHORTEST:g} s"
-        breaks.append(Break(words, len(short), float(axes.position[first]), float(axes.time[first])))
+    short = np.array([each.start for each in parts if each not in long], dtype=int)
+    breaks.append(_break(f"a piece is shorter than {SHORTEST:g} s", axes, short))
     pieces = [_piece(run, axes, force, series, each) for each in long]
     return pieces, [each for each in breaks if each.count]
 
@@ -278,14 +275,12 @@ def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part
     return Piece(run, step, float(time[0]), position, forces, own.get("height"), own.get("uplift"))
 
 
-def _between(reason: str, axes: Axes, where: NDArray[np.bool_]) -> Break:
-    """Breaks between a sample and the next, (n - 1,)."""
-    first = int(np.argmax(where)) if where.size else 0
-    return Break(reason, int(where.sum()), float(axes.position[first]), float(axes.time[first]))
+def _break(reason: str, axes: Axes, places: Index) -> Break:
+    """places: numbers of the samples at which the run is cut, or before which."""
+    first = int(places[0]) if places.size else 0
+    return Break(reason, len(places), float(axes.position[first]), float(axes.time[first]))
 
 
-def _stretches(reason: str, axes: Axes, where: NDArray[np.bool_]) -> Break:
-    """Stretches of samples, (n,), that are left out."""
-    begins = np.flatnonzero(where & ~np.concatenate([[False], where[:-1]]))
-    first = int(begins[0]) if begins.size else 0
-    return Break(reason, len(begins), float(axes.position[first]), float(axes.time[first]))
+def _begins(where: NDArray[np.bool_]) -> Index:
+    """Numbers of the samples at which stretches, (n,), begin."""
+    return np.flatnonzero(where & ~np.concatenate([[False], where[:-1]]))

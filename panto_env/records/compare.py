@@ -103,31 +103,28 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
     )
-    criteria = (*_limits(figures, uplift, where, height), alike, *_information(figures))
-    return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
-
-
-def _limits(
-    figures: dict[str, tuple[float, float]], uplift: float, where: str, height: float
-) -> list[Criterion]:
-    measured, simulated = figures["std"]
-    std = 100 * (simulated / measured - 1)
-    heights = "mean over the spans of the range within each, low-passed at 20 Hz"
-    return [
-        Criterion("std", "σ of the contact force", "%", std, -STD, STD, SOURCE),
+    heights_note = "mean over the spans of the range within each, low-passed at 20 Hz"
+    criteria = (
+        Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
         Criterion(
-            "height", "range of the contact point's height", "mm", height, -HEIGHT, HEIGHT, SOURCE, heights
+            "height",
+            "range of the contact point's height",
+            "mm",
+            height,
+            -HEIGHT,
+            HEIGHT,
+            SOURCE,
+            heights_note,
         ),
-    ]
-
-
-def _information(figures: dict[str, tuple[float, float]]) -> list[Criterion]:
-    return [
-        Criterion(key, LABELS[key].name, "N", simulated - measured)
-        for key, (measured, simulated) in figures.items()
-        if key != "std"
-    ]
+        alike,
+        *(
+            Criterion(key, LABELS[key].name, "N", simulated - measured)
+            for key, (measured, simulated) in figures.items()
+            if key != "std"
+        ),
+    )
+    return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
 
 
 _STATISTICS = {
@@ -139,7 +136,6 @@ _STATISTICS = {
 
 
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
-    """The record's pieces at the run's speed, and notes."""
     same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
     if not same:
         raise InputError(
@@ -189,7 +185,6 @@ def _spans(
 
 
 def _check_speed(speed: Array, run: Trajectory, begin: float, end: float) -> None:
-    """Raise InputError unless local speeds (m/s), (m,), from begin to end (m), are about the run's."""
     away = float(np.abs(speed / run.speed - 1).max())
     if away > SAME_SPEED:
         low, high = to_kmh(float(speed.min())), to_kmh(float(speed.max()))
@@ -237,9 +232,6 @@ def _uplift(samples: Samples, run: Trajectory, begin: float, end: float) -> tupl
     return 1e3 * (simulated - measured), words
 
 
-FIGURES = ("mean", "std", "max", "min")
-
-
 def figures_table(found: Comparison) -> Table:
     """Statistics of both forces over the common spans."""
     rows = [
@@ -264,18 +256,18 @@ def spans_table(found: Comparison) -> Table:
         (
             found.run.alignment.span_name(each.span),
             f"{each.begin:,.6g}",
-            *(number(value) for key in FIGURES for value in getattr(each, key)),
-            _signed(deviation(each)),
+            *(number(value) for key in _STATISTICS for value in getattr(each, key)),
+            _signed(deviation(each.std)),
         )
         for each in found.spans
     ]
-    short = [f"{LABELS[key].short} {whose}" for key in FIGURES for whose in ("rec.", "run")]
+    short = [f"{LABELS[key].short} {whose}" for key in _STATISTICS for whose in ("rec.", "run")]
     return Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
 
 
-def deviation(pair: SpanPair) -> float:
-    """Deviation of a run's standard deviation in a span (%)."""
-    measured, simulated = pair.std
+def deviation(pair: tuple[float, float]) -> float:
+    """Deviation of a run's standard deviation from a record's (%)."""
+    measured, simulated = pair
     return 100 * (simulated / measured - 1)
 
 

@@ -92,8 +92,10 @@ def judge(
     runs = list(dict.fromkeys(piece.run for piece in record.pieces))
     if len(runs) > 1:
         parts += [_part(samples, "run", f"run {name}", samples.run == k) for k, name in enumerate(runs)]
-    number = np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
-    classes = [_part(samples, "speed", _class_name(k), number == k) for k in np.unique(number)]
+    low = FIRST_KMH + CLASS_KMH * np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
+    classes = [
+        _part(samples, "speed", f"{max(k, 0):g}-{k + CLASS_KMH:g} km/h", low == k) for k in np.unique(low)
+    ]
     parts += classes
     edges = _section_edges(samples.position, line, section)
     at = np.searchsorted(edges, samples.position, side="right") - 1
@@ -127,11 +129,6 @@ def force_spectrum(record: Record) -> tuple[Array, Array]:
     return found[0][0], np.sqrt(np.mean([own**2 for _, own in found], axis=0))
 
 
-def _class_name(number: float) -> str:
-    begin = FIRST_KMH + CLASS_KMH * number
-    return f"{max(begin, 0):g}-{begin + CLASS_KMH:g} km/h"
-
-
 def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) -> Part:
     force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
     speed = float(samples.speed[inside].mean())
@@ -153,7 +150,6 @@ def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) ->
 
 
 def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -> list[Part]:
-    """Parts of the spans within reach (m), that runs cover together."""
     numbers, found = alignment.span_of(samples.position), []
     for span in np.unique(numbers):
         begin, end = alignment.limits((int(span), int(span)))
@@ -292,7 +288,6 @@ def part_tables(found: Judgement) -> list[Table]:
 
 
 def _parts_table(parts: list[Part], title: str) -> Table:
-    """Figures of parts; spans have their length in their names."""
     long = [] if parts[0].kind == "span" else ["distance (m)"]
     short = [LABELS[key].short_heading for key in SHOWN]
     rows = [

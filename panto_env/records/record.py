@@ -217,7 +217,10 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
     own = np.interp(places, run.position, zero_phase_low_pass(run.contact_force, run.time_step))
     # The record on a grid that reaches further on both sides: a shift by a step is one by an index.
     there = begin - lags[-1] + GRID * np.arange(len(places) + len(lags) - 1)
-    pieces = _on_grid(samples, there)
+    pieces = [
+        np.interp(there, samples.position[part], samples.in_place[part], left=np.nan, right=np.nan)
+        for part in samples.slices
+    ]
     # Lag k reads the record at places - lags[k], which begins at index len(lags) - 1 - k.
     found = np.array([_correlation(own, pieces, len(lags) - 1 - k) for k in range(len(lags))])
     ways, correlations = GRID * found[:, 1], found[:, 0]
@@ -234,21 +237,8 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
     rest = [k for k in peaks if abs(lags[k] - lags[best]) > 0.25 * span]
     second = max(rest, key=lambda k: correlations[k], default=None)
     value, correlation = _vertex(lags, correlations, best)
-    return Shift(
-        value,
-        correlation,
-        math.nan if second is None else float(lags[second]),
-        math.nan if second is None else float(correlations[second]),
-        (float(lags[0]), float(lags[-1])),
-    )
-
-
-def _on_grid(samples: Samples, places: Array) -> list[Array]:
-    """Force of each piece without delay at places (m), (n,), N; nan where the piece is not."""
-    return [
-        np.interp(places, samples.position[part], samples.in_place[part], left=np.nan, right=np.nan)
-        for part in samples.slices
-    ]
+    other = (math.nan, math.nan) if second is None else (float(lags[second]), float(correlations[second]))
+    return Shift(value, correlation, *other, (float(lags[0]), float(lags[-1])))
 
 
 def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, int]:
@@ -263,13 +253,11 @@ def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, in
 
 
 def _peaks(values: Array) -> list[int]:
-    """Places of local maxima, the ends included."""
     padded = np.concatenate([[-math.inf], values, [-math.inf]])
     return np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:])).tolist()
 
 
 def _vertex(lags: Array, values: Array, k: int) -> tuple[float, float]:
-    """Place and height of the parabola through a maximum and its neighbours."""
     if not 0 < k < len(lags) - 1 or values[k - 1] <= -1.0 or values[k + 1] <= -1.0:
         return float(lags[k]), float(values[k])
     before, here, after = values[k - 1 : k + 2]

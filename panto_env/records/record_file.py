@@ -1,22 +1,10 @@
-"""Columns of a record's file, CSV or Parquet, as arrays in SI units.
+"""A record's file, CSV or Parquet, read as pieces, and its contact force from sensors below the strips.
 
-Contact force from the force sensors below the strips: EN 50317's correction by the strips' inertia.
-
-The standard was not at hand; as recalled, it has the contact force as the sum of the sensors' forces, the
-inertia of the mass between sensors and contact, and an aerodynamic part, which is left to the user here.
-
-    contact wire      F_c down on the strips
-    ===========
-      strips, m       m a = F_s - F_c - m g,  a: upward acceleration
-    ===========
-    force sensors     F_s up on the strips
-
-The sensors are set to zero under the strips at rest, so that F_s does not hold m g. What remains is
-F_c = F_s - m a: where the strips accelerate upwards, part of the sensors' force does so, and the wire feels
-less. With accelerations that are positive downwards it would be F_s + m a.
-
-Force and acceleration are corrected before any filter: the sum goes through EN 50317's low-pass as a whole,
-so both parts have the same delay. What is recorded must not have been filtered differently before.
+EN 50317's correction by the strips' inertia, recalled: the sensors' forces F_s (set to zero under the strips
+at rest, so without m g) act up on the strips of mass m, the contact wire with F_c down on them. So
+F_c = F_s - m a, with a upwards; the aerodynamic part is left to the user. Force and acceleration are
+corrected before any filter, so both parts have the same delay; what is recorded must not have been filtered
+differently before.
 """
 
 from __future__ import annotations
@@ -96,7 +84,6 @@ def read_table(
 
 
 def _refuse_sensor(path: str | Path, heading: str) -> None:
-    """Raise InputError for a heading, as ``places_of`` gives it, of a sensor that would be left out."""
     match = _SENSOR.fullmatch(heading)
     if match is None:
         return
@@ -128,12 +115,9 @@ def _parquet(
             f"{path} is a saved run of `panto simulate`, not a record: give it to `panto compare` as the "
             "run, or write the run as .csv to judge it like a record."
         )
-    values: dict[str, Any] = {}
     refuse = partial(_refuse_sensor, path)
     places = places_of(path, table.column_names, COLUMNS, units, refuse, headings)
-    for name, (place, scale) in places.items():
-        values[name] = _cells(path, name, table.column(place), scale)
-    return values
+    return {name: _cells(path, name, table.column(at), scale) for name, (at, scale) in places.items()}
 
 
 def _cells(path: str | Path, name: str, cells: Any, scale: float) -> Any:
@@ -261,7 +245,8 @@ def write_record(record: Record, path: str | Path) -> None:
 
 def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
     force, notes = contact_force(values, mass)
-    check_motion({key: each for key in ("height", "uplift") if (each := _known(values, key)) is not None})
+    seen = (key for key in ("height", "uplift") if key in values)
+    check_motion({key: values[key] for key in seen if not np.isnan(values[key]).all()})
     raised = values.get("raised")
     kept = np.isfinite(force) & (True if raised is None else raised > 0.5)
     if kept.sum() < 2:
@@ -312,7 +297,6 @@ def _runs(names: Sequence[str] | None, samples: int) -> dict[str, slice]:
 
 
 def _check(pieces: Sequence[Piece]) -> None:
-    """Raise InputError where pieces are too short, have different rates, or are there twice."""
     longest = max((piece.time_step * len(piece.force) for piece in pieces), default=0.0)
     if longest < LONGEST:
         raise InputError(
@@ -335,7 +319,6 @@ def _check(pieces: Sequence[Piece]) -> None:
 
 
 def _sentences(breaks: Sequence[Break]) -> list[str]:
-    """A sentence for each reason: how often, and where first."""
     found = []
     for reason in dict.fromkeys(each.reason for each in breaks):
         own = [each for each in breaks if each.reason == reason]
@@ -346,8 +329,3 @@ def _sentences(breaks: Sequence[Break]) -> list[str]:
         left = "it is left out" if reason.startswith("a piece") else left
         found.append(f"{reason[0].upper()}{reason[1:]} {how}; {left}.")
     return found
-
-
-def _known(values: Mapping[str, Array], key: str) -> Array | None:
-    each: Array | None = values.get(key)
-    return None if each is None or np.isnan(each).all() else each

@@ -16,12 +16,10 @@ from panto_env.analysis import plots as line_plot
 from panto_env.analysis.plots import plot_forces, plot_run
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_catenary
-from panto_env.diagnosis.diagnosis import Diagnosis, Finding
+from panto_env.diagnosis.diagnosis import Diagnosis, Finding, plot_diagnosis
 from panto_env.diagnosis.features import Evidence
-from panto_env.diagnosis.plots import plot_diagnosis
-from panto_env.estimation.plots import plot_estimate
-from panto_env.identification.performance import Match
-from panto_env.identification.plots import plot_matches, plot_record
+from panto_env.estimation.estimate import plot_estimate
+from panto_env.identification.performance import Match, plot_matches, plot_record
 from panto_env.identification.record import Record
 from panto_env.plant.alignment import Alignment
 from panto_env.report import charts

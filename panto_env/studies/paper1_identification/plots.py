@@ -11,7 +11,7 @@ from ...base.arrays import Array
 from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.methods import equations
-from ...identification.plots import plot_matches, plot_record
+from ...identification.performance import plot_matches, plot_record
 from .published import PUBLISHED
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from ...analysis.pool import Progress, in_processes
 from ...base.plotting import LIMIT, legend_above, series_colour
 from ...base.table import Table
 from ...diagnosis import diagnose
+from ...diagnosis.diagnosis import plot_diagnosis
 from ...diagnosis.features import BROKEN, FALSE_ALARMS, RAISED, SPOT
-from ...diagnosis.plots import plot_diagnosis
 from ...diagnosis.training import Track, draw_defect, drive
 from ..study import Comparison, Outcome, Report
 from .diagnosis_tables import (
