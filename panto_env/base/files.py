@@ -26,17 +26,23 @@ PAGES = (".html",)
 
 @contextmanager
 def alone_in(folder: Path, doing: str) -> Iterator[None]:
-    """Within the body no other process is in the folder, which is made if necessary.
+    """Within the body no other process is in the folder, which is made, as far as files can be locked there.
 
     doing: what a process does there, such as "trains into". The system releases the lock of a killed
     process. Raises InputError where another process holds it.
     """
     make_folder(folder)
+    lock = FileLock(folder / ".lock")
     try:
-        with FileLock(folder / ".lock", timeout=0):
-            yield
+        lock.acquire(timeout=0)
     except Timeout as error:
         raise InputError(f"Another process {doing} {folder}; wait until it has ended, or end it.") from error
+    except (OSError, NotImplementedError):
+        pass  # network drives without locks
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @contextmanager
