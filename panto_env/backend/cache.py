@@ -22,14 +22,17 @@ import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import llvmlite
 import numba
+
+from ..base.checksums import checksum, read_checked, write_checked
+from ..base.errors import InputError
 
 DECORATORS = ("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload")
 """Names of the decorators of functions that Numba compiles."""
@@ -258,3 +261,24 @@ def _private(folder: Path) -> bool:
     found = folder.lstat()
     others = stat.S_IWGRP | stat.S_IWOTH
     return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not found.st_mode & others
+
+
+def cached(folder: str, made_of: Any, compute: Callable[[], Any]) -> Any:
+    """Result of ``compute`` for what it is made of, both plain data; from the disk where it is there already.
+
+    It lies in a folder beside the compiled kernels; without one nothing is cached.
+    """
+    beside = cache_folder()
+    if beside is None:
+        return compute()
+    key = checksum(made_of)
+    file = beside / folder / f"{key}.json"
+    with suppress(InputError):  # the file does not exist, or is damaged
+        found = read_checked(file)
+        if found["made_of"] == key:
+            return found["value"]
+    value = compute()
+    with suppress(InputError, OSError):  # no room: the next process computes it again
+        file.parent.mkdir(exist_ok=True)
+        write_checked(file, {"made_of": key, "value": value})
+    return value

@@ -19,7 +19,7 @@ from ..metrics.compliance import largest_mean
 from ..metrics.figures import SpanChoice
 from ..plant.pantograph.schema import PantographData
 from .identity import NOT_OF_A_RUN
-from .passive_run import BySpeed, kept
+from .passive_run import BySpeed, cached_for
 from .settings import RunSettings, as_designed
 
 TOLERANCE = 0.05
@@ -109,7 +109,9 @@ def trim_of_pass(
         "spans": spans,
     }
     line = settings.line.name
-    forces = kept("mean_force", line, inputs, lambda: _solve(settings, passive_mean(settings, seed, spans)))
+    forces = cached_for(
+        line, "mean_force", inputs, lambda: _solve(settings, passive_mean(settings, seed, spans))
+    )
     return Trim((low,), (tuple(forces),))
 
 

@@ -1,11 +1,7 @@
-"""Values by speed, each computed when it is first needed, and interpolated between speeds.
+"""Means and spreads of the readings of a passive run, by speed, with line and pantograph as designed.
 
-Means and spreads of the readings of a passive run, by speed, with line and pantograph as designed.
-
-Observations and rewards of agents can be relative to them. Results are cached on disk, under a hash of the
-sources and of the run's settings.
-
-Observation normalised by a passive run, so that entries have a mean near 0 and a spread near 1.
+Observations and rewards can be relative to them. Results are cached on disk, under a hash of the sources and
+of the run's settings.
 
 The mean of a reading depends on the speed, nearly linearly, as the uplift does: so the centre of an entry is
 linear in the speed. The scale is the same at all speeds, so that a swing twice as large reads twice as much.
@@ -14,16 +10,14 @@ linear in the speed. The scale is the same at all speeds, so that a swing twice 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..backend import cache_folder, source_hash
+from ..backend import cached, source_hash
 from ..base.arrays import Array, to_kmh
-from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
 from ..catalog.loader import drawn_kind
 from ..metrics.low_pass import low_pass
@@ -70,27 +64,11 @@ class BySpeed:
         return sorted({max(0, place - below) for place in above.tolist() for below in (0, 1)})
 
 
-def kept(folder: str, line: str, inputs: Any, compute: Callable[[], Any]) -> Any:
-    """Result of ``compute`` for these inputs, both plain data; from the disk where it is cached already.
-
-    The cache is a folder beside the compiled kernels of the same sources; without one nothing is cached, nor
-    for a line drawn from a family or a section, by its name: a training draws thousands, and hardly meets
-    one again.
+def cached_for(line: str, folder: str, inputs: Any, compute: Callable[[], Any]) -> Any:
+    """As ``cached``; not for a line drawn from a family or a section, by its name: a training draws
+    thousands, and hardly meets one again.
     """
-    cache = cache_folder()
-    if cache is None or drawn_kind(line):
-        return compute()
-    made_of = checksum([source_hash(), inputs])
-    file = cache / folder / f"{made_of}.json"
-    with suppress(InputError):  # the file does not exist, or is damaged
-        found = read_checked(file)
-        if found["made_of"] == made_of:
-            return found["value"]
-    value = compute()
-    with suppress(InputError, OSError):  # no room: the next process computes it again
-        file.parent.mkdir(exist_ok=True)
-        write_checked(file, {"made_of": made_of, "value": value})
-    return value
+    return compute() if drawn_kind(line) else cached(folder, [source_hash(), inputs], compute)
 
 
 KNOT_DISTANCE = 25.0
@@ -111,32 +89,12 @@ RunPassively = Callable[[RunSettings], Trajectory]
 """Function from settings to the record of a run without control."""
 
 
-class PassiveRun:
-    """Means and spreads over the settled spans, by speed; rows as in ``Reading``, then ``LOW_PASSED``.
-
-    Its methods raise InputError where a run leaves the valid range.
-    """
+class PassiveRun(BySpeed):
+    """Means, then standard deviations over the settled spans; each as in ``Reading``, then ``LOW_PASSED``."""
 
     def __init__(self, settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> None:
         """speeds: the range (m/s)."""
-        self._table = BySpeed(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
-        self.speeds = self._table.speeds  # (speeds,): of the runs, rising (m/s)
-
-    def means(self, row: int) -> Array:
-        """Mean at each of the speeds, (speeds,)."""
-        return self._table.column(row)
-
-    def spreads(self, row: int) -> Array:
-        """Standard deviation at each of the speeds, (speeds,)."""
-        return self._table.column(SPREADS + row)
-
-    def mean(self, row: int, speed: Any) -> Any:
-        """Mean at a speed (m/s), or at each of an array."""
-        return self._table.at(speed, row)
-
-    def spread(self, row: int, speed: Any) -> Any:
-        """Standard deviation at a speed (m/s), or at each of an array."""
-        return self._table.at(speed, SPREADS + row)
+        super().__init__(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
 
 
 def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[float]:
@@ -146,7 +104,7 @@ def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[fl
     designed = as_designed(RunSettings.model_construct(**own), speed)
     inputs = designed.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True)
     line = designed.line.name
-    means, spreads = kept("passive_run", line, inputs, lambda: _measured(run(designed)))
+    means, spreads = cached_for(line, "passive_run", inputs, lambda: _measured(run(designed)))
     return [*means, *spreads]
 
 
@@ -183,12 +141,12 @@ def _normalised(entry: Entry, run: PassiveRun) -> Entry:
     row = _ROWS.get(present(entry))
     if row is None:
         return entry
-    scale = float(np.sqrt(np.mean(run.spreads(row) ** 2)))
+    scale = float(np.sqrt(np.mean(run.column(SPREADS + row) ** 2)))
     if scale == 0.0:
         raise InputError(
             f"The {present(entry)} does not change in a passive run, so it cannot be scaled by its spread; "
             "leave out normalise."
         )
-    means, several = run.means(row), len(run.speeds) > 1
+    means, several = run.column(row), len(run.speeds) > 1
     slope, centre = np.polyfit(run.speeds, means, 1) if several else (0.0, means[0])
     return entry._replace(centre=float(centre), slope=float(slope), scale=scale)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Self
@@ -12,16 +11,10 @@ import numpy as np
 from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..plant.actuators import ActuatorSettings
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from .arguments import not_finite
 from .episode import Flags, Results, new_results
-from .length import EpisodeLength
-from .mean_force import target_mean
-from .observation import Layout
-from .passive_run import LOW_PASSED, PassiveRun
-from .settings import RunSettings
 from .step import control_steps, observe_start
 
 COASTED = 100
@@ -182,33 +175,3 @@ class Stepping:
         self.episode.steps[:] = steps
         self.step(np.zeros_like(self.episode.action), steps == 0, results)
         self.episode.steps[:] = 1
-
-
-class TaskState(Stepping):
-    """Lanes of a plant with the settings of their episodes."""
-
-    settings: RunSettings
-    actuator: ActuatorSettings
-    length: EpisodeLength
-    layout: Layout
-    passive: tuple[PassiveRun, ...]  # that each agent's reward counts from, or none
-    speed: Array  # of each lane (m/s)
-    keep_samples: bool  # of whole episodes
-    record_droppers: bool
-
-    def targets(self, agent: int, speeds: Array, nominal: Array) -> tuple[Array, Array]:
-        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
-
-        Of a controlled collector in lanes, (n,), with these speeds (m/s) and nominal forces (N).
-        """
-        if not self.passive:
-            collector = self.episode.controlled[agent]
-            required = [target_mean(self.settings, speed, collector) for speed in speeds.tolist()]
-            return nominal if None in required else np.array(required, dtype=float), nominal
-        own = self.passive[agent]
-        return own.mean(LOW_PASSED, speeds), own.spread(LOW_PASSED, speeds)
-
-    def target_mean(self, lane: int, collector: int = 0) -> float:
-        """Mean force (N) that a lane's collector is trimmed for; nan where its own force is applied."""
-        target = target_mean(self.settings, float(self.speed[lane]), collector)
-        return math.nan if target is None else target

@@ -14,21 +14,21 @@ from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
-from .entries import DEVIATIONS, ESTIMATED, EntryOptions
+from .entries import DEVIATIONS, ESTIMATED
 from .episode import Flags, Results, new_episode
 from .length import Cost, EpisodeLength, arrays_of, new_plant, run_cost
 from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
-from .observation import Context, layout
-from .passive_run import ADVICE, PassiveRun, normalised
+from .observation import Context, Layout
+from .passive_run import ADVICE, LOW_PASSED, SPREADS, PassiveRun, normalised
 from .record import diverged, divergence, ending, trajectory
 from .reset import LaneGenerators, reset
 from .settings import RunSettings
 from .state import TaskRow
 from .step import figures_so_far, running_figures
-from .stepping import TaskState
+from .stepping import Stepping
 
 
-class Task(TaskState):
+class Task(Stepping):
     """Lanes with one line, pantograph and controller; each lane is reset and evaluated on its own."""
 
     def __init__(
@@ -58,7 +58,7 @@ class Task(TaskState):
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
-        self.layout = layout(settings.observation, _entry_options(settings))
+        self.layout = Layout.of(settings)
         self.known_pantograph = settings.known_pantograph or settings.controlled_pantograph
         if settings.normalise is not None and settings.observation == DEVIATIONS:
             raise InputError(
@@ -67,13 +67,13 @@ class Task(TaskState):
             )
         if settings.normalise is not None:
             known = settings.with_pantograph(plant.train.driven[0], self.known_pantograph)
-            speeds = self._speeds_of_passive_runs(settings.normalise)
-            run = PassiveRun(known, speeds, passive_pass)
+            run = PassiveRun(known, self._speeds_of_passive_runs(settings.normalise), passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
-        self.passive = ()
-        if settings.reward.target == "passive":
-            each = [settings.model_copy(update={"controlled": (number,)}) for number in settings.controlled]
-            self.passive = tuple(PassiveRun(own, length.speed_range, passive_pass) for own in each)
+        targets = settings.controlled if settings.reward.target == "passive" else ()
+        self.passive = tuple(  # that each agent's reward counts from, or none
+            PassiveRun(settings.model_copy(update={"controlled": (n,)}), length.speed_range, passive_pass)
+            for n in targets
+        )
         self.speed = plant.speed
         agents = len(plant.train.driven)
         odometers = Odometers(settings.sensors.odometer, lanes * agents, plant.alignment)
@@ -93,7 +93,6 @@ class Task(TaskState):
         )
 
     def _speeds_of_passive_runs(self, normalise: tuple[float, float]) -> tuple[float, float]:
-        """Lowest and highest speed (m/s); InputError, which says what they are for, if not valid here."""
         try:
             return self.length.check_speeds(normalise)
         except InputError as error:
@@ -104,10 +103,6 @@ class Task(TaskState):
             ) from error
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
-        """Cost of the longest episode.
-
-        Raises InputError where it exceeds the machine's memory or the maximum computing time.
-        """
         steps, supports = self.length.most_plant_steps, len(plant.model.supports)
         droppers = len(plant.model.droppers) if self.record_droppers else 0
         moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
@@ -136,7 +131,19 @@ class Task(TaskState):
         """
         lanes = np.atleast_1d(lanes)
         self.begin(lanes)
-        reset(self, lanes, random, self.static_forces, results or self.results)
+        reset(self, lanes, random, results or self.results)
+
+    def targets(self, agent: int, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
+
+        Of a controlled collector in lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        """
+        if self.passive:
+            own = self.passive[agent]
+            return own.at(speeds, LOW_PASSED), own.at(speeds, SPREADS + LOW_PASSED)
+        collector = self.episode.controlled[agent]
+        required = [target_mean(self.settings, speed, collector) for speed in speeds.tolist()]
+        return nominal if None in required else np.array(required, dtype=float), nominal
 
     def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is required, else None."""
@@ -180,7 +187,7 @@ class Task(TaskState):
         """
         values, without = self.figures_of(np.array([row]))
         if without.any():
-            raise InputError(divergence(self, row // self.agents))
+            raise InputError(self.divergence(row // self.agents))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
     def figures_of(self, rows: Any) -> tuple[dict[str, Array], Flags]:
@@ -204,27 +211,7 @@ class Task(TaskState):
         deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
         return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
 
-    def divergence(self, lane: int) -> str:
-        """Message that a lane's computation diverged, and what to do."""
-        return divergence(self, lane)
-
-    def trajectory(
-        self, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
-    ) -> Trajectory:
-        """Record of a lane's run so far.
-
-        last: the task does not run any more, so the record may take over its arrays. Raises InputError where
-        the computation diverged.
-        """
-        return trajectory(self, lane, policy, seed, last=last)
-
-    def ending(self, lane: int) -> str:
-        """Where and why a lane's run ended early, as a sentence; empty if it did not."""
-        return ending(self, lane)
-
-
-def _entry_options(settings: RunSettings) -> EntryOptions:
-    return EntryOptions(**{name: getattr(settings, name) for name in EntryOptions._fields})
+    divergence, ending, trajectory = divergence, ending, trajectory
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:
@@ -268,7 +255,6 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
 
 
 def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice, collector: int = 0) -> float:
-    """By how much the mean force required over the spans exceeds that at the run's mean speed (N)."""
     required = target_mean(settings, run.speed, collector)
     if required is None or not run.drifts:
         return 0.0

@@ -12,9 +12,9 @@ from ..base.errors import InputError, shown
 from ..base.settings import Between
 from ..catalog import load_pantograph
 from ..control.arguments import table
-from ..control.entries import CENTRED, EntryOptions
+from ..control.entries import CENTRED
 from ..control.lines import draws_line
-from ..control.observation import layout
+from ..control.observation import Layout
 from ..control.settings import RunSettings, default
 from ..plant.actuators import actuator_settings
 
@@ -227,10 +227,10 @@ def described(text: str) -> str:
 def _observation_table(kind: str) -> str:
     """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, EntryOptions(actuator, pantograph)).entries
+    settings = RunSettings.model_construct(observation=kind, actuator=actuator, pantograph=pantograph)
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
-        for k, each in enumerate(entries)
+        for k, each in enumerate(Layout.of(settings).entries)
     ]
     return "\n".join(
         ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
