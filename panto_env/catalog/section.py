@@ -10,15 +10,12 @@ from pydantic import Field, model_validator
 
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
-from ..plant.catenary import check_line
 from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS
 from .drawn_lines import Bands, DrawnLines, Length, Range, Speeds, in_words
 from .family import ROUNDING, LineFamily, gradient_limits, gradients
 from .section_parts import Bridge, Bridges, Curves, Masts, Obstacles, Overlaps, lowered
-from .values import values_of
 
 PLACES, HEIGHTS = 3, 4
 """Decimals of lengths of spans and of heights (m), as of a survey."""
@@ -123,7 +120,14 @@ class LineSection(DrawnLines):
             return None
         base = self.base.draw(random, (low, high))[0] if isinstance(self.base, LineFamily) else self.base
         table = self._table(random, base)
-        return None if table is None else self._line(table)
+        line = table and self.hung(table, self.droppers.shortest)
+        if not line:
+            return None
+        heights = line.contact_heights or (0.0, 0.0)
+        slopes, changes = gradients(heights, line.alignment().supports[: len(heights)])
+        steepest, change = self._limits
+        legal = (np.abs(slopes) <= steepest + ROUNDING).all() and (np.abs(changes) <= change + ROUNDING).all()
+        return line if legal else None
 
     def _table(self, random: np.random.Generator, base: FlexibleCatenaryData) -> dict[str, Any] | None:
         """Values of a line with the wires of ``base``; None where there is no room for its ramps."""
@@ -145,13 +149,22 @@ class LineSection(DrawnLines):
         error = self.masts.height_error
         encumbrances += random.uniform(-error, error, count + 1)
         table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+        at = [
+            {"encumbrance": encumbrance, "contact_height": height + 0.0}
+            for encumbrance, height in zip(
+                encumbrances.round(HEIGHTS).tolist(), heights.round(HEIGHTS).tolist(), strict=True
+            )
+        ]
         return table | {
             "name": self.full_name,
             "description": f"Drawn from a section. {self.description}",
             "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
             "droppers": self._droppers(random, base),
             "overlaps": self._overlaps(random, lengths, heights, bridges),
-            **_sequence(lengths, heights.round(HEIGHTS), encumbrances.round(HEIGHTS)),
+            "sequence": [
+                {"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)
+            ],
+            "end_support": at[-1],
         }
 
     def _overlaps(
@@ -173,30 +186,3 @@ class LineSection(DrawnLines):
             "first": random.uniform(*self.droppers.first),
             "pre_sag": base.span_length * random.uniform(*self.droppers.pre_sag),
         }
-
-    def _line(self, table: dict[str, Any]) -> FlexibleCatenaryData | None:
-        """The line with these values; None where it is to be drawn again."""
-        try:
-            line = FlexibleCatenaryData.model_validate(table)
-            check_line(line)
-        except ValueError:  # InputError too
-            return None
-        heights = line.contact_heights or (0.0, 0.0)
-        slopes, changes = gradients(heights, line.alignment().supports[: len(heights)])
-        steepest, change = self._limits
-        legal = (np.abs(slopes) <= steepest + ROUNDING).all() and (np.abs(changes) <= change + ROUNDING).all()
-        shortest = hang(line).dropper_length.min()
-        if not legal or shortest < self.droppers.shortest:
-            return None
-        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
-        return line.model_copy(update={"sources": sources})
-
-
-def _sequence(lengths: Array, heights: Array, encumbrances: Array) -> dict[str, Any]:
-    """The spans of a line one by one, and the heights at its last support."""
-    at = [
-        {"encumbrance": encumbrance, "contact_height": height + 0.0}
-        for encumbrance, height in zip(encumbrances.tolist(), heights.tolist(), strict=True)
-    ]
-    spans = [{"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)]
-    return {"sequence": spans, "end_support": at[-1]}

@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..control.arguments import checked
 from ..control.observation import BOUND
 from ..policies import errors_name, find_fitting_policy
-from .infos import REWARD
+from .lanes import REWARD
 from .single import PantographEnv
 
 Observation = NDArray[np.float32]

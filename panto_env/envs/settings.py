@@ -148,22 +148,14 @@ class VectorSettings(RunSettings):
         return self.num_envs // len(self.controlled)
 
     @model_validator(mode="after")
-    def _whole_trains(self) -> VectorSettings:
+    def _lanes_fit(self) -> VectorSettings:
         if self.num_envs % len(self.controlled):
             raise InputError(
                 f"num_envs counts the controlled pantographs, {len(self.controlled)} in each train, so it "
                 f"must be a multiple of that, not {self.num_envs}."
             )
-        return self
-
-    @model_validator(mode="after")
-    def _lanes_for_each_line(self) -> VectorSettings:
         if self.lines is not None and self.lines > self.trains:
             raise InputError(f"{self.trains} lanes are too few for {self.lines} lines; give fewer lines.")
-        return self
-
-    @model_validator(mode="after")
-    def _lanes_are_there(self) -> VectorSettings:
         beyond = [lane for lane in self.render_lanes or () if lane >= self.num_envs]
         if beyond:
             raise InputError(f"render_lanes has lane {beyond[0]}, but lanes are 0 to {self.num_envs - 1}.")
@@ -201,17 +193,11 @@ OF_VECTORS = TensorSettings.model_fields.keys() - EnvironmentSettings.model_fiel
 """Names of arguments that only vector environments have."""
 
 
-def frames_per_second(control_interval: float, slow_motion: float) -> float:
-    """Frames per second of a film with one frame per control step, rounded where nearly whole."""
-    exact = 1 / control_interval / slow_motion
-    return round(exact) if abs(exact - round(exact)) < 1e-6 * exact else exact
-
-
-def render_metadata(
-    metadata: dict[str, Any], settings: EnvironmentSettings | VectorSettings
-) -> dict[str, Any]:
-    """An environment's metadata with the frames per second of its own control interval and slow motion."""
-    return metadata | {"render_fps": frames_per_second(settings.control_interval, settings.slow_motion)}
+def render_metadata(metadata: dict[str, Any], settings: Any) -> dict[str, Any]:
+    """An environment's metadata with its own frames per second: one per control step, in slow motion."""
+    exact = 1 / settings.control_interval / settings.slow_motion
+    whole = abs(exact - round(exact)) < 1e-6 * exact
+    return metadata | {"render_fps": round(exact) if whole else exact}
 
 
 def described(text: str) -> str:
