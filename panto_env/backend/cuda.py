@@ -194,7 +194,6 @@ def _axis(one: Any, several: Any) -> int | None:
 
 
 def _numbers(axis: int, array: Any) -> int:
-    """Numbers of a column of an array."""
     return int(array.size // array.shape[axis])
 
 
@@ -243,7 +242,6 @@ def _words(value: Any, apart: Any) -> Any:
 
 
 def _type_of(value: Any) -> Any:
-    """Numba's type of a value."""
     if hasattr(value, "_fields"):
         return types.NamedTuple([_type_of(field) for field in value], type(value))
     if not isinstance(value, torch.Tensor):
@@ -325,7 +323,6 @@ def _kept(
 
 @lru_cache
 def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
-    """A kernel on the GPU with this number."""
     from cuda.core import Device, ObjectCode
 
     Device(index).set_current()

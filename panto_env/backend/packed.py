@@ -60,8 +60,6 @@ def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int | N
 
 
 class _View(NamedTuple):
-    """An array as a part of a block of memory."""
-
     block: int
     offset: int  # bytes
     shape: tuple[int, ...]
@@ -91,7 +89,6 @@ def copy_whole(*tuples: Any) -> None:
 
 
 def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
-    """Reduction of a named tuple for ``pickle`` and ``copy``."""
     owners: dict[int, Any] = {}
     used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
     for array in arrays:
@@ -119,7 +116,6 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
 
 
 def _together(parts: _Parts) -> Any:
-    """A named tuple from the result of ``_apart``, with memory of its own."""
     memory = []
     for content, place in parts.blocks:
         memory.append(aligned_zeros(content.shape, np.uint8, place))
@@ -136,7 +132,6 @@ def _together(parts: _Parts) -> Any:
 
 
 def _owner(array: Any) -> Any:
-    """The array that owns the memory of this one."""
     while isinstance(array.base, np.ndarray):
         array = array.base
     return array

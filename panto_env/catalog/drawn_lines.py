@@ -28,7 +28,6 @@ N = TypeVar("N")
 
 
 def _two(value: Any) -> Any:
-    """A number as the range from it to itself."""
     return value if isinstance(value, list | tuple) else (value, value)
 
 

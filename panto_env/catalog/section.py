@@ -84,7 +84,6 @@ class LineSection(DrawnLines):
 
     @property
     def _limits(self) -> tuple[float, float]:
-        """Maximum gradient and maximum change of gradient (‰)."""
         return gradient_limits(self.fastest_kmh)
 
     def speeds(self, wave_speed: float, speed_kmh: Speeds | None = None) -> Speeds:
@@ -179,7 +178,6 @@ class LineSection(DrawnLines):
         return self.overlaps.draw(random, lengths, level)
 
     def _droppers(self, random: np.random.Generator, base: FlexibleCatenaryData) -> dict[str, Any]:
-        """The line's table of droppers, by the rule that all its spans follow."""
         kept = base.droppers.model_dump(exclude={"positions", "sag"}, exclude_none=True)
         return kept | {
             "spacing": random.uniform(*self.droppers.spacing),

@@ -302,7 +302,6 @@ def _head_force(episode, own, task, now, number):
 
 
 def _inner_masses(settings: RunSettings) -> list[tuple[str, float, str, int]]:
-    """Displacement and velocity of each mass between head and frame."""
     count = len(settings.pantograph.masses)
     return [
         listed

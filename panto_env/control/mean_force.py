@@ -168,8 +168,6 @@ def _solve(settings: RunSettings, means: PassiveMean) -> Forces:
 
 
 class _Search:
-    """Secant search of the static force of one pantograph."""
-
     def __init__(self, settings: RunSettings, pantograph: PantographData, target: float) -> None:
         speed = settings.speeds[0]
         self._aerodynamic = pantograph.nominal_force(speed) - pantograph.static_force

@@ -59,7 +59,6 @@ class BySpeed:
         return np.interp(speed, self.speeds, self.column(number, speed))
 
     def _around(self, speed: Any) -> Iterable[int]:
-        """Places of the speeds below and above each one."""
         above = np.minimum(np.atleast_1d(np.searchsorted(self.speeds, speed)), len(self.speeds) - 1)
         return sorted({max(0, place - below) for place in above.tolist() for below in (0, 1)})
 

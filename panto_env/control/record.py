@@ -78,7 +78,6 @@ def trajectory(
 
 
 def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int, last: bool) -> Trajectory:
-    """Record of one collector, from where it comes onto the line."""
     plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE, collector)
     steps, pantograph = int(plant.of(lane, Row.STEP)), task.settings.riding[collector]
     position = plant.position(lane, np.arange(steps) + 0.5, collector)

@@ -112,8 +112,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
 
 
 def _rows(task: Task, lanes: Any) -> Any:
-    """Rows of lanes, (agents, n)."""
-    return task.agents * lanes + np.arange(task.agents)[:, None]
+    return task.agents * lanes + np.arange(task.agents)[:, None]  # (agents, n)
 
 
 def _at_start(task: Task, agent: int, lanes: Any) -> Array:

@@ -64,12 +64,10 @@ _estimator = partial(parse, EstimatorSettings, name="estimator", presets=ESTIMAT
 
 
 def _parsed(kind: Any, name: str, presets: Mapping[str, Any] | None = None) -> BeforeValidator:
-    """Validation by ``parse``; None stands for the defaults."""
     return BeforeValidator(lambda value: parse(kind, {} if value is None else value, name, presets or {}))
 
 
 def _unless_none(read: Callable[[Any], Any]) -> BeforeValidator:
-    """Validation by ``read``, except of None."""
     return BeforeValidator(lambda value: None if value is None else read(value))
 
 

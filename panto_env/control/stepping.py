@@ -66,7 +66,6 @@ class Stepping:
         return *self.plant.arrays, *self._arrays
 
     def _bind(self) -> None:
-        """Bind the kernels to the arrays."""
         packed = pack(*self.arrays)
         run = bind(control_steps, packed, *self.results, 0, self.lanes)
         self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
@@ -131,7 +130,6 @@ class Stepping:
         return self._evaluate(answer, results, skip)
 
     def _refuse_over(self, skip: Flags | None) -> None:
-        """Raise InputError where a lane that is not skipped has no running episode."""
         over = self._over if skip is None else self._over & ~skip
         if over.any():
             raise InputError(

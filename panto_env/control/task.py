@@ -16,7 +16,7 @@ from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .entries import DEVIATIONS, ESTIMATED
 from .episode import Flags, Results, new_episode
-from .length import Cost, EpisodeLength, arrays_of, new_plant, run_cost
+from .length import Cost, EpisodeLength, arrays_of, new_plant
 from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
 from .observation import Context, Layout
 from .passive_run import ADVICE, LOW_PASSED, SPREADS, PassiveRun, normalised
@@ -106,12 +106,11 @@ class Task(Stepping):
         steps, supports = self.length.most_plant_steps, len(plant.model.supports)
         droppers = len(plant.model.droppers) if self.record_droppers else 0
         moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
-        cost = run_cost(lanes, steps, supports, droppers, moving, self.keep_samples)
+        cost = Cost.of(lanes, steps, supports, droppers, moving, self.keep_samples)
         cost.check(f"{steps:,.0f} time steps with {supports} supports")
         return cost
 
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
-        """Sensors of all lanes, and the rms of their noise."""
         settings = self.settings
         form = plant.time_step, self.length.control_steps, lanes, len(plant.train.collectors)
         if settings.observation != ESTIMATED:

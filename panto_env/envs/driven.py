@@ -92,6 +92,5 @@ class DrivenByPolicies(
         return self._seen(), reward, terminated, truncated, info
 
     def _seen(self) -> Observation:
-        """Observations of the agent's pantographs, one after the other."""
         seen: Observation = self._train.task.results.observation[self._rows].reshape(-1)
         return seen

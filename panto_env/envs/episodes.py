@@ -88,7 +88,6 @@ class CopiedAlone(Whole):
             }
 
     def _state(self) -> dict[str, Any]:
-        """What a copy consists of."""
         return vars(self)
 
     @one_at_a_time
@@ -187,7 +186,6 @@ class Episodes:
 
     @property
     def _spaces(self) -> tuple[Any, ...]:
-        """What an observation and an action consist of."""
         layout = self.task.layout
         names = [entry.name for entry in layout.entries]
         scales = [] if layout.normalise else [(entry.centre, entry.scale) for entry in layout.entries]

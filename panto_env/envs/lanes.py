@@ -129,7 +129,6 @@ class VectorLanes:
         self._speed_kmh[lanes] = np.repeat(to_kmh(task.speed[trains]), self.agents)
 
     def _next_line(self, lanes: Flags, random: Callable[[], np.random.Generator], anew: bool) -> None:
-        """Draw the line on which lanes, and those after them, begin, if the present one has had enough."""
         if anew or self._left <= 0:
             going_on = self._on_usual & ~lanes
             if going_on.any():
@@ -138,7 +137,6 @@ class VectorLanes:
         self._left -= int(lanes.sum())
 
     def _take(self, results: Results, lanes: Flags) -> None:
-        """Copy the results of some lanes."""
         if results is not self._results:
             own = np.flatnonzero(lanes)
             for taken, given in zip(self._results, results, strict=True):
@@ -173,7 +171,6 @@ class VectorLanes:
 
     @property
     def _on_usual(self) -> Flags:
-        """Which lanes run the usual task."""
         usual = np.ones(self.count, dtype=np.bool_)
         for _, its in self._others:
             usual &= ~its

@@ -211,7 +211,6 @@ def described(text: str) -> str:
 
 
 def _observation_table(kind: str) -> str:
-    """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
     settings = RunSettings.model_construct(observation=kind, actuator=actuator, pantograph=pantograph)
     rows = [
@@ -224,7 +223,6 @@ def _observation_table(kind: str) -> str:
 
 
 def _id_table(name: str) -> str:
-    """Arguments that an id sets, as a Markdown table."""
     rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
     return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
 

@@ -163,7 +163,6 @@ class PantographTensorEnv(SharedByLanes):
 
     @property
     def _none(self) -> torch.Tensor:
-        """No lane: (num_envs,) of False."""
         return torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
 
     def _draw(self, seed: int | None) -> None:
@@ -190,7 +189,6 @@ class PantographTensorEnv(SharedByLanes):
         return answer if bool(lanes.all()) else self._of(answer, lanes)
 
     def _of(self, answer: Any, lanes: torch.Tensor) -> Any:
-        """An answer with the results of these lanes only."""
         values = answer.results.values * lanes[:, None]
         return Answer(answer.results._replace(values=values), answer.speed_kmh * lanes, lanes)
 
@@ -215,7 +213,6 @@ class PantographTensorEnv(SharedByLanes):
         }
 
     def _check(self, actions: Any) -> None:
-        """Raise InputError unless these are actions."""
         if not (isinstance(actions, torch.Tensor) and actions.device == self.device):
             raise InputError(
                 f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}."

@@ -67,7 +67,7 @@ def overlaps_are_described(described, line):
 def test_drawn_lines_are_what_the_section_describes(name):
     section, with_ramps = load_section(name), 0
     masts, bridges = section.masts, section.bridges
-    for seed in range(25):
+    for seed in range(15):
         line = drawn(name, seed)
         each, heights, encumbrances = spans_of(line)
         lengths = np.array([span.span_length for span in each])
@@ -96,7 +96,7 @@ def test_drawn_lines_are_what_the_section_describes(name):
             assert first[0] - 1e-9 <= x[0] <= first[1] + 1e-9
             assert 0.8 * spacing[0] < np.diff(x).min() <= np.diff(x).max() < 1.2 * spacing[1]
         overlaps_are_described(section.overlaps, line)
-    assert with_ramps > 8 or bridges.lowering[1] == 0
+    assert with_ramps > 5 or bridges.lowering[1] == 0
 
 
 @pytest.mark.slow
@@ -207,11 +207,10 @@ def test_ramps_have_as_few_spans_as_the_gradient_allows():
     [
         (
             (("[120.0, 160.0]", "[200.0, 280.0]"),),
-            "lowering must be 0, as EN 50119 allows no gradient at 280",
+            "lowering must be 0, as EN 50119 allows no gradient",
         ),
         ((('"sweden-st15"', '"re250-curves"'),), "base must not have a sequence of spans"),
         ((('"sweden-st15"', '"periodic-stiffness"'),), "'base' must be a flexible line or a family"),
-        ((('"sweden-st15"', '"section:fast-line"'),), "'base' must be a flexible line or a family"),
         (
             (('"sweden-st15"', '"swedn-st15"'),),
             "key 'base' names no line: Unknown catenary 'swedn-st15', did you mean 'sweden-st15",
@@ -226,7 +225,6 @@ def test_ramps_have_as_few_spans_as_the_gradient_allows():
             "longer span in a tighter",
         ),
         ((("[0, 2]", "2"), ("[0.0, 0.4]", "2.0")), "No line of section 'mine' was found in 100 draws"),
-        ((("value = 0.25", "value = 3.0"),), "No line of section 'mine' was found in 100 draws"),
         ((("[curves]", "[curve]"),), "curve"),
     ],
 )
