@@ -16,7 +16,7 @@ from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
 from ..plant.state import LARGEST_HEIGHT, LARGEST_SPEED, Ending, Row, reason
 from .identity import identity
-from .mean_force import named, target_mean
+from .passive_run import named, target_mean
 from .state import TaskRow
 
 if TYPE_CHECKING:

@@ -15,17 +15,29 @@ from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .entries import DEVIATIONS, ESTIMATED
-from .episode import Flags, Results, new_episode
+from .episode import Flags, Results, Stepping, new_episode
 from .length import Cost, EpisodeLength, arrays_of, new_plant
-from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
 from .observation import Context, Layout
-from .passive_run import ADVICE, LOW_PASSED, SPREADS, PassiveRun, normalised
+from .passive_run import (
+    ADVICE,
+    LOW_PASSED,
+    SPREADS,
+    Forces,
+    PassiveMean,
+    PassiveRun,
+    Trim,
+    TrimAsDesigned,
+    named,
+    normalised,
+    target_mean,
+    trimmed,
+    warn_of_spring,
+)
 from .record import diverged, divergence, ending, trajectory
 from .reset import LaneGenerators, reset
 from .settings import RunSettings
 from .state import TaskRow
 from .step import figures_so_far, running_figures
-from .stepping import Stepping
 
 
 class Task(Stepping):

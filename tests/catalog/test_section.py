@@ -12,7 +12,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
-from panto_env.catalog.section_parts import Bridge, Masts, lowered
+from panto_env.catalog.section import Bridge, Masts, lowered
 from panto_env.plant.catenary.flexible.overlaps import tension_lengths
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang

@@ -10,8 +10,8 @@ import pytest
 from panto_env import InputError, Trajectory, simulate
 from panto_env.analysis.sweep import sweep
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.control import Task, mean_force, passive_mean, trim_of_pass
-from panto_env.control.mean_force import target_mean
+from panto_env.control import Task, passive_mean, trim_of_pass
+from panto_env.control.passive_run import TOLERANCE, TRIM_DISTANCE, TrimAsDesigned, target_mean
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.control.task import _required_more
 from panto_env.metrics.compliance import largest_mean
@@ -222,7 +222,7 @@ def test_the_command_takes_it_and_says_what_it_applied():
     assert text.returncode == 0, text.stderr
     assert "trimmed for a passive mean of 60.0 N" in text.stdout
     told = json.loads(panto(*command, "en50367", "--json").stdout)
-    assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC") - mean_force.TOLERANCE)
+    assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC") - TOLERANCE)
     assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=1.0)
     assert told["nominal_force"] > told["target_mean"]
     bad = panto(*command, "much")
@@ -234,8 +234,8 @@ def test_a_trim_by_speed_is_near_that_of_each_speed():
     """Between the speeds that are trimmed the mean is within a few tenths of a newton."""
     given = {"catenary": "en50318-2002", "pantograph": "dsa250", "mean_force": "en50367"}
     settings = run_settings(given | {"speed_kmh": (240.0, 250.0)})
-    trim = mean_force.TrimAsDesigned(settings, (240 / 3.6, 250 / 3.6), passive_mean)
-    assert 3.6 * np.diff(trim.speeds).max() <= mean_force.KNOT_DISTANCE
+    trim = TrimAsDesigned(settings, (240 / 3.6, 250 / 3.6), passive_mean)
+    assert 3.6 * np.diff(trim.speeds).max() <= TRIM_DISTANCE
     between = far_enough(run_settings(given | {"speed_kmh": 247.3}))
     exact = trim_of_pass(between, 0, None, passive_mean)
     assert trim.static_force(247.3 / 3.6) == pytest.approx(exact.static_forces[0][0], abs=0.3)
