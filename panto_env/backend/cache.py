@@ -1,15 +1,9 @@
-"""What the compiled kernels are made of: every kernel of the package, and all that it names, as syntax trees.
+"""The cache folder of compiled kernels, named by a hash of what they are made of.
 
-A kernel is compiled with the functions that it calls and the constants that it names, in whatever file these
-are. So all of them are followed, from the decorated functions on, and nothing else counts: not the rest of
-their files, and neither docstrings, comments and annotations nor the words of errors.
-
-The cache folder of compiled kernels.
-
-Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the folder is named by a hash of what kernels are made of (``kernel_sources``): after a change of it a new
-folder is used, and after any other the same. Its content is executed, so a folder is used only if it belongs
-to this user and no other can write to it.
+Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls. So all
+functions and constants that kernels name are followed (``kernel_sources``), and nothing else counts: not the
+rest of their files, and neither docstrings, comments and annotations nor the words of errors. The folder's
+content is executed, so it is used only if it belongs to this user and no other can write to it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Memory aligned for vector instructions and caches, also in copies.
-
-Arguments of kernels, packed once in their compiled form.
+"""Arguments of kernels: aligned memory, also in copies, and packed once in their compiled form.
 
 Converting Python tuples of fifty arrays for a kernel takes a microsecond in each call, as long as a step of
 the plant. ``pack`` does it once; the kernel gets the address of each tuple and reads the fields that it

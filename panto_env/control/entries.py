@@ -40,16 +40,6 @@ LINE_ENTRIES = (
     ("droppers of a span", 10.0, "-"),
 )
 """Name, scale and unit of each value of the whole line."""
-LINE_CENTRES = {
-    "span length": (55.0, 8.0),
-    "wave speed": (140.0, 14.0),
-    "contact wire tension": (22e3, 5e3),
-    "messenger wire tension": (16e3, 3e3),
-    "contact wire mass": (1.15, 0.12),
-    "messenger wire mass": (0.85, 0.15),
-    "droppers of a span": (8.0, 2.0),
-}
-"""Centre and scale of each in "centred", from the lines of the family high-speed."""
 
 
 def line_values(line: CatenaryData) -> Array:
@@ -97,9 +87,16 @@ CENTRES = {
     "nominal force": (120.0, 30.0),
     "front force": (120.0, 30.0),
     "remembered force": (120.0, 30.0),
-    **LINE_CENTRES,
+    "span length": (55.0, 8.0),
+    "wave speed": (140.0, 14.0),
+    "contact wire tension": (22e3, 5e3),
+    "messenger wire tension": (16e3, 3e3),
+    "contact wire mass": (1.15, 0.12),
+    "messenger wire mass": (0.85, 0.15),
+    "droppers of a span": (8.0, 2.0),
 }
-"""Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
+"""Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0; those
+of a line's values from the lines of the family high-speed."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
 """Scale and unit of the force deviation."""
 READING_ENTRIES = (

@@ -23,7 +23,7 @@ from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
-from .state import NOW_ROWS, RESULT_ROWS, Flag, Result, TaskRow
+from .state import NOW_ROWS, RESULT_ROWS, Flag, TaskRow
 from .step import control_steps, observe_start
 
 Flags = NDArray[np.bool_]
@@ -142,11 +142,6 @@ class Results(NamedTuple):
     def truncated(self) -> Flags:
         """(rows,): whether the end of the run is reached within the valid range, a view."""
         return self.flags[:, Flag.TRUNCATED]
-
-    @property
-    def reward_and_terms(self) -> Array:
-        """(1 + terms, rows): the reward and its unweighted terms, a view."""
-        return self.values[:, Result.REWARD : Result.CONTACT_FORCE].T
 
     def copy(self) -> Results:
         """A copy of the arrays."""

@@ -111,7 +111,7 @@ def test_tasks_and_plants_are_copied_too():
         task.step(action)
         twin.step(action)
     np.testing.assert_array_equal(twin.results.observation, task.results.observation)
-    np.testing.assert_array_equal(twin.results.reward_and_terms, task.results.reward_and_terms)
+    np.testing.assert_array_equal(twin.results.values, task.results.values)
     np.testing.assert_equal(twin.figures(1).as_dict(), task.figures(1).as_dict())
     settings = run_settings({})
     plant = Plant(settings.catenary, settings.train, lanes=2)

@@ -12,6 +12,7 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.analysis.line_check import drawn_line
 from panto_env.catalog import load_catenary, load_drawn, load_family, load_lines
+from panto_env.catalog.family import LineFamily
 from panto_env.catalog.loader import text_of
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
@@ -154,11 +155,12 @@ def test_speeds_choose_the_line():
         ((("value = [40.0, 65.0]", "value = [65.0, 40.0]"),), "key 'span_length' must not fall"),
         ((("value = [40.0, 65.0]", "value = 55.0"),), None),
         ((("value = [40.0, 65.0]", "value = [40.0, 900.0]"),), "key 'span_length.*from 2 to 200 m"),
-        ((("value = 0.25, source", "value = 3.0, source"),), "No line of family 'mine' was found in 1,000"),
+        ((("value = 0.25, source", "value = 3.0, source"),), "No line of family 'mine' was found in 30"),
         ((("[pre_sag]", "[presag]"),), "presag"),
     ],
 )
-def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message):
+def test_families_of_one_s_own_are_read_and_checked(tmp_path, changes, message, monkeypatch):
+    monkeypatch.setattr(LineFamily, "most_draws", 30)
     own = file_of(tmp_path, *changes)
     if message is None:
         assert line_of(1, own)[0].span_length == 55.0
