@@ -209,7 +209,6 @@ def test_line_values_say_what_the_line_is(kind):
     [
         ({"observation": "centred"}, True),
         ({"observation": "centred", "pantograph": "identified-2dof"}, False),
-        ({"observation": "measured", "normalise": (200, 350)}, True),
         ({"observation": "measured", "normalise": (200, 350), "pantograph": "identified-2dof"}, True),
     ],
 )

@@ -106,34 +106,6 @@ def test_early_end_is_charged_as_if_contact_were_lost_to_the_end():
     assert rewards[-1] == pytest.approx(-(0.5 * cost + 2.0) - left * (0.5 + 2.0), rel=1e-9)
 
 
-def test_vector_environment_counts_changes_of_action_in_each_lane():
-    """Over the end of an episode too: the lane begins anew, from no action, while its own is not taken."""
-    lanes = 3
-    env = gymnasium.make_vec(
-        NAME,
-        num_envs=lanes,
-        actuator=BOTH,
-        reward={"cost_function": 0.0, "contact_loss": 0.0, "rate": 1.0},
-        speed_kmh=(200, 300),
-        distance=20.0,
-    )
-    env.reset(seed=0)
-    random, before = np.random.default_rng(0), np.zeros((lanes, 2))
-    ended, ends = np.zeros(lanes, dtype=bool), 0
-    for _ in range(90):
-        actions = random.uniform(-1, 1, (lanes, 2))
-        _, rewards, terminated, truncated, infos = env.step(actions)
-        actions[ended] = 0.0  # these lanes have just begun anew
-        before[ended] = 0.0
-        expected = ((0.5 * (actions - before)) ** 2).sum(axis=1)
-        assert rewards == pytest.approx(-expected)
-        assert infos["reward_terms"]["rate"][~ended] == pytest.approx(expected[~ended])
-        assert infos["reward_terms"]["effort"][~ended] == pytest.approx((actions[~ended] ** 2).sum(axis=1))
-        before, ended = actions, terminated | truncated
-        ends += ended.sum()
-    assert ends >= 6
-
-
 @pytest.mark.parametrize("target", ["nominal", "passive"])
 def test_term_of_the_low_passed_force_is_scipy_s(target):
     """Behind a Butterworth filter of sixth order at 20 Hz, settled at the first sample."""

@@ -184,15 +184,14 @@ def test_an_episode_broken_off_changes_the_next_one_without_a_seed():
 
 
 @every
-@pytest.mark.parametrize("seed", [-1, "1"])
-def test_a_bad_seed_changes_nothing(kind, seed):
+def test_a_bad_seed_changes_nothing(kind):
     env = kind.make()
     kind.reset(env, 3)
     twin = copy.deepcopy(env)
     if kind is OfStableBaselines:
-        env._seeds = [seed] * 3
+        env._seeds = [-1] * 3
     with pytest.raises(InputError, match="seed must be a whole number from 0 up"):
-        kind.reset(env, None if kind is OfStableBaselines else seed)
+        kind.reset(env, None if kind is OfStableBaselines else -1)
     np.testing.assert_array_equal(run(kind, env, 5), run(kind, twin, 5))
 
 
@@ -250,7 +249,7 @@ def test_options_that_are_none_are_refused_and_change_nothing(kind):
     env = kind.make()
     kind.reset(env, 3)
     twin = copy.deepcopy(env)
-    for options in ({"sped_kmh": 200}, {"device": "cpu"}, [("speed_kmh", 200)]):
+    for options in ({"sped_kmh": 200}, {"device": "cpu"}, {"observation": "full"}, [("speed_kmh", 200)]):
         given = {"options": options}
         if kind is OfStableBaselines:
             env.set_options(given.pop("options") if isinstance(options, dict) else [{"speed_kmh": 2}, {}, {}])

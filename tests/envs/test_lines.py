@@ -113,9 +113,8 @@ def test_gymnasium_s_checker_accepts_it():
     check_env(make(**FAMILY).unwrapped, skip_render_check=True)
 
 
-@drawn
-def test_copies_go_on_alike(settings):
-    env = make(**settings)
+def test_copies_go_on_alike():
+    env = make(**SECTION)
     env.reset(seed=1)
     twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
     seen = run_to_end(env)

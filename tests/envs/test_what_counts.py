@@ -86,17 +86,10 @@ def test_an_early_end_before_anything_counts_is_charged_for_what_would_have_coun
     assert "std" not in info["figures"]  # it has none
 
 
-@pytest.mark.parametrize("lanes", [None, 3])
-def test_a_washout_is_that_of_the_policies_where_the_actuator_is_ideal(lanes):
+def test_a_washout_is_that_of_the_policies_where_the_actuator_is_ideal():
     """Independent code: what a policy's own high-pass makes of the same actions."""
     settings = {"distance": 150.0, "actuator": {"force_limit": 50.0, "place": "both"}}
-
-    def make(**more):
-        if lanes is None:
-            return gymnasium.make(LIGHT, **settings, **more).unwrapped
-        return gymnasium.make_vec(LIGHT, num_envs=lanes, **settings, **more).unwrapped
-
-    inside, outside = make(washout=0.7), make()
+    inside, outside = (gymnasium.make(LIGHT, **settings, **more) for more in ({"washout": 0.7}, {}))
     shape = inside.action_space.shape
     own = Washout(WashoutSettings(time_constant=0.7, lag=0.0, rate=1e12), 0.01, 50.0, shape)
     for each in (inside, outside):
