@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError, shown
 from ..metrics.figures import Figures, SpanChoice, settled_spans
@@ -14,8 +16,9 @@ from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
+from .arguments import not_finite
 from .entries import DEVIATIONS, ESTIMATED
-from .episode import Flags, Results, Stepping, new_episode
+from .episode import Flags, Results, new_episode, new_results
 from .length import Cost, EpisodeLength, arrays_of, new_plant
 from .observation import Context, Layout
 from .passive_run import (
@@ -37,10 +40,15 @@ from .record import diverged, divergence, ending, trajectory
 from .reset import LaneGenerators, reset
 from .settings import RunSettings
 from .state import TaskRow
-from .step import figures_so_far, running_figures
+from .step import control_steps, figures_so_far, observe_start, running_figures
+
+COASTED = 100
+"""Control steps without a policy per call."""
+BOUND_ANEW = ("_threads", "_plain_step", "_observe_start")
+"""Attributes that ``Task._bind`` makes from the others."""
 
 
-class Task(Stepping):
+class Task:
     """Lanes with one line, pantograph and controller; each lane is reset and evaluated on its own."""
 
     def __init__(
@@ -91,18 +99,19 @@ class Task(Stepping):
         odometers = Odometers(settings.sensors.odometer, lanes * agents, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
-        super().__init__(
-            plant,
-            lanes,
-            episode=new_episode(settings, plant, self.layout, length.control_steps, odometers.arrays()),
-            sensors=sensors,
-            samples=plant.samples(rows, tension=record_droppers),
-            running=running_figures(lanes * agents, len(plant.model.supports), plant.time_step),
-            noise=None if rms is None else Noise(rms, lanes),
-            odometers=odometers,
-            entries=len(self.layout.entries),
-            threads=threads,
-        )
+        self.plant, self.lanes, self.agents = plant, lanes, agents  # agents: rows of results for each lane
+        arrays = odometers.arrays()
+        self.episode: Any = new_episode(settings, plant, self.layout, length.control_steps, arrays)
+        self.sensors: Any = sensors
+        self.samples: Any = plant.samples(rows, tension=record_droppers)
+        self.running: Any = running_figures(lanes * agents, len(plant.model.supports), plant.time_step)
+        self.noise, self.odometers = None if rms is None else Noise(rms, lanes), odometers
+        self._most_threads = threads
+        self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
+        self._any_over = True
+        self.results = self.new_results()
+        copy_whole(*self._arrays)
+        self._bind()
 
     def _speeds_of_passive_runs(self, normalise: tuple[float, float]) -> tuple[float, float]:
         try:
@@ -166,6 +175,125 @@ class Task(Stepping):
         return np.array(
             [[self.trim.static_force(speed, number) for speed in speeds.tolist()] for number in collectors]
         )
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """All named tuples that the kernels take, in their order."""
+        return *self.plant.arrays, *self._arrays
+
+    def _bind(self) -> None:
+        packed = pack(*self.arrays)
+        run = bind(control_steps, packed, *self.results, 0, self.lanes)
+        self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
+        alone = partial(run, *self.results, 0, 1)
+        self._plain_step = alone if self.lanes == 1 else partial(threads.step, *self.results)
+        self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without the bound kernels: a copy has arrays of its own, and binds them again."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    def new_results(self) -> Results:
+        """Empty arrays for the results of a step."""
+        return new_results(self.lanes * self.agents, len(self.layout.entries))
+
+    def begin(self, lanes: Any) -> None:
+        """Mark that episodes begin in lanes, (n,)."""
+        self._over[lanes] = False
+        self._any_over = bool(self._over.any())
+
+    def observe_start(self, lanes: Any, results: Results) -> None:
+        """Write the results of lanes, (n,), at their start."""
+        idle = self.episode.idle
+        idle[:] = True
+        idle[lanes] = False
+        self._observe_start(*results, int(lanes.min()), int(lanes.max()) + 1)
+        idle[:] = False
+
+    def step(
+        self,
+        action: Array,
+        skip: Flags | None = None,
+        results: Results | None = None,
+    ) -> bool:
+        """Make one control step in all lanes, except those to skip, under actions, (rows, actions).
+
+        Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
+        default the task's own. Skipped lanes do not change. Raises InputError, and changes nothing, for an
+        action that is not finite, or a lane whose episode has ended or not begun.
+        """
+        if self._any_over:
+            self._refuse_over(skip)
+        self.episode.action[...] = action
+        if self.noise is not None:
+            self.noise.prepare(self.sensors, skip)
+        if self.odometers.drawn:
+            rows = None if skip is None else np.repeat(skip, self.agents)
+            self.odometers.prepare(self.episode.odometer, rows)
+        if skip is None and results is None:
+            return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible
+        results = results or self.results
+        if skip is None:
+            return self._evaluate(self._threads.step(*results), results)
+        self.episode.idle[:] = skip
+        answer = self._threads.step(*results)
+        self.episode.idle[:] = False
+        return self._evaluate(answer, results, skip)
+
+    def _refuse_over(self, skip: Flags | None) -> None:
+        over = self._over if skip is None else self._over & ~skip
+        if over.any():
+            raise InputError(
+                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
+            )
+
+    def _evaluate(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
+        """Whether an episode has ended, from a kernel's answer. Raises InputError for an invalid action."""
+        if answer > 0:
+            ended = self._ended(results)
+            self._over |= ended if skip is None else ended & ~skip
+            self._any_over = bool(self._over.any())
+        if answer < 0:
+            action = self.episode.action
+            lane = int(np.flatnonzero(~np.isfinite(action).all(axis=1))[0])
+            raise not_finite(action, lane, several=len(action) > 1)
+        return answer > 0
+
+    def _ended(self, results: Results) -> Flags:
+        """Whether the episodes of lanes have ended, (lanes,): those of a lane's rows end together."""
+        ended: Flags = (results.terminated | results.truncated)[:: self.agents]
+        return ended
+
+    def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
+        """Run all lanes, just reset, to their ends without actuators.
+
+        watch: called with this object after every ``COASTED`` control steps; it must change nothing.
+        """
+        ended = np.zeros(self.lanes, dtype=np.bool_)
+        while not ended.all():
+            self.coast(np.where(ended, 0, COASTED), self.results)
+            ended = self._ended(self.results)
+            if watch is not None:
+                watch(self)
+
+    def coast(self, steps: Any, results: Results) -> None:
+        """Make ``steps``, (lanes,), control steps without control, none beyond an episode's end.
+
+        Noise is drawn only for the observation after the last step.
+        """
+        self.episode.steps[:] = steps
+        self.step(np.zeros_like(self.episode.action), steps == 0, results)
+        self.episode.steps[:] = 1
 
     def end(self, lane: int) -> int:
         """Number of plant steps of a lane's episode."""
