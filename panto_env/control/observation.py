@@ -56,6 +56,16 @@ class Layout:
         return np.array([entry.scale for entry in self.entries])
 
     @property
+    def centre(self) -> Array:
+        """Value at which each entry, (entries,), is 0, in its unit."""
+        return np.array([entry.centre for entry in self.entries])
+
+    @property
+    def slope(self) -> Array:
+        """Change of the centre, (entries,), in its unit for each m/s of the train."""
+        return np.array([entry.slope for entry in self.entries])
+
+    @property
     def earlier(self) -> tuple[Index, Index]:
         """Indices of all earlier values, and of the present value of each."""
         names = {entry.name: place for place, entry in enumerate(self.entries)}
