@@ -28,9 +28,12 @@ import numba
 from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
 
-DECORATORS = ("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload")
+DECORATORS = (
+    *("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload"),
+    *("entry", "entries"),  # of ``control.entries``
+)
 """Names of the decorators of functions that Numba compiles."""
-COMPILER = ("compile", "dispatch", "parts")
+COMPILER = ("compile",)
 """Files of ``backend`` that say how kernels are compiled."""
 MARK = re.compile(rf"^\s*@(?:{'|'.join(DECORATORS)})\b", re.MULTILINE)
 
