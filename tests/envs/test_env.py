@@ -57,15 +57,6 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     assert not any("figures" in info for info in infos[:-1])
 
 
-def test_weights_scale_the_reward():
-    unweighted, _, _ = run_episode(gymnasium.make("PantographStiffness-v0"))
-    reward = {"cost_function": 2.0, "contact_loss": 2.0}
-    weighted, _, _ = run_episode(gymnasium.make("PantographStiffness-v0", reward=reward))
-    assert weighted == pytest.approx([2 * r for r in unweighted])
-    effort, _, _ = run_episode(gymnasium.make("PantographStiffness-v0", reward={"effort": 1.0}))
-    assert sum(effort) < sum(unweighted)
-
-
 def test_second_episode_is_as_if_it_were_the_first():
     settings = {"sensors": "realistic", "actuator": "realistic", "line_condition": "worn", "distance": 40.0}
     env = gymnasium.make("PantographStiffness-v0", **settings).unwrapped
@@ -80,15 +71,6 @@ def test_second_episode_is_as_if_it_were_the_first():
     assert ended
     for first, third in zip(runs[0], runs[2], strict=True):
         np.testing.assert_array_equal(first, third)
-
-
-def test_seed_changes_noise_speed_and_line():
-    env = gymnasium.make("Pantograph-v0", speed_kmh=(200, 300), sensors="realistic", line_condition="fair")
-    first, info_1 = env.reset(seed=1)
-    second, info_2 = env.reset(seed=2)
-    assert info_1["speed_kmh"] != info_2["speed_kmh"]
-    assert 200 <= info_1["speed_kmh"] <= 300
-    assert not np.array_equal(first[:5], second[:5])
 
 
 def test_id_works_in_a_fresh_process_by_module_name():
@@ -164,23 +146,6 @@ def test_step_outside_an_episode_is_refused():
     assert not terminated
     with pytest.raises(InputError, match="call reset before step"):
         env.step(np.zeros(1))
-
-
-def test_losing_contact_for_long_ends_the_episode_and_is_no_way_out():
-    env = gymnasium.make("Pantograph-v0", settle=0.0, actuator={"force_limit": 400.0})
-    env.reset(seed=0)
-    total, steps = 0.0, 0
-    while True:
-        _, reward, terminated, truncated, info = env.step(np.array([-1.0], np.float32))
-        total += reward
-        steps += 1
-        if terminated or truncated:
-            break
-    assert terminated
-    assert not truncated
-    assert info["figures"]["contact_loss"] > 50
-    passive, _, _ = run_episode(gymnasium.make("Pantograph-v0", settle=0.0))
-    assert total < sum(passive)
 
 
 def test_contact_lost_for_half_a_second_or_a_head_too_high_ends_the_episode():
