@@ -22,7 +22,7 @@ from panto_env.base.errors import InputError
 from panto_env.control import Task, passive_mean, trim_of_pass
 from panto_env.control.length import arrays_of, check_record, whole_steps
 from panto_env.control.lines import on_drawn_line
-from panto_env.control.mean_force import Trim
+from panto_env.control.passive_run import Trim
 from panto_env.control.settings import RunSettings, far_enough, run_settings
 from panto_env.metrics.figures import SpanChoice
 from panto_env.metrics.low_pass import low_pass_from, settled_at

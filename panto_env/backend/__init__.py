@@ -8,7 +8,7 @@ select a function by the type of its first argument; ``constants`` gives kernels
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
-from .cache import cache_folder, source_hash
+from .cache import cache_folder, cached, source_hash
 from .compile import JIT, called, constants, implements, inlined, kernel, operation, python_function
 from .packed import CACHE_LINE, aligned_zeros, bind, copy_whole, open_packed, pack
 from .threads import LaneThreads
@@ -36,6 +36,7 @@ __all__ = [
     "any_of",
     "bind",
     "cache_folder",
+    "cached",
     "called",
     "choose",
     "constants",

@@ -1,15 +1,9 @@
-"""What the compiled kernels are made of: every kernel of the package, and all that it names, as syntax trees.
+"""The cache folder of compiled kernels, named by a hash of what they are made of.
 
-A kernel is compiled with the functions that it calls and the constants that it names, in whatever file these
-are. So all of them are followed, from the decorated functions on, and nothing else counts: not the rest of
-their files, and neither docstrings, comments and annotations nor the words of errors.
-
-The cache folder of compiled kernels.
-
-Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls.
-So the folder is named by a hash of what kernels are made of (``kernel_sources``): after a change of it a new
-folder is used, and after any other the same. Its content is executed, so a folder is used only if it belongs
-to this user and no other can write to it.
+Numba's cache notices an edit in a kernel's own file but not in another file that the kernel calls. So all
+functions and constants that kernels name are followed (``kernel_sources``), and nothing else counts: not the
+rest of their files, and neither docstrings, comments and annotations nor the words of errors. The folder's
+content is executed, so it is used only if it belongs to this user and no other can write to it.
 """
 
 from __future__ import annotations
@@ -22,18 +16,24 @@ import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import llvmlite
 import numba
 
-DECORATORS = ("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload")
+from ..base.checksums import checksum, read_checked, write_checked
+from ..base.errors import InputError
+
+DECORATORS = (
+    *("kernel", "inlined", "called", "operation", "implements", "in_python", "intrinsic", "overload"),
+    *("entry", "entries"),  # of ``control.entries``
+)
 """Names of the decorators of functions that Numba compiles."""
-COMPILER = ("compile", "dispatch", "parts")
+COMPILER = ("compile",)
 """Files of ``backend`` that say how kernels are compiled."""
 MARK = re.compile(rf"^\s*@(?:{'|'.join(DECORATORS)})\b", re.MULTILINE)
 
@@ -258,3 +258,24 @@ def _private(folder: Path) -> bool:
     found = folder.lstat()
     others = stat.S_IWGRP | stat.S_IWOTH
     return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not found.st_mode & others
+
+
+def cached(folder: str, made_of: Any, compute: Callable[[], Any]) -> Any:
+    """Result of ``compute`` for what it is made of, both plain data; from the disk where it is there already.
+
+    It lies in a folder beside the compiled kernels; without one nothing is cached.
+    """
+    beside = cache_folder()
+    if beside is None:
+        return compute()
+    key = checksum(made_of)
+    file = beside / folder / f"{key}.json"
+    with suppress(InputError):  # the file does not exist, or is damaged
+        found = read_checked(file)
+        if found["made_of"] == key:
+            return found["value"]
+    value = compute()
+    with suppress(InputError, OSError):  # no room: the next process computes it again
+        file.parent.mkdir(exist_ok=True)
+        write_checked(file, {"made_of": key, "value": value})
+    return value

@@ -8,10 +8,8 @@ two hundred parts, a third LLVM optimises the whole; its own lower levels save l
 slower kernels. Parts that were optimised by themselves would also be fused otherwise: the contact force, in
 single precision, would change by some 1e-6.
 
-Operations of kernels that depend on the type of their first argument: one name, one source per type.
-
-Numba selects the source when it compiles a kernel for a type, so that it is inlined and the compiled kernel
-can be cached on disk (a function passed as an argument could not). Without compilation Python selects it.
+The source of an operation is selected when a kernel is compiled for a type, so that it is inlined and the
+kernel can be cached on disk (with a function passed as an argument it could not).
 """
 
 from __future__ import annotations

@@ -1,13 +1,9 @@
-"""Arrays of kernels in the memory of a PyTorch device, the numbers of neighbouring lanes side by side.
+"""Kernels on a GPU, with a thread for each lane: the processor's source and results, bit for bit, as far as
+was seen.
 
-A thread of a GPU computes a lane, and what neighbouring threads read at once should lie side by side. So
-the last axis of everything that differs from lane to lane is the lane: each lane is a column. Kernels index
-the same arrays with the same axes as ever; only the strides differ.
-
-Kernels on a GPU: a part of kernels, compiled by numba-cuda, with a thread for each lane.
-
-The source is that of the processor's kernels, and so are the results, bit for bit, as far as was seen. What
-is compiled is kept on disk: it takes a minute. The extra "cuda" brings what this needs.
+What neighbouring threads read at once should lie side by side. So the last axis of everything that differs
+from lane to lane is the lane: each lane is a column. Kernels index the same arrays with the same axes as
+ever; only the strides differ. The extra "cuda" brings what this needs.
 """
 
 from __future__ import annotations
@@ -15,7 +11,6 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -26,9 +21,8 @@ from llvmlite import ir
 from numba import types
 from numba.core.extending import intrinsic
 
-from ..base.checksums import checksum, read_checked, write_checked
 from ..base.errors import InputError
-from .cache import cache_folder, kernel_hash
+from .cache import cached, kernel_hash
 from .compile import inlined
 from .packed import ADDRESS, PackedType, array_form, open_packed, words_of
 
@@ -200,7 +194,6 @@ def _axis(one: Any, several: Any) -> int | None:
 
 
 def _numbers(axis: int, array: Any) -> int:
-    """Numbers of a column of an array."""
     return int(array.size // array.shape[axis])
 
 
@@ -249,7 +242,6 @@ def _words(value: Any, apart: Any) -> Any:
 
 
 def _type_of(value: Any) -> Any:
-    """Numba's type of a value."""
     if hasattr(value, "_fields"):
         return types.NamedTuple([_type_of(field) for field in value], type(value))
     if not isinstance(value, torch.Tensor):
@@ -318,31 +310,19 @@ def _kept(
     import numba_cuda
 
     name = getattr(part, "py_func", part).__name__
-    made_of = checksum(
-        [kernel_hash(), name, str(form), str(results), list(capability), numba_cuda.__version__]
-    )
-    folder = cache_folder()
-    file = None if folder is None else folder / "gpu" / f"{made_of}.json"
-    if file is not None:
-        with suppress(InputError):  # the file does not exist, or is damaged
-            found = read_checked(file)
-            if found["made_of"] == made_of:
-                return str(found["ptx"])
-    if sys.stderr is not None and sys.stderr.isatty():
-        print(
-            "Compiling for the GPU, a minute or two, once per version and kind of line ...", file=sys.stderr
-        )
-    ptx = compiled(part, form, results, capability)
-    if file is not None:
-        with suppress(InputError, OSError):  # no room: the next process compiles it again
-            file.parent.mkdir(exist_ok=True)
-            write_checked(file, {"made_of": made_of, "ptx": ptx})
-    return ptx
+    made_of = [kernel_hash(), name, str(form), str(results), list(capability), numba_cuda.__version__]
+
+    def compute() -> str:
+        if sys.stderr is not None and sys.stderr.isatty():
+            text = "Compiling for the GPU, a minute or two, once per version and kind of line ..."
+            print(text, file=sys.stderr)
+        return compiled(part, form, results, capability)
+
+    return str(cached("gpu", made_of, compute))
 
 
 @lru_cache
 def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
-    """A kernel on the GPU with this number."""
     from cuda.core import Device, ObjectCode
 
     Device(index).set_current()

@@ -1,6 +1,4 @@
-"""Memory aligned for vector instructions and caches, also in copies.
-
-Arguments of kernels, packed once in their compiled form.
+"""Arguments of kernels: aligned memory, also in copies, and packed once in their compiled form.
 
 Converting Python tuples of fifty arrays for a kernel takes a microsecond in each call, as long as a step of
 the plant. ``pack`` does it once; the kernel gets the address of each tuple and reads the fields that it
@@ -60,8 +58,6 @@ def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int | N
 
 
 class _View(NamedTuple):
-    """An array as a part of a block of memory."""
-
     block: int
     offset: int  # bytes
     shape: tuple[int, ...]
@@ -91,7 +87,6 @@ def copy_whole(*tuples: Any) -> None:
 
 
 def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
-    """Reduction of a named tuple for ``pickle`` and ``copy``."""
     owners: dict[int, Any] = {}
     used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
     for array in arrays:
@@ -119,7 +114,6 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
 
 
 def _together(parts: _Parts) -> Any:
-    """A named tuple from the result of ``_apart``, with memory of its own."""
     memory = []
     for content, place in parts.blocks:
         memory.append(aligned_zeros(content.shape, np.uint8, place))
@@ -136,7 +130,6 @@ def _together(parts: _Parts) -> Any:
 
 
 def _owner(array: Any) -> Any:
-    """The array that owns the memory of this one."""
     while isinstance(array.base, np.ndarray):
         array = array.base
     return array

@@ -137,7 +137,6 @@ def _number(k: int) -> Any:
 
 
 def _vector(builder: Any, numbers: list[Any]) -> Any:
-    """A vector of eight numbers, or another count of them."""
     vector = ir.Constant(ir.VectorType(numbers[0].type, len(numbers)), ir.Undefined)
     for k, number in enumerate(numbers):
         vector = builder.insert_element(vector, number, _number(k))
@@ -161,13 +160,11 @@ def _numbers(context: Any, builder: Any, array_type: Any, array: Any, places: li
 
 
 def _in_row(builder: Any, i: Any, count: int) -> list[Any]:
-    """Places of the numbers of row ``i`` of ``count``."""
     first = builder.mul(i, ir.Constant(i.type, count))
     return [builder.add(first, ir.Constant(i.type, k)) for k in range(count)]
 
 
 def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -> Any:
-    """Address of a row of ``count`` numbers in C's order."""
     array, i = values
     data = make_array(array_type)(context, builder, array).data
     first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, count))])

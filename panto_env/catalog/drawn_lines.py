@@ -1,13 +1,8 @@
-"""Ranges of the parts of a flexible line, and how the values of a part are drawn from them.
-
-Values that belong together are not drawn apart. A wire's mass, tension and bending stiffness follow from its
-section and stress; the place of the first dropper is a share of the span, and the number of droppers follows
-from the distance between them.
-
-Descriptions from which lines are drawn that hang and that an engineer would build.
+"""Descriptions from which lines are drawn that hang and that an engineer would build.
 
 Each kind is a TOML file with a schema of its own, and is named where a line is expected by its kind, a colon
-and its name or its file: "family:high-speed".
+and its name or its file: "family:high-speed". Values that belong together are not drawn apart: a wire's mass,
+tension and bending stiffness follow from its section and stress.
 """
 
 from __future__ import annotations
@@ -22,15 +17,17 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..base.errors import InputError
 from ..base.settings import Between, Settings
+from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import evenly, parabola
+from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import LONGEST_SPAN
+from .values import values_of
 
 N = TypeVar("N")
 
 
 def _two(value: Any) -> Any:
-    """A number as the range from it to itself."""
     return value if isinstance(value, list | tuple) else (value, value)
 
 
@@ -178,9 +175,9 @@ class DrawnLines(Settings):
         """Maximum speed of trains on any of the lines (km/h)."""
 
     @property
-    @abstractmethod
     def fewest_spans(self) -> int | None:
         """Number of spans after which a line ends at the earliest; None where none of the lines ends."""
+        return None
 
     @abstractmethod
     def speeds(self, wave_speed: float, speed_kmh: Speeds | None = None) -> Speeds:
@@ -211,6 +208,18 @@ class DrawnLines(Settings):
             if line is not None:
                 return line, self.speeds(line.contact_wire.wave_speed, speed_kmh)
         raise InputError(self.none_found(speed_kmh))
+
+    def hung(self, values: dict[str, Any], shortest: float) -> FlexibleCatenaryData | None:
+        """The line with these values; None where it cannot hang, or has shorter droppers (m)."""
+        try:
+            line = FlexibleCatenaryData.model_validate(values)
+            check_line(line)
+        except ValueError:  # InputError too
+            return None
+        if hang(line).dropper_length.min() < shortest:
+            return None
+        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
+        return line.model_copy(update={"sources": sources})
 
     def drawn(
         self, random: np.random.Generator, speed_kmh: Speeds | None = None

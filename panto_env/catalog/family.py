@@ -1,4 +1,4 @@
-"""Limits of EN 50119 on the gradient of the contact wire."""
+"""Families of flexible lines, and the limits of EN 50119 on the gradient of the contact wire."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from pydantic import Field
 
 from ..base.arrays import Array, to_kmh
 from ..base.settings import Between
-from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, PowerSystem
 from .drawn_lines import (
     Bands,
@@ -29,7 +27,6 @@ from .drawn_lines import (
     WireRanges,
     in_words,
 )
-from .values import values_of
 
 GRADIENTS = (
     (50.0, 25.0, 25.0),
@@ -110,14 +107,15 @@ class LineFamily(DrawnLines):
         """As ``DrawnLines.fastest_kmh``."""
         return self.max_speed_kmh
 
-    @property
-    def fewest_spans(self) -> None:
-        """As ``DrawnLines.fewest_spans``."""
-        return None
-
     def draw_once(self, random: np.random.Generator, speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
         """A line; None for one that cannot hang, or whose droppers, tensions or speeds do not fit."""
-        return self._line(self._values(random), speed_kmh)
+        values = self._values(random)
+        contact, messenger = values["contact_wire"], values["messenger_wire"]
+        low, high = self.speeds(math.sqrt(contact["tension"] / contact["mass"]), speed_kmh)
+        least, most = self.tension_ratio
+        if not low <= high or not least <= messenger["tension"] / contact["tension"] <= most:
+            return None
+        return self.hung(values, self.droppers.shortest)
 
     def none_found(self, speed_kmh: Speeds | None) -> str:
         """As ``DrawnLines.none_found``."""
@@ -147,6 +145,8 @@ class LineFamily(DrawnLines):
             random.uniform(*ends) for ends in (self.steady_arm.mass, self.steady_arm.stiffness)
         )
         return {
+            "name": self.full_name,
+            "description": f"Drawn from a family. {self.description}",
             "system": self.system,
             "span_length": span,
             "spans": self.spans,
@@ -164,22 +164,3 @@ class LineFamily(DrawnLines):
                 "beta": random.uniform(*self.damping.beta),
             },
         }
-
-    def _line(self, values: dict[str, Any], speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
-        """The line with these values; None where it is to be drawn again."""
-        contact, messenger = values["contact_wire"], values["messenger_wire"]
-        low, high = self.speeds(math.sqrt(contact["tension"] / contact["mass"]), speed_kmh)
-        least, most = self.tension_ratio
-        if not low <= high or not least <= messenger["tension"] / contact["tension"] <= most:
-            return None
-        try:
-            line = FlexibleCatenaryData.model_validate(
-                {"name": self.full_name, "description": f"Drawn from a family. {self.description}", **values}
-            )
-            check_line(line)
-        except ValueError:  # InputError too
-            return None
-        if hang(line).dropper_length.min() < self.droppers.shortest:
-            return None
-        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
-        return line.model_copy(update={"sources": sources})

@@ -78,14 +78,12 @@ def load_family(source: str | Path | LineFamily) -> LineFamily:
     Raises InputError, naming the file and the key, where it cannot be read, is not valid, or has no lines.
     Warns of values of an example line that are far from the catalogue's.
     """
-    family: LineFamily = source if isinstance(source, LineFamily) else _load_drawn("family", source)
-    return family
+    return source if isinstance(source, LineFamily) else _load_drawn("family", source)
 
 
 def load_section(source: str | Path | LineSection) -> LineSection:
     """Section to draw from, from a catalogue name, a TOML file, or one already loaded; as ``load_family``."""
-    section: LineSection = source if isinstance(source, LineSection) else _load_drawn("section", source)
-    return section
+    return source if isinstance(source, LineSection) else _load_drawn("section", source)
 
 
 def load_drawn(source: Any) -> LineFamily | LineSection:
@@ -168,11 +166,15 @@ def _load_drawn(kind: str, source: Any) -> Any:
 
 
 def _load(family: str, source: str | Path) -> Any:
-    path = _find(family, source)
+    path = file_of(source, family)
     return _read(family, path, path.stat().st_mtime_ns)
 
 
-def _find(family: str, source: str | Path) -> Path:
+def file_of(source: str | Path, family: str = "catenary") -> Path:
+    """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
+
+    Raises InputError where there is none.
+    """
     if not isinstance(source, str | Path):
         raise InputError(
             f"A {family} must be a catalogue name, a TOML file or a catalogue entry, "
@@ -199,22 +201,14 @@ def parse_catenary(table: Mapping[str, Any], path: Path) -> CatenaryData:
 
     Raises InputError, and warns, as ``load_catenary`` does.
     """
-    line: CatenaryData = _entry("catenary", table, path)
-    return _checked(line, path)
+    line: CatenaryData = _checked(_entry("catenary", table, path), path)
+    return line
 
 
 def parse_pantograph(table: Mapping[str, Any], path: Path) -> PantographData:
     """Pantograph from the table of a TOML file, as ``parse_catenary`` does for lines."""
-    pantograph: PantographData = _entry("pantograph", table, path)
-    return _checked(pantograph, path)
-
-
-def file_of(source: str | Path, family: str = "catenary") -> Path:
-    """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
-
-    Raises InputError where there is none.
-    """
-    return _find(family, source)
+    pantograph: PantographData = _checked(_entry("pantograph", table, path), path)
+    return pantograph
 
 
 @cache
@@ -331,10 +325,8 @@ def is_entry(entry: CatenaryData | PantographData, name: str, content: str | Non
 
 def _content_in_catalogue(entry: CatenaryData | PantographData, name: str) -> str | None:
     """``content_of`` the catalogue's entry of a name, of the kind of ``entry``; None where it has none."""
-    line = isinstance(entry, CatenaryData)
-    if name not in available("catenary" if line else "pantograph"):
-        return None
-    return content_of(load_catenary(name) if line else load_pantograph(name))
+    family = "catenary" if isinstance(entry, CatenaryData) else "pantograph"
+    return content_of(_load(family, name)) if name in available(family) else None
 
 
 def _without_words(values: Any) -> Any:

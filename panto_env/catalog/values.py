@@ -79,7 +79,6 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
 
 
 def _inline(value: Any) -> str:
-    """A span, a type of spans or an overlap in one line."""
     value = value.model_dump() if isinstance(value, BaseModel) else value
     if isinstance(value, Mapping):
         return ", ".join(

@@ -39,6 +39,17 @@ class Cost(NamedTuple):
     memory: float  # bytes, of the record
     seconds: float  # of computing, on one core
 
+    @classmethod
+    def of(cls, lanes: int, steps: float, supports: int, droppers: int, moving: float, record: bool) -> Cost:
+        """Cost of a run in all lanes.
+
+        steps: time steps. supports, droppers: numbers of those recorded. moving: numbers in the state of all
+        lanes together. record: whether all steps are recorded.
+        """
+        columns = SAMPLE_ROWS + supports + droppers
+        memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
+        return cls(steps, memory, steps * (lanes * STEP + moving * NUMBER))
+
     def check(self, what: str, remedy: str = "") -> None:
         """Raise InputError where the cost exceeds the machine's memory, or the time ``LONGEST``.
 
@@ -58,31 +69,9 @@ class Cost(NamedTuple):
             )
 
 
-def run_cost(lanes: int, steps: float, supports: int, droppers: int, moving: float, record: bool) -> Cost:
-    """Cost of a run in all lanes.
-
-    steps: time steps. supports, droppers: numbers of those recorded. moving: numbers in the state of all
-    lanes together. record: whether all steps are recorded.
-    """
-    columns = SAMPLE_ROWS + supports + droppers
-    memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
-    return Cost(steps, memory, steps * (lanes * STEP + moving * NUMBER))
-
-
 def check_record(needed: float, what: str) -> None:
     """Raise InputError unless the machine has the memory (bytes) for a record."""
     Cost(0.0, needed, 0.0).check(what)
-
-
-def check_lanes(lanes: int, some: int, arrays: Iterable[Any]) -> None:
-    """Raise InputError where lanes do not fit into memory; arrays: named tuples of the arrays of ``some``."""
-    needed = lanes / some * sum(numbers.nbytes for each in arrays for numbers in arrays_of(each))
-    there = machine.memory()
-    if needed > SHARE * there:
-        raise InputError(
-            f"{lanes:,} lanes would take {gigabytes(needed)}, but this machine has {gigabytes(there)} of "
-            "memory; take fewer."
-        )
 
 
 def arrays_of(fields: Any) -> Iterable[np.ndarray[Any, Any]]:
@@ -155,7 +144,13 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
         drifting=settings.speed_drift > 0,
     )
     if lanes > FEW_LANES:
-        check_lanes(lanes, FEW_LANES, make_plant(lanes=FEW_LANES).arrays)
+        few, there = make_plant(lanes=FEW_LANES), machine.memory()
+        needed = lanes / FEW_LANES * sum(each.nbytes for each in arrays_of(few.arrays))
+        if needed > SHARE * there:
+            raise InputError(
+                f"{lanes:,} lanes would take {gigabytes(needed)}, but this machine has {gigabytes(there)} of "
+                "memory; take fewer."
+            )
     return make_plant(lanes=lanes)
 
 
@@ -194,6 +189,8 @@ class EpisodeLength:
         # In the slowest run, after the longest run-in.
         slow = self.speed_range[0]
         run_in = np.ceil(plant.alignment.support(settings.run_in) / (slow * self.control_interval))
+        lag = largest_lag(self._drift)  # of a train by its drift (m)
+        self._late = math.ceil(lag / (slow * self.control_interval)) * self.control_steps
         self.most_plant_steps = float(self.plant_steps(slow, run_in)) + self._late
 
     def check_speeds(self, speed_kmh: Any) -> tuple[float, float]:
@@ -230,12 +227,6 @@ class EpisodeLength:
         needed = np.searchsorted(position, position[int(run_in)] + distance - 1e-9)
         possible = np.searchsorted(position, self._plant.model.length + 1e-9) - 1
         return max(1, min(int(needed), int(possible))) * self.control_steps
-
-    @property
-    def _late(self) -> int:
-        """Maximum delay of a train by its drift (plant steps)."""
-        lag = largest_lag(self._drift)
-        return math.ceil(lag / (self.speed_range[0] * self.control_interval)) * self.control_steps
 
     @property
     def most_control_steps(self) -> int:

@@ -1,14 +1,11 @@
-"""What the pantograph in front measured at places ahead of a controlled one, as a train's data bus tells it.
+"""What was measured earlier at the places ahead of a pantograph, by the one in front of it and by itself.
 
 The contact force that the sensors of the one in front read, with their delay and noise, is kept for each
-control step until the one behind has come to the place.
+control step until the one behind has come to the place, as a train's data bus tells it.
 
-What a pantograph read and did at the places just ahead of it, one span ago and more.
-
-Droppers, supports and sag repeat from span to span, and so does much of the contact force: what was felt at
-the same share of earlier spans, and what was done there, foretells what comes. Place and contact force, as
-read, and actions are kept for each control step and looked up by the place. Before a line's start the force
-is that at rest and there are no actions.
+Droppers, supports and sag repeat from span to span, and so does much of the contact force: what was felt and
+done at the same share of earlier spans foretells what comes. It is kept for each control step and looked up
+by the place. Before a line's start the force is that at rest and there are no actions.
 """
 
 from __future__ import annotations

@@ -124,7 +124,6 @@ def _tile(lanes: int, device: torch.device) -> int:
 
 
 def _bound(columns: Columns) -> Callable[[], Any]:
-    """A control step of all lanes that are not idle."""
     if columns.device.type == "cuda":
         from ..backend.cuda import bind_on_gpu  # needs numba-cuda, an extra
 

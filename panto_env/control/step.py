@@ -1,4 +1,4 @@
-"""Figures of an episode, updated during the run."""
+"""Kernels of a control step: actions, plant steps, figures, endings, results."""
 
 from __future__ import annotations
 

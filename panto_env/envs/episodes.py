@@ -1,4 +1,4 @@
-"""An environment is used by one thread at a time: a second one is refused."""
+"""What all environments share: one thread at a time, copies, checked arguments of reset, their episodes."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ..base.errors import InputError, shown
 from ..control import Task
 from ..control.lines import draws_line, on_drawn_line, on_example
 from ..control.settings import RunSettings, check_names, read_settings
+from .settings import Whole
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -62,14 +63,31 @@ def one_at_a_time(method: F) -> F:
     return alone  # type: ignore[return-value]
 
 
-class CopiedAlone:
+class CopiedAlone(Whole):
     """Base of an environment with an ``InUse`` in ``_in_use``: no other thread steps it while it is copied.
 
     A copy, by ``copy`` or ``pickle``, raises InputError while another thread is using the environment.
     """
 
+    _spec: EnvSpec | None = None
+    _longest: int | None = None  # steps of an episode without options; None where that depends on its line
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The spec from `gymnasium.make` or `make_vec`, with the maximum steps of an episode."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copy.copy(spec)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self._longest
+            # ``make_vec`` also adds it to the arguments; left there, a spec made from this one would differ.
+            self._spec.kwargs = {
+                k: value for k, value in self._spec.kwargs.items() if k != "max_episode_steps"
+            }
+
     def _state(self) -> dict[str, Any]:
-        """What a copy consists of."""
         return vars(self)
 
     @one_at_a_time
@@ -168,24 +186,7 @@ class Episodes:
 
     @property
     def _spaces(self) -> tuple[Any, ...]:
-        """What an observation and an action consist of."""
         layout = self.task.layout
         names = [entry.name for entry in layout.entries]
         scales = [] if layout.normalise else [(entry.centre, entry.scale) for entry in layout.entries]
         return layout.kind, layout.normalise, names, scales, self.task.actuator.places
-
-    @property
-    def most_control_steps(self) -> int | None:
-        """Control steps of the longest possible episode; None where that depends on the line drawn."""
-        return None if self.draws_line else self.task.length.most_control_steps
-
-
-def with_longest_episode(spec: EnvSpec | None, steps: int | None) -> EnvSpec | None:
-    """A copy of an environment's spec with the maximum steps of an episode, which wrappers read."""
-    if spec is None:
-        return None
-    completed = copy.copy(spec)
-    completed.max_episode_steps = steps
-    # ``make_vec`` also adds it to the arguments; left there, a spec made from this one would differ.
-    completed.kwargs = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
-    return completed

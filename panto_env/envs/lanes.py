@@ -1,4 +1,4 @@
-"""Lanes of a vector environment: each runs the usual task, or another one for an episode.
+"""Lanes of a vector environment: each runs the usual task, or another one for an episode; and infos.
 
 A lane here is what one action controls: a pantograph. Where several pantographs of a train are controlled,
 they are as many lanes, one behind the other, that a task computes as one, and whose episodes begin and end
@@ -7,6 +7,7 @@ together.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -23,8 +24,22 @@ from ..control import Task
 from ..control.arguments import not_finite
 from ..control.episode import Flags, Results
 from ..control.lines import draws_line
+from ..control.state import TERMS, Result
 from .episodes import Episodes
 from .settings import VectorSettings
+
+# Rows of results as plain integers: members of an enum would take longer.
+REWARD, COST = int(Result.REWARD), int(Result.COST)
+CONTACT_FORCE, POSITION = int(Result.CONTACT_FORCE), int(Result.POSITION)
+INFOS = tuple(
+    zip(
+        ("contact_force", "head", "wire", "frame_force", "head_force", "position", "cost"),
+        range(CONTACT_FORCE, COST + 1),
+        strict=True,
+    )
+)
+"""Keys of infos, and the rows of results that they have."""
+REWARD_TERMS = tuple(zip(TERMS, range(Result.TERM, CONTACT_FORCE), strict=True))
 
 OfLane = Callable[[int], np.random.Generator]
 """Function from a lane's number to its generator."""
@@ -87,7 +102,8 @@ class VectorLanes:
             if self._others:
                 idle = ~its if waiting is None else ~its | waiting
             own = results if task is self.usual else task.results
-            ended = task.step(action, self._trains(idle), results=own) or ended
+            skip = None if idle is None else idle[:: self.agents]
+            ended = task.step(action, skip, results=own) or ended
             self._results = results
             self._take(own, its)
         if waiting is not None:
@@ -112,12 +128,7 @@ class VectorLanes:
         self._take(own, lanes)
         self._speed_kmh[lanes] = np.repeat(to_kmh(task.speed[trains]), self.agents)
 
-    def _trains(self, lanes: Flags | None) -> Flags | None:
-        """Which trains have these lanes."""
-        return None if lanes is None else lanes[:: self.agents]
-
     def _next_line(self, lanes: Flags, random: Callable[[], np.random.Generator], anew: bool) -> None:
-        """Draw the line on which lanes, and those after them, begin, if the present one has had enough."""
         if anew or self._left <= 0:
             going_on = self._on_usual & ~lanes
             if going_on.any():
@@ -126,7 +137,6 @@ class VectorLanes:
         self._left -= int(lanes.sum())
 
     def _take(self, results: Results, lanes: Flags) -> None:
-        """Copy the results of some lanes."""
         if results is not self._results:
             own = np.flatnonzero(lanes)
             for taken, given in zip(self._results, results, strict=True):
@@ -161,7 +171,6 @@ class VectorLanes:
 
     @property
     def _on_usual(self) -> Flags:
-        """Which lanes run the usual task."""
         usual = np.ones(self.count, dtype=np.bool_)
         for _, its in self._others:
             usual &= ~its
@@ -273,3 +282,64 @@ def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | Lane
         for size in set(sizes)
     }
     return LaneGroups([VectorLanes(usual_of[size], settings.episodes_per_line) for size in sizes])
+
+
+def final_figures(task: Task, row: int = 0) -> dict[str, float]:
+    """Figures of the ended episode of a task's only lane, for infos, without those that it does not have.
+
+    row: of one of the controlled pantographs. Neither nan nor infinity stands for what is missing: strict
+    JSON refuses both, and nan makes two infos unequal.
+    """
+    figures = {name: float(value[0]) for name, value in ended_figures(task, np.array([row])).items()}
+    return {name: value for name, value in figures.items() if math.isfinite(value)}
+
+
+def own_info(values: Array) -> dict[str, Any]:
+    """Info of one of several controlled pantographs; values: its rows of ``Result``."""
+    own = {"reward": REWARD, "cost": COST, "contact_force": CONTACT_FORCE, "position": POSITION}
+    return {name: float(values[row]) for name, row in own.items()}
+
+
+def lane_infos(answer: Answer) -> dict[str, Any]:
+    """Infos of lanes in the form of Gymnasium's vector environments.
+
+    Each key holds an array with a value per lane, or a dictionary of such arrays; "_key" marks the lanes
+    that have a value.
+    """
+    (_, values, _), speed_kmh, lanes = answer
+    rows = values.T
+    infos: dict[str, Any] = {}
+    for name, row in INFOS:
+        infos[name], infos[f"_{name}"] = rows[row], lanes
+    infos["speed_kmh"], infos["_speed_kmh"] = speed_kmh, lanes
+    infos["reward_terms"], infos["_reward_terms"] = {}, lanes
+    for name, row in REWARD_TERMS:
+        infos["reward_terms"][name], infos["reward_terms"][f"_{name}"] = rows[row], lanes
+    return infos
+
+
+def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
+    """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended.
+
+    A figure that a lane does not have is 0 there, and not marked under "_name"; one that none has is left
+    out.
+    """
+    values: dict[str, Any] = {}
+    for name, value in figures.items():
+        marked = lanes & np.isfinite(value)
+        if marked.any():
+            values[name], values[f"_{name}"] = np.where(marked, value, 0.0), marked
+    return {"figures": values, "_figures": lanes.copy()}
+
+
+def first_info(task: Task) -> dict[str, Any]:
+    """Info of the only lane of a task at the start of its episode, of its first controlled pantograph."""
+
+    def of_lane(infos: dict[str, Any]) -> dict[str, Any]:
+        plain = {key: value for key, value in infos.items() if not key.startswith("_")}
+        return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
+
+    observation, values, flags = task.results
+    first = Results(observation[:1], values[:1], flags[:1])
+    answer = Answer(first, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
+    return of_lane(lane_infos(answer))

@@ -13,7 +13,7 @@ from ..base.errors import InputError
 from ..control.arguments import checked
 from ..control.observation import BOUND
 from .episodes import checked_options
-from .infos import REWARD
+from .lanes import REWARD
 from .settings import Whole
 from .single import PantographEnv
 

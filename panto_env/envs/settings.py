@@ -12,9 +12,9 @@ from ..base.errors import InputError, shown
 from ..base.settings import Between
 from ..catalog import load_pantograph
 from ..control.arguments import table
-from ..control.entries import CENTRED, EntryOptions
+from ..control.entries import CENTRED
 from ..control.lines import draws_line
-from ..control.observation import layout
+from ..control.observation import Layout
 from ..control.settings import RunSettings, default
 from ..plant.actuators import actuator_settings
 
@@ -148,22 +148,14 @@ class VectorSettings(RunSettings):
         return self.num_envs // len(self.controlled)
 
     @model_validator(mode="after")
-    def _whole_trains(self) -> VectorSettings:
+    def _lanes_fit(self) -> VectorSettings:
         if self.num_envs % len(self.controlled):
             raise InputError(
                 f"num_envs counts the controlled pantographs, {len(self.controlled)} in each train, so it "
                 f"must be a multiple of that, not {self.num_envs}."
             )
-        return self
-
-    @model_validator(mode="after")
-    def _lanes_for_each_line(self) -> VectorSettings:
         if self.lines is not None and self.lines > self.trains:
             raise InputError(f"{self.trains} lanes are too few for {self.lines} lines; give fewer lines.")
-        return self
-
-    @model_validator(mode="after")
-    def _lanes_are_there(self) -> VectorSettings:
         beyond = [lane for lane in self.render_lanes or () if lane >= self.num_envs]
         if beyond:
             raise InputError(f"render_lanes has lane {beyond[0]}, but lanes are 0 to {self.num_envs - 1}.")
@@ -201,17 +193,11 @@ OF_VECTORS = TensorSettings.model_fields.keys() - EnvironmentSettings.model_fiel
 """Names of arguments that only vector environments have."""
 
 
-def frames_per_second(control_interval: float, slow_motion: float) -> float:
-    """Frames per second of a film with one frame per control step, rounded where nearly whole."""
-    exact = 1 / control_interval / slow_motion
-    return round(exact) if abs(exact - round(exact)) < 1e-6 * exact else exact
-
-
-def render_metadata(
-    metadata: dict[str, Any], settings: EnvironmentSettings | VectorSettings
-) -> dict[str, Any]:
-    """An environment's metadata with the frames per second of its own control interval and slow motion."""
-    return metadata | {"render_fps": frames_per_second(settings.control_interval, settings.slow_motion)}
+def render_metadata(metadata: dict[str, Any], settings: Any) -> dict[str, Any]:
+    """An environment's metadata with its own frames per second: one per control step, in slow motion."""
+    exact = 1 / settings.control_interval / settings.slow_motion
+    whole = abs(exact - round(exact)) < 1e-6 * exact
+    return metadata | {"render_fps": round(exact) if whole else exact}
 
 
 def described(text: str) -> str:
@@ -225,12 +211,11 @@ def described(text: str) -> str:
 
 
 def _observation_table(kind: str) -> str:
-    """The entries of an observation as a Markdown table."""
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
-    entries = layout(kind, EntryOptions(actuator, pantograph)).entries
+    settings = RunSettings.model_construct(observation=kind, actuator=actuator, pantograph=pantograph)
     rows = [
         f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
-        for k, each in enumerate(entries)
+        for k, each in enumerate(Layout.of(settings).entries)
     ]
     return "\n".join(
         ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
@@ -238,7 +223,6 @@ def _observation_table(kind: str) -> str:
 
 
 def _id_table(name: str) -> str:
-    """Arguments that an id sets, as a Markdown table."""
     rows = [f"| `{key}` | `{value!r}` |" for key, value in IDS[name].items()]
     return "\n".join(("| Argument | Value |", "|----------|-------|", *rows))
 

@@ -92,16 +92,6 @@ def test_ending_early_costs_as_if_the_rest_were_without_contact():
     assert total > left
 
 
-def test_the_vector_environment_gives_the_same():
-    costs, _ = episode()
-    envs = gymnasium.make_vec(NAME, num_envs=2, **STRONG)
-    envs.reset(seed=[1, 5])
-    for k, cost in enumerate(costs[:-1]):
-        *_, infos = envs.step(np.full((2, 1), np.sin(0.1 * k), dtype=np.float32))
-        assert infos["cost"][0] == cost
-        assert infos["_cost"].all()
-
-
 @pytest.mark.parametrize("cost", [{"uplift": -1}, {"upliftt": 1}, "much", {"max_force": float("nan")}])
 def test_weights_that_make_no_sense_are_refused(cost):
     with pytest.raises(InputError, match="cost"):
