@@ -17,7 +17,7 @@ from panto_env.base.errors import InputError
 from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
 from panto_env.plant.alignment import Spans
 
-from .settings import Line
+from .settings import Line, LineAtSpeed
 
 SUFFIX = ".actions.safetensors"
 """End of the file's name, in the place of the result's ".json"."""
@@ -98,6 +98,11 @@ class Trace:
     force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
     frequency: tuple[float, ...]  # (m,): up to 20 Hz (Hz)
     amplitude: tuple[float, ...]  # (m,): of the unfiltered contact force over all evaluated spans (N)
+
+    @property
+    def place(self) -> LineAtSpeed:
+        """Line, pantograph and speed."""
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
 
 
 def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:

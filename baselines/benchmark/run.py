@@ -25,9 +25,17 @@ from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played, Trace
 from .overall import Standing, standings
-from .settings import ORACLE_TAPE, BenchmarkSettings, Line, control_of, policy_of, salt_hash
+from .settings import (
+    ORACLE_TAPE,
+    BenchmarkSettings,
+    Line,
+    LineAtSpeed,
+    control_of,
+    policy_of,
+    salt_hash,
+)
 from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
-from .statistics import Cell, LineAtSpeed, compare
+from .statistics import Cell, compare
 
 SUFFIXES = (".json", *TABLES)
 """Suffixes of the files that an outcome can be saved to."""

@@ -12,12 +12,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from itertools import chain
+from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_configs import find
 from panto_env.base.errors import InputError, shown
@@ -38,6 +39,22 @@ from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import Policy, check_named, wishes
 
 from ..line import LineAndTrain, as_clause, distinct
+
+Number = Annotated[
+    float,
+    BeforeValidator(lambda value: nan if value is None else value),
+    AfterValidator(lambda value: value if isfinite(value) else nan),
+]
+"""A figure; nan if there is none, which is null in JSON."""
+
+
+class LineAtSpeed(NamedTuple):
+    """A line, the pantograph on it, and its speed (km/h)."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+
 
 TEST = range(1000)
 SELECTION = range(1000, 2000)
@@ -78,7 +95,6 @@ def salt_hash(salt: str) -> str:
 
 
 Array = NDArray[np.float64]
-
 BLIND, TAPE = "blind of ", "tape of "
 ORACLE_TAPE = TAPE + "oracle"
 OTHER_SEED = 1_000_003

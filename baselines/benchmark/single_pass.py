@@ -38,6 +38,8 @@ from .settings import (
     policy_of,
 )
 
+Array = NDArray[np.float64]
+
 
 class PassiveFigures(NamedTuple):
     """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
@@ -69,8 +71,6 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
     worst = passive.worst_controlled(spans).summary(spans)
     return PassiveFigures(worst.std, worst.cost_function)
 
-
-Array = NDArray[np.float64]
 
 FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""

@@ -1,24 +1,24 @@
-"""A sentence or two on what a policy is, from its name in a result; no code of a user's is run."""
+"""What the page shows of one track; no code of a user's is run for it."""
 
 from __future__ import annotations
 
 import inspect
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
 
 from panto_env.base import plugins
 from panto_env.base.errors import InputError
 from panto_env.policies import maker_of
 
-from ..benchmark.settings import BLIND, REFERENCE, TAPE, control_of, policy_of
-from ..benchmark.statistics import LineAtSpeed, Share
+from ..benchmark.actions import Trace
+from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
+from ..benchmark.statistics import Cell, Share
+from ..line import as_toml
 from .charts import Chart, Line, Point, curves, dots
-from .result import Result, StoredCell, Trace
+from .result import Result
 from .tables import FAR_OFF, PageTable, leaderboard, signed, table_of_cells
 
 CONTROLS = {
@@ -44,37 +44,6 @@ def what_is(policy: str) -> str:
     if Path(policy).suffix[1:] in plugins.installed(plugins.LOADERS):
         return "A model from a file, which is not read for this page."
     return "It is not installed where this page was made."
-
-
-def as_toml(settings: Mapping[str, Any]) -> str:
-    """Text of a file for `panto benchmark --config`, from plain data; settings that are null are left out."""
-    plain = {key: value for key, value in settings.items() if not _is_tables(value)}
-    tables = {key: value for key, value in settings.items() if _is_tables(value)}
-    parts = ["\n".join(_lines(plain))]
-    parts += ["\n".join([f"[[{_key(key)}]]", *_lines(row)]) for key, rows in tables.items() for row in rows]
-    return "\n\n".join(parts) + "\n"
-
-
-def _lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
-
-
-def _is_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(_lines(value))} }}" if value else "{}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML alone escapes it
-    return json.dumps(value)
-
-
-def _key(key: str) -> str:
-    return key if key.isidentifier() and key.isascii() else _value(key)
 
 
 STRONGEST = 0.6
@@ -118,8 +87,8 @@ class About:
     name: str
     text: str
     rank: int | None
-    worst: StoredCell
-    disqualified: list[StoredCell]
+    worst: Cell
+    disqualified: list[Cell]
     everywhere: bool
     method: str  # of which it is a training, or ""
 
@@ -186,7 +155,7 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     }
 
 
-def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
+def _shade(cell: Cell | None, maximum: float) -> Shade | None:
     if cell is None:
         return None
     strength = cell.change / maximum if isfinite(cell.change) else 0.0
