@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import isfinite
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -168,32 +169,21 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
 
 def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clusters: Clusters) -> Standing:
     """changes: relative changes of sigma, (trainings, passes)."""
-
-    def mean(name: str) -> float:
-        return float(np.mean([getattr(each, name) for each in trainings]))
-
-    worst = max(trainings, key=lambda each: -np.inf if np.isnan(each.worst) else each.worst)
+    names = ["change", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"]
+    names += ["saturation"] if trainings[0].oracle_share is None else ["saturation", "oracle_share"]
+    means: dict[str, Any] = {n: float(np.mean([getattr(each, n) for each in trainings])) for n in names}
     out = next((each for each in trainings if each.disqualified), None)
-    return Standing(
+    return replace(
+        max(trainings, key=lambda each: -np.inf if np.isnan(each.worst) else each.worst),
         policy=method,
-        change=mean("change"),
         interval=interval_of_mean(100 * changes, clusters),
         interval_for_lines=interval_for_lines(100 * changes, clusters),
-        worst_quarter=mean("worst_quarter"),
-        worst=worst.worst,
-        worst_at=worst.worst_at,
-        improved=mean("improved"),
-        contact_loss=mean("contact_loss"),
-        cost_change=mean("cost_change"),
-        effort=mean("effort"),
-        power=mean("power"),
-        saturation=mean("saturation"),
-        oracle_share=None if trainings[0].oracle_share is None else mean("oracle_share"),
         passes=sum(each.passes for each in trainings),
         moved=sum(each.moved for each in trainings),
         most_moved=max((each.most_moved for each in trainings), key=_size),
         disqualified=f"{out.policy}: {out.disqualified}" if out else "",
         trainings={each.policy: each.change for each in trainings},
+        **means,
     )
 
 

@@ -1,4 +1,4 @@
-"""SHA-256 of each file of a data set, in a list that `sha256sum --check` can read."""
+"""Data sets made in parts, each whole or not at all, with a list that `sha256sum --check` can read."""
 
 from __future__ import annotations
 
@@ -55,16 +55,13 @@ def verify(path: Path) -> list[tuple[Path, int]]:
 
 
 def _verify(folder: Path) -> int:
-    listed = {}
     try:
         lines = (folder / LIST).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{folder / LIST} could not be read, or is damaged; make or download the data set anew."
         ) from error
-    for line in lines:
-        checksum, _, name = line.partition("  ")
-        listed[name] = checksum
+    listed = {name: checksum for checksum, _, name in (line.partition("  ") for line in lines)}
     found = _files(folder)
     for name, checksum in listed.items():
         if name not in found:
@@ -82,12 +79,8 @@ def _verify(folder: Path) -> int:
 
 def _files(folder: Path) -> list[str]:
     """Relative paths of a folder's files, sorted."""
-    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    return sorted(
-        path.as_posix()
-        for path in paths
-        if path.name != LIST and not any(p.startswith(".") for p in path.parts)
-    )
+    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.name != LIST)
+    return sorted(path.as_posix() for path in paths if not any(p.startswith(".") for p in path.parts))
 
 
 DESIGNS_PER_PART = 64
