@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from numpy.typing import NDArray
+from typer.testing import CliRunner
 
 from panto_baselines.benchmark import settings as seeds
 from panto_baselines.policies.adaptive import (
@@ -29,8 +32,11 @@ from panto_baselines.policies.lanes_law import (
     gain_file,
     load_gains,
 )
+from panto_baselines.tuning import store as parts
+from panto_baselines.tuning.command import tune
 from panto_baselines.tuning.store import check_gain_file, make_tuning, store
 from panto_baselines.tuning.tune import (
+    DAMPINGS,
     MEAN_TOLERANCE,
     MEAN_WEIGHT,
     Still,
@@ -74,12 +80,6 @@ def seen(context: Context = CONTEXT, angle: float = 0.0, **values: float) -> NDA
 
 
 # --- seeds ---------------------------------------------------------------------------------------
-
-
-def test_no_seed_serves_two_purposes() -> None:
-    assert set(seeds.TEST).isdisjoint(seeds.SELECTION)
-    assert set(seeds.TEST).isdisjoint(seeds.TRAINING)
-    assert set(seeds.SELECTION).isdisjoint(seeds.TRAINING)
 
 
 # --- the laws ------------------------------------------------------------------------------------
@@ -399,3 +399,76 @@ def test_gains_of_a_family_are_for_any_line_that_has_none_of_its_own(tmp_path):
     store(path, "skyhook", make_tuning(own, list(Skyhook.TUNED), [other], (2000,), "test"))
     found = find_gains(str(path), list(Skyhook.TUNED), a_context(**given))
     np.testing.assert_allclose(found, other.gains, rtol=1e-4)  # its own go first
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+SMALL = ("--speed", "350", "--seeds", "1", "--passes", "11", "--workers", "1")
+
+
+def called(*arguments: str) -> Any:
+    app = typer.Typer()
+    app.command()(tune)
+    return CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+
+
+def test_it_stores_gains_that_the_policy_then_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "mine.toml"
+    monkeypatch.setattr("sys.argv", ["/somewhere/panto", "tune", "skyhook", *SMALL])
+    result = called("skyhook", *SMALL, "--sensors", "ideal", "--output", str(file), "--json")
+    assert result.exit_code == 0, result.output
+    printed = json.loads(result.stdout[result.stdout.index("{") :])
+    stored = load_gains(file)
+    (kept,) = stored.tunings
+    assert stored.policy == "skyhook"
+    assert (kept.catenary, kept.pantograph, kept.place) == ("en50318-2002", "en50318-2002", "frame")
+    assert (kept.speeds_kmh, kept.names) == ((350.0,), ("frame", "head"))
+    assert printed["gains"] == [list(kept.gains[0])]
+    assert kept.seeds == (seeds.TRAINING[0],)
+    assert kept.command == f"panto tune skyhook {' '.join(SMALL)}"
+    assert kept.actuator["lag"] > 0  # "realistic" unless told otherwise
+    assert kept.sensors["force_noise"] == 0
+    # The passive run, and one iteration: gains as they are, each changed alone, and each damping.
+    assert kept.passes == 1 + 1 + 2 + len(DAMPINGS)
+    assert kept.std_change[0] < -0.1
+    run: dict[str, Any] = {"speed_kmh": 350.0, "actuator": "realistic", "line_condition": "smooth"}
+    run["seed"] = seeds.SELECTION[0]
+    passive, controlled = (
+        simulate(policy=policy, **run).summary() for policy in (None, f"skyhook:gains='{file}'")
+    )
+    assert controlled.std / passive.std - 1 == pytest.approx(kept.std_change[0], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("pd",), "'pd' has no gains to tune; policies with gains are"),
+        (("skyhook", "--output", "gains.json"), ".toml"),
+        (("skyhook", "--output", "{lqg}"), "holds gains of 'lqg'; give another --output"),
+    ],
+)
+def test_what_it_cannot_do_is_said_at_once(
+    tmp_path: Path, arguments: tuple[str, ...], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "lqg.toml"
+    file.write_text('policy = "lqg"\n')
+    monkeypatch.setattr(parts, "tune", None)  # nothing may be run
+    result = called(*(each.format(lqg=file) for each in arguments), *SMALL)
+    assert result.exit_code != 0
+    assert words in str(result.exception)
+    assert file.read_text() == 'policy = "lqg"\n'
+
+
+def test_parts_of_another_tuning_are_not_taken(tmp_path: Path) -> None:
+    settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
+    given: dict[str, Any] = {"speeds_kmh": (250.0,), "passes": 11, "workers": 1}
+    first = parts.tune(tmp_path, "skyhook", settings, seeds=1, **given)
+    assert parts.tune(tmp_path, "skyhook", settings, seeds=1, **given) == first
+    with pytest.raises(InputError, match=r"holds parts of another work \(its seeds is 1, this is 2\)"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=2, **given)
+    with pytest.raises(InputError, match=r"holds parts of another work \(its passes is 11, this is 12\)"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=1, **given | {"passes": 12})
+    part = tmp_path / "250.0.json"
+    part.write_text(part.read_text().replace("0.", "1.", 1))
+    with pytest.raises(InputError, match="damaged or was changed"):
+        parts.tune(tmp_path, "skyhook", settings, seeds=1, **given)
