@@ -7,11 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_env.base.errors import InputError, shown
-from panto_env.base.settings import Positive, Settings
+from panto_env.base.settings import Between, Positive, Settings, parse
 from panto_env.control.settings import controlled_numbers, default, description
+from panto_env.plant.actuators import ActuatorSettings, actuator_settings
+from panto_env.plant.catenary.schema import MOST_SPANS
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
 T = TypeVar("T")
 OPTIONS = ("catenary", "pantograph", "distances", "controlled")
@@ -36,6 +39,15 @@ def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     if twice is not None:
         raise ValueError(f"{shown(twice)} is given twice")
     return values
+
+
+def _condition(value: Any) -> LineCondition:
+    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
+
+
+Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
+Condition = Annotated[LineCondition, BeforeValidator(as_clause(_condition))]
+Span = Annotated[int, Between(1, MOST_SPANS)]
 
 
 class LineAndTrain(Settings):

@@ -179,9 +179,9 @@ def stored_bounds(
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            changes = stored_changes(along(settings, line) | {"speed_kmh": speed}, covered)
-            found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
-    return {place: changes for place, changes in found.items() if changes}
+            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered):
+                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
+    return found
 
 
 def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

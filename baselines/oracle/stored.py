@@ -11,13 +11,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, SerializeAsAny
+from pydantic import Field
 
 from panto_configs import find
 from panto_env.base.checksums import __version__, read_checked, with_checksum
 from panto_env.base.errors import InputError
 from panto_env.base.files import finite, read_toml, write_whole
-from panto_env.base.settings import Between, Positive, Settings, parse
+from panto_env.base.settings import Positive, Settings, parse
 from panto_env.catalog.loader import is_entry
 from panto_env.control.identity import OF_TRAINS
 from panto_env.control.lines import draws_line, line_name
@@ -30,28 +30,20 @@ from panto_env.control.settings import (
     description,
     run_settings,
 )
-from panto_env.plant.actuators import ActuatorSettings, actuator_settings
-from panto_env.plant.catenary.schema import MOST_SPANS
-from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
+from panto_env.plant.line_condition import LINE_CONDITIONS
 
-from ..line import LineAndTrain
+from ..line import Actuator, Condition, LineAndTrain, Span
 from .search import METHOD, STARTS, Oracle
 
 MOST_HOPS = 1000
 """Maximum number of hops; each takes about as long as the first search."""
-_Span = Annotated[int, Between(1, MOST_SPANS)]
 Start = Literal[STARTS]  # type: ignore[valid-type]
-_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(actuator_settings)]]
-
-
-def _condition(value: Any) -> LineCondition:
-    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
 
 
 class OracleCell(LineAndTrain):
     """A train with an actuator on a line, and the speeds to run at."""
 
-    actuator: _Actuator = Field(
+    actuator: Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
     speeds_kmh: tuple[Positive, ...] = Field((300.0,), min_length=1, description="km/h")
@@ -64,7 +56,7 @@ class OracleSettings(Settings):
         (OracleCell(),), min_length=1, description="lines, actuators and speeds"
     )
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
-    spans: tuple[_Span, _Span] | None = Field(
+    spans: tuple[Span, Span] | None = Field(
         None, description="first and last span over which σ is minimised; by default those after the start"
     )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
@@ -74,7 +66,7 @@ class OracleSettings(Settings):
         le=MOST_HOPS,
         description="further searches, each from the best result plus noise; more find steadier forces",
     )
-    line_condition: Annotated[LineCondition, BeforeValidator(_condition)] = Field(
+    line_condition: Condition = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     pantograph_scatter: PantographScatter = Field(

@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark.run import evaluated_spans, stored_bounds
+from panto_baselines.benchmark.run import evaluated_spans
 from panto_baselines.benchmark.settings import Tape, load_benchmark
 from panto_baselines.benchmark.single_pass import along
 from panto_baselines.oracle import command, problem, report, search, stored
@@ -235,16 +235,13 @@ def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
     )
 
 
-def test_simulate_says_the_same_to_the_digit(short: Problem, descent: solver.Descent):
-    run = short.replay(short.knots.commands(descent.knots))
-    figures = run.summary(SPANS)
+def test_simulate_says_the_same_to_the_digit_and_the_force_keeps_the_actuators_limits(
+    short: Problem, descent: solver.Descent
+):
+    run, actuator = short.replay(short.knots.commands(descent.knots)), short.settings.actuator
+    figures, force = run.summary(SPANS), run.frame_force
     assert figures.std == pytest.approx(descent.std, rel=1e-12)
     assert figures.mean == pytest.approx(descent.iterations[-1].mean, rel=1e-12)
-
-
-def test_the_force_keeps_the_actuators_limits(short: Problem, descent: solver.Descent):
-    actuator = short.settings.actuator
-    force = short.replay(short.knots.commands(descent.knots)).frame_force
     assert 0.5 * actuator.force_limit < np.abs(force).max() <= actuator.force_limit * (1 + 1e-9)
     largest = actuator.rate_limit * short.passive.time_step
     # What is recorded is the mean over a step, which may change by a little more than the force itself.
@@ -286,14 +283,6 @@ def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkey
         shaken = np.sqrt(np.mean((begun[hop] / share - before.knots) ** 2))
         assert 0.3 < share < 1.1  # limits shrink the whole
         assert 0.5 * search.HOP_FORCE < shaken < 1.5 * search.HOP_FORCE
-
-
-def test_what_repeats_from_span_to_span_does(short: Problem):
-    basis = search.span_periodic(short)
-    per_span = short.passive.alignment.mean_length / (short.passive.speed_kmh / 3.6 * short.interval)
-    assert per_span == round(per_span)
-    assert basis.shape == (short.count, 2 * search.HARMONICS + 1)
-    np.testing.assert_allclose(basis[round(per_span) :], basis[: -round(per_span)], atol=1e-9)
 
 
 # --- what is stored ------------------------------------------------------------------------------
@@ -359,19 +348,6 @@ def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str, config: str
     for speed in line.speeds_kmh:
         assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
     assert oracles.spans == evaluated_spans(settings, line)
-
-
-def test_a_track_is_shown_beside_oracles_over_its_own_spans_alone():
-    settings = load_benchmark(find_config("benchmark/known-line", "benchmark"))
-    kept = {
-        each["speed_kmh"]: 100 * (each["ratio"] - 1)
-        for each in stored.stored_cells()
-        if (each["pantograph"], each["actuator"]["kind"]) == ("en50318-2002", "lagged")
-    }
-    assert kept
-    found = stored_bounds(settings, [(10, 19)])
-    assert {speed: np.mean([*own.values()]) for (_, _, speed), own in found.items()} == pytest.approx(kept)
-    assert stored_bounds(settings, [(4, 9)]) == {}
 
 
 # --- the command ---------------------------------------------------------------------------------

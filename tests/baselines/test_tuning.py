@@ -48,35 +48,12 @@ from panto_baselines.tuning.tune import (
     tune_at,
 )
 from panto_env import InputError, simulate
-from panto_env.control import Task
-from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
+
+from .laws import CONTEXT, a_context, seen
 
 Array = NDArray[np.float64]
 REAL: dict[str, Any] = {"actuator": "realistic", "sensors": "realistic", "line_condition": "smooth"}
-
-
-def a_context(**settings: Any) -> Context:
-    task = Task(run_settings({"speed_kmh": 300.0, "accuracy": "fast"} | settings), keep_samples=False)
-    task.reset(0, np.random.default_rng(0))
-    return task.context(0)
-
-
-CONTEXT = a_context()
-
-
-def seen(context: Context = CONTEXT, angle: float = 0.0, **values: float) -> NDArray[np.float32]:
-    """An observation, (1, entries), at an angle of the span, with these values (spaces as underscores)."""
-    observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
-    values = {
-        "sine_of_span_position": np.sin(angle),
-        "cosine_of_span_position": np.cos(angle),
-        "speed": context.speed,
-    } | values
-    for name, value in values.items():
-        place = context.layout.index(name.replace("_", " "))
-        observation[0, place] = value / context.layout.entries[place].scale
-    return observation
 
 
 # --- seeds ---------------------------------------------------------------------------------------
@@ -317,7 +294,7 @@ def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen() -> None:
 
 def test_gains_tuned_with_a_washout_are_for_policies_that_have_it(tmp_path: Path) -> None:
     path, without = tmp_path / "own.toml", run_settings({"accuracy": "fast"} | REAL)
-    made = Tuned(300.0, (0.1, 0.2, 0.3, 0.4), (1.0, 0.9), 10, -0.1, 0.0)
+    made = Tuned(250.0, (0.1, 0.2, 0.3, 0.4), (1.0, 0.9), 10, -0.1, 0.0)
     names = list(tunable("tuned-pd", washout=1.0).TUNED)
     with_it = without.model_copy(update={"washout": 1.0})
     store(path, "tuned-pd", make_tuning(with_it, names, [made], [2000], "a command"))
