@@ -179,18 +179,6 @@ def test_feedforward_follows_the_equation_along_the_line(
         observation, *_ = env.step(action)
 
 
-def test_feedforward_begins_anew_with_each_episode() -> None:
-    env, policy = environment(), FeedbackFeedforward(gain=0, reading="printed")
-    firsts = []
-    for _ in range(2):
-        observation, _ = env.reset(seed=0)
-        policy.reset(env.context)
-        firsts.append(policy.act(observation)[0])
-        for _ in range(100):  # more than a span
-            observation, *_ = env.step(policy.act(observation))
-    assert firsts[0] == firsts[1]
-
-
 def test_feedforward_refuses_sensors_that_do_not_tell_the_place() -> None:
     with pytest.raises(InputError, match="needs the place within the span"):
         simulate(policy="fb+ff", sensors="blind", distance=100.0)
