@@ -242,7 +242,7 @@ class Oracle:
     @property
     def best(self) -> Descent:
         """The search that reached the minimum σ."""
-        return min(self.searches, key=_std)
+        return min(self.searches, key=lambda search: search.std)
 
     @property
     def change(self) -> float:
@@ -271,9 +271,9 @@ def find(
         name = f"seed {neighbour.problem.seed}"
         searches = [descend(problem, name, neighbour.best.knots, progress=progress)]
     for hop in range(1, hops + 1):
-        shaken = min(searches, key=_std).knots + noise(problem, HOP_FORCE, hop)
+        shaken = min(searches, key=lambda search: search.std).knots + noise(problem, HOP_FORCE, hop)
         searches.append(descend(problem, f"hop {hop}", problem.knots.within(shaken), progress=progress))
-    best = min(searches, key=_std)
+    best = min(searches, key=lambda search: search.std)
     commands = np.round(problem.knots.commands(best.knots), DECIMALS)
     run = problem.replay(commands)
     if run.terminated:
@@ -290,10 +290,6 @@ def find(
         zero_phase_low_pass(run.contact_force, run.time_step),
     )
     return Oracle(problem, tuple(searches), commands, run, figures, forces)
-
-
-def _std(search: Descent) -> float:
-    return search.std
 
 
 def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterator[Descent]:

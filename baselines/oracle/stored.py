@@ -24,7 +24,6 @@ from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,
-    RunSettings,
     SpeedDrift,
     default,
     description,
@@ -162,11 +161,15 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
     """A cell as plain data, with its passes under all seeds; request: its entry of ``requests``."""
     first = passes[0].problem
     settings = first.settings
+    train: dict[str, Any] = {}
+    if settings.pantographs:
+        train = {name: getattr(settings, name) for name in ("distances", "controlled")}
+        train = {"pantographs": [each.name for each in settings.pantographs]} | train
     table: dict[str, Any] = finite(
         {
             "catenary": line_name(run_settings(first.given)),
             "pantograph": settings.pantograph.name,
-            **_train(settings),
+            **train,
             "speed_kmh": settings.speed_kmh[0],
             "actuator": settings.actuator.model_dump(mode="json"),
             "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
@@ -182,23 +185,9 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
     return table
 
 
-def _train(settings: RunSettings) -> dict[str, Any]:
-    """Pantographs, distances and the controlled one of a train of several, as plain data."""
-    if not settings.pantographs:
-        return {}
-    names = [each.name for each in settings.pantographs]
-    return {"pantographs": names, "distances": settings.distances, "controlled": settings.controlled}
-
-
 def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
     """Content of a file: cells made by ``cell``, and the text of the command that found them."""
     return {"version": __version__, "command": command, "cells": list(cells)}
-
-
-def as_text(data: Mapping[str, Any]) -> str:
-    """Text of a file: data of ``as_data`` with a checksum, one line per cell and per pass."""
-    text = json.dumps(with_checksum(data), separators=(",", ":"))
-    return text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
 
 
 def _pass(oracle: Oracle) -> dict[str, Any]:
@@ -218,9 +207,11 @@ def _pass(oracle: Oracle) -> dict[str, Any]:
 
 
 def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> None:
-    """Write cells as JSON, whole or not at all."""
+    """Write cells as JSON with a checksum, one line per cell and per pass, whole or not at all."""
+    text = json.dumps(with_checksum(as_data(cells, command)), separators=(",", ":"))
+    text = text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"')
     with write_whole(path) as temporary:
-        temporary.write_text(as_text(as_data(cells, command)), encoding="utf-8")
+        temporary.write_text(f"{text}\n", encoding="utf-8")
 
 
 def read(path: str | Path) -> dict[str, Any]:
