@@ -317,8 +317,9 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         [row.figures.cost_function for row in rows], [row.pressed_cost_function for row in rows]
     )
     # Pass by pass, with the same line, speed, seed and noise.
-    paired = zip(rows, passive_rows, strict=True)
-    means = np.array([_mean_moved(row, passive) for row, passive in paired])
+    paired = [zip(row.means, own.means, strict=True) for row, own in zip(rows, passive_rows, strict=True)]
+    # Of several controlled pantographs the largest change in size.
+    means = np.array([max((own / its - 1 for own, its in pair), key=abs) for pair in paired])
     both = [(own, oracle[row.seed]) for own, row in zip(changes, rows, strict=True) if row.seed in oracle]
     reached, bound = np.mean(both, axis=0).tolist() if both else (0.0, None)
     return Cell(
@@ -342,12 +343,6 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         disqualified=_disqualification(rows, passive_rows, means),
         rank=None,
     )
-
-
-def _mean_moved(row: Row, passive: Row) -> float:
-    """Relative change of the mean force in a pass: of several controlled pantographs the largest in size."""
-    each = [own / its - 1 for own, its in zip(row.means, passive.means, strict=True)]
-    return max(each, key=abs)
 
 
 def relative_changes(rows: Sequence[Row]) -> Array:

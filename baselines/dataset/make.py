@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -154,13 +155,9 @@ def read_identity(path: Path) -> dict[str, Any]:
 def _assemble_designs(
     settings: DesignsSettings, folder: Path, parts: Sequence[Path], made_of: dict[str, Any]
 ) -> None:
-    """Write the table to a hidden folder, and rename that once it is complete."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    unfinished = folder.with_name(f".{folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
-    unfinished.mkdir()
     described = columns(settings)
     schema = pa.schema(
         [
@@ -170,10 +167,19 @@ def _assemble_designs(
         metadata={TABLE_KEY: json.dumps(made_of)},
     )
     table = pa.Table.from_pylist([row for path in parts for row in read_checked(path)["rows"]], schema=schema)
-    pq.write_table(table, unfinished / TABLE, compression="zstd")
-    (unfinished / "card.md").write_text(
-        card_of_designs(settings, described, table, made_of), encoding="utf-8"
-    )
+    with _whole_folder(folder) as unfinished:
+        pq.write_table(table, unfinished / TABLE, compression="zstd")
+        text = card_of_designs(settings, described, table, made_of)
+        (unfinished / "card.md").write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def _whole_folder(folder: Path) -> Iterator[Path]:
+    """A hidden folder to write to, which gets its checksums and its name once it is complete."""
+    unfinished = folder.with_name(f".{folder.name}")
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
+    unfinished.mkdir()
+    yield unfinished
     write_checksums(unfinished)
     unfinished.rename(folder)
 
@@ -283,10 +289,7 @@ class _Order:
 
 
 def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
-    """Write a data set to a hidden folder, and rename that once it is complete."""
     _make_namespaces(one.folder)
-    unfinished = one.folder.with_name(f".{one.folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
     rows: list[tuple[Plan, dict[str, float]]] = []
 
     def episodes() -> Iterator[tuple[Plan, Episode]]:
@@ -297,16 +300,14 @@ def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
                 yield plan, episode
 
     paragraph = description(settings, one.policy_set)
-    unfinished.mkdir()
-    with StepsTable(unfinished / STEPS) as table:
-        write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()
-    text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
-    (unfinished / "card.md").write_text(text, encoding="utf-8")
-    write_checksums(unfinished)
-    unfinished.rename(one.folder)
+    with _whole_folder(one.folder) as unfinished:
+        with StepsTable(unfinished / STEPS) as table:
+            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
+        text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
+        (unfinished / "card.md").write_text(text, encoding="utf-8")
 
 
 def _make_namespaces(folder: Path) -> None:

@@ -74,7 +74,6 @@ class Shade:
 class Section:
     """Table and charts of one line at one speed."""
 
-    place: LineAtSpeed
     title: str
     table: PageTable
     charts: list[Chart]
@@ -192,7 +191,6 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
     over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
     traces = [trace for trace in result.traces if trace.place == place]
     return Section(
-        place=place,
         title=title,
         table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
         charts=[

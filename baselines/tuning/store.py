@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import __version__, read_checked, write_checked
@@ -66,14 +65,8 @@ def tune(
             progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
             take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
         )
-        return [_read(path) for path in parts.values()]
-
-
-def _read(path: Path) -> Tuned:
-    values: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in read_checked(path).items()
-    }
-    return Tuned(**values)
+        found = map(read_checked, parts.values())
+        return [Tuned(**each | {name: tuple(each[name]) for name in ("gains", "history")}) for each in found]
 
 
 DIGITS = 5
