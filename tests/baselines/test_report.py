@@ -45,7 +45,7 @@ def result(**changes):
                 where
                 | {"seeds": 2, "nominal_force": 120.0, "figures": figures, "change": change, "interval": None}
                 | {"cost_change": change, "mean_change": 0.5, "improved": 1.0, "disqualified": reason}
-                | {"moved": 1}
+                | {"moved": 1, "most_moved": 2.0, "oracle": None, "oracle_share": None}
                 | {"rank": None if reason else rank, "spread": 1.0}
             )
             along = {"position": [0.0, 50.0, 100.0], "force": [100.0, 120.0 + change, 140.0]}
@@ -54,7 +54,12 @@ def result(**changes):
         standings.append(
             {"policy": policy, "change": change, "interval": [change - 1, change + 1], "worst": change}
             | {"worst_at": "ln2, 250 km/h", "improved": 1.0, "effort": abs(change), "power": 2.0}
-            | {"contact_loss": 0.5, "cost_change": change / 2}
+            | {
+                "contact_loss": 0.5,
+                "cost_change": change / 2,
+                "interval_for_lines": None,
+                "oracle_share": None,
+            }
             | {"saturation": 0.25, "worst_quarter": change + 3, "passes": 4, "moved": 2, "most_moved": -1.6}
             | {"better_than": {other: SHARE for other in names if other != policy}, "trainings": {}}
             | {"disqualified": reason, "rank": None if reason else 4 - rank}
