@@ -364,3 +364,30 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> No
     assert rows[1].figures.std > 1.01 * rows[0].figures.std
     with pytest.raises(InputError, match="No oracle is stored for 'en50318-2002' at 351 km/h"):
         benchmark.run(settings(policies=[ORACLE_TAPE], lines=[LINE | {"speeds_kmh": [351]}]), workers=1)
+
+
+@pytest.mark.parametrize(
+    ("source", "speeds_kmh", "spans"),
+    [
+        ("family:high-speed", (260.0, 350.0), (10, 19)),
+        ("section:main-line", (160.0,), (10, 28)),  # the shortest has 36, and its end is felt in 8 of them
+    ],
+)
+def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, spans):
+    """Policies meet the same line under a seed, at speeds for it, over spans that all runs cover."""
+    line = {"catenary": source, "speeds_kmh": speeds_kmh}
+    given = settings(lines=[line], seeds=[3], policies=["pd"])
+    found = benchmark.run(given, workers=1)
+    assert found.spans == (spans,)
+    for row in found.rows:
+        policy = None if row.policy == "passive" else row.policy
+        alone = simulate(
+            source,
+            speed_kmh=row.speed_kmh,
+            seed=3,
+            policy=policy,
+            line_condition="smooth",
+            record_droppers=False,
+        )
+        assert row.figures.std == alone.summary(spans).std
+        assert row.catenary == source

@@ -27,6 +27,7 @@ from panto_configs import find as find_config
 from panto_env import InputError, simulate
 from panto_env.base.checksums import with_checksum
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.state import Row
 
@@ -482,3 +483,14 @@ def test_problems_without_an_oracle_are_refused(short: Problem):
         Problem(both)
     with pytest.raises(InputError, match="start must be one of zero, periodic, random, not 'best'"):
         find(short, ("best",))
+
+
+@pytest.mark.parametrize("source", ["family:high-speed", "section:fast-line"])
+def test_an_oracle_is_one_of_the_drawn_line(source):
+    given = {"catenary": source, "speed_kmh": 300.0, "distance": 260.0}
+    problem = Problem(given, seed=4, spans=(3, 3))
+    line = simulate(**given, seed=4, record_droppers=False).design["catenary"]
+    assert problem.settings.line.model_dump(mode="json") == line
+    rest = np.zeros((1, problem.count, problem.places))
+    force = low_pass(problem.passive.contact_force, problem.passive.time_step)[problem.passive.inside((3, 3))]
+    np.testing.assert_allclose(problem.forces(rest)[0], force, atol=1e-6)

@@ -7,20 +7,24 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
 from panto_baselines.report.page import page, report
-from panto_baselines.report.result import parse_result
+from panto_baselines.report.result import parse_result, read_result
 from panto_baselines.report.tables import summary
 from panto_baselines.report.track import as_toml, what_is
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import with_checksum, write_checked
+
+from ..pages import DOCS, tables_of
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
 VOID = {"meta", "input"}
@@ -365,3 +369,46 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
     assert made.cells[-1] == ("*oracle*", "-20.0", *["–"] * 8)
     passive = next(row for row in made.cells if row[0] == "passive")
     assert passive[1] == "0.0 *"  # the first in the cells of this result by hand
+
+
+# --- the documents ---------------------------------------------------------------------------------
+
+TRACKS = [name for name in names("benchmark") if name.startswith("benchmark/") and name != "benchmark/ideal"]
+"""All but that for the curious, which `make benchmark` leaves out."""
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_its_tables_are_those_of_the_results(track):
+    table = summary(read_result(DOCS / f"{track}.json"))
+    headings, rows = tables_of("benchmark.md")[table.title]
+    assert tuple(headings) == table.headings
+    assert [tuple(row) for row in rows] == table.cells
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_stored_results_are_of_the_tracks_as_they_are(track):
+    stored = json.loads((DOCS / f"{track}.json").read_text(encoding="utf-8"))
+    # Values that came later have in older results the default with which these were made.
+    settings = BenchmarkSettings.model_validate(stored["settings"])
+    assert settings.model_dump(mode="json") == load_benchmark(track).model_dump(mode="json")
+
+
+def test_the_page_of_all_has_every_track():
+    page = (DOCS / "benchmark" / "index.html").read_text(encoding="utf-8")
+    for track in TRACKS:
+        assert load_benchmark(track).title in page
+
+
+def test_the_makefile_runs_the_same_tracks():
+    lines = (Path(__file__).parents[2] / "Makefile").read_text(encoding="utf-8").splitlines()
+    told = next(line for line in lines if line.startswith("TRACKS := ")).split()[2:]
+    assert {f"benchmark/{name}" for name in told} == set(TRACKS)
+
+
+def test_an_oracle_is_stored_for_every_cell_of_the_known_line():
+    for cell in read_result(DOCS / "benchmark" / "known-line.json").cells:
+        if cell.policy == "fitted-fb+ff":
+            assert cell.oracle_share is not None
+            given = {"catenary": cell.catenary, "pantograph": cell.pantograph, "speed_kmh": cell.speed_kmh}
+            realistic = given | {"actuator": "realistic", "line_condition": "smooth"}
+            assert cell.oracle == pytest.approx(stored_changes(realistic, (10, 19))[0])
