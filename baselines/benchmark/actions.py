@@ -51,13 +51,14 @@ def read(path: str | Path, expected: str) -> list[Played]:
     """Actions of all passes. Raises InputError unless they are whole and have the expected checksum."""
     try:
         _, arrays = read_arrays(path)
-        passes = _passes(**arrays)
+        each = np.split(arrays["actions"], np.cumsum(arrays["steps"])[:-1])
+        passes = [Played(one, float(time)) for one, time in zip(each, arrays["washout"], strict=True)]
     except FileNotFoundError as error:
         raise InputError(
             f"{path}, the actions of the result, could not be read: there is no such file; put it beside "
             "the result."
         ) from error
-    except (OSError, TypeError, ValueError) as error:
+    except (OSError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path} holds no actions, or is damaged; make the result again.") from error
     if digest(passes) != expected:
         raise InputError(f"{path} holds the actions of another result; put its own beside the result.")
@@ -71,12 +72,6 @@ def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
         "steps": np.array([len(each.actions) for each in passes]),
         "washout": np.array([each.washout for each in passes]),
     }
-
-
-def _passes(actions: NDArray[np.float64], steps: NDArray[np.int64], washout: Array) -> list[Played]:
-    """The inverse of ``_arrays``."""
-    each = np.split(actions, np.cumsum(steps)[:-1])
-    return [Played(one, float(time)) for one, time in zip(each, washout, strict=True)]
 
 
 STRIDE = 0.5

@@ -273,10 +273,6 @@ class BenchmarkSettings(Settings):
     @model_validator(mode="after")
     def _with_distinct_names(self) -> Self:
         distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
-        return self
-
-    @model_validator(mode="after")
-    def _without_repeated_line(self) -> Self:
         # Rows and cells tell lines apart by these.
         distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
         return self

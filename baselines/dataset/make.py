@@ -246,7 +246,13 @@ def make_episodes(
                 _assemble_episodes(settings, one)
                 remove_parts(one.parts)
         remove_if_empty(output / PARTS)
-    return [_made_episodes(one, kept=there) for one, there in zip(sets, kept, strict=True)]
+    made = []
+    for one, there in zip(sets, kept, strict=True):
+        metadata = _metadata(one.folder)
+        size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file()) / 1e6
+        counts = metadata["total_episodes"], metadata["total_steps"]
+        made.append(Made(one.name, one.folder, *counts, size, there))
+    return made
 
 
 @dataclass(frozen=True)
@@ -318,13 +324,6 @@ def _make_namespaces(folder: Path) -> None:
             (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
         if above.name == NAMESPACE:
             break
-
-
-def _made_episodes(one: _Order, *, kept: bool) -> Made:
-    metadata = _metadata(one.folder)
-    size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file())
-    steps, episodes = metadata["total_steps"], metadata["total_episodes"]
-    return Made(one.name, one.folder, episodes, steps, size / 1e6, kept)
 
 
 def _metadata(folder: Path) -> dict[str, Any]:

@@ -86,7 +86,10 @@ def descend(
     iteration. The merit, σ plus a weighted error of the mean, falls from iteration to iteration. If the mean
     is not met after ``iterations``, up to as many more follow.
     """
-    limits = of_all_places(problem.knots.limits(problem.count), problem.places)
+    one = problem.knots.limits(problem.count)
+    # Of the knots of all actuators, (count, places), flattened row by row.
+    matrix = csc_matrix(kron(one.matrix, eye_array(problem.places)))
+    limits = Limits(matrix, np.repeat(one.low, problem.places), np.repeat(one.high, problem.places))
     force, damping = problem.forces(knots[None])[0], DAMPING
     found = [_iteration(problem, 0, knots, force, 0.0)]
     if progress is not None:
@@ -196,14 +199,6 @@ def quadratic_solver() -> Any:
             "'control'."
         ) from error
     return osqp.OSQP()
-
-
-def of_all_places(limits: Limits, places: int) -> Limits:
-    """Limits of the knots of all actuators, (count, places), flattened row by row, from those of one."""
-    matrix = csc_matrix(kron(limits.matrix, eye_array(places)))
-    return limits._replace(
-        matrix=matrix, low=np.repeat(limits.low, places), high=np.repeat(limits.high, places)
-    )
 
 
 def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:

@@ -219,8 +219,11 @@ def summary(result: Result) -> Table:
     the policy is better than the next one, with its interval, and in how many it moves the mean by more than
     1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
     """
-    lines = {place[:2] for place in result.places}
-    headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
+    several = len({place[:2] for place in result.places}) > 1
+    of_places = (
+        f"{at.catenary}, {at.speed_kmh:g}" if several else f"{at.speed_kmh:g} km/h" for at in result.places
+    )
+    headings = ("policy", *of_places, *OVERALL)
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     after = next_in_ranking(result.standings)
     rows = []
@@ -253,10 +256,6 @@ def _overall(one: Standing, after: str | None) -> tuple[str, ...]:
         str(one.better_than.get(after or "", "–")),
         moved,
     )
-
-
-def _heading(place: LineAtSpeed, several_lines: bool) -> str:
-    return f"{place.catenary}, {place.speed_kmh:g}" if several_lines else f"{place.speed_kmh:g} km/h"
 
 
 def _text(cells: Sequence[Cell]) -> str:

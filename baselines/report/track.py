@@ -15,7 +15,7 @@ from panto_env.policies import maker_of
 
 from ..benchmark.actions import Trace
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
-from ..benchmark.statistics import Cell, Share
+from ..benchmark.statistics import Cell
 from ..line import as_toml
 from .charts import Chart, Line, Point, curves, dots
 from .result import Result
@@ -164,14 +164,14 @@ def _shade(cell: Cell | None, maximum: float) -> Shade | None:
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
     """Share of passes in which the row's policy has a smaller change of σ than the column's."""
     compared = [one for one in result.standings if one.policy not in result.method_of]
-    table: dict[str, list[Shade | None]] = {}
-    for one in compared:
-        table[one.policy] = [_shade_of_share(one.better_than.get(other.policy)) for other in compared]
-    return table
-
-
-def _shade_of_share(one: Share | None) -> Shade | None:
-    return None if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+    shares = {one.policy: [one.better_than.get(other.policy) for other in compared] for one in compared}
+    return {
+        policy: [
+            one if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+            for one in each
+        ]
+        for policy, each in shares.items()
+    }
 
 
 def _section(result: Result, place: LineAtSpeed) -> Section:
