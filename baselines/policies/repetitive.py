@@ -199,11 +199,9 @@ WASHED = WashoutSettings(time_constant=2.0)
 class Repetitive(TunableLaw):
     """Adaptive cancellation of the span's harmonics, from the measured contact force.
 
-    Its learning, which backs off where it does not help, is that of ``SpanLearner``: s dc_k/dx =
-    - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k for the
-    force Re sum_k c_k e^(ik phi), phi the angle of the place within the span (Bodson and Douglas, Automatica
-    33:2213, 1997). G_k, the response of the contact force to a command, is that of the pantograph under the
-    mean line, delays included (``line_model``).
+    Its learning, which backs off where it does not help, is that of ``SpanLearner``. G_k, the response of the
+    contact force to a command, is that of the pantograph under the mean line, delays included
+    (``line_model``).
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
