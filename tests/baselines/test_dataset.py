@@ -185,7 +185,7 @@ class TestEpisodes:
         folder, one = made
         table = pq.read_table(folder / one.dataset_id / "steps.parquet")
         assert table.num_rows == one.steps
-        assert table.column_names[: len(COLUMNS)] == [column.name for column in COLUMNS]
+        assert table.column_names[: len(COLUMNS)] == list(COLUMNS)
         for number, episode in enumerate(data):
             own = table.filter(pc.field("episode") == number).to_pydict()
             assert own["step"] == list(range(len(episode.rewards)))
