@@ -17,7 +17,7 @@ from panto_env.base.errors import InputError
 from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
 from panto_env.plant.alignment import Spans
 
-from .settings import Line
+from .settings import Line, LineAtSpeed
 
 SUFFIX = ".actions.safetensors"
 """End of the file's name, in the place of the result's ".json"."""
@@ -51,13 +51,14 @@ def read(path: str | Path, expected: str) -> list[Played]:
     """Actions of all passes. Raises InputError unless they are whole and have the expected checksum."""
     try:
         _, arrays = read_arrays(path)
-        passes = _passes(**arrays)
+        each = np.split(arrays["actions"], np.cumsum(arrays["steps"])[:-1])
+        passes = [Played(one, float(time)) for one, time in zip(each, arrays["washout"], strict=True)]
     except FileNotFoundError as error:
         raise InputError(
             f"{path}, the actions of the result, could not be read: there is no such file; put it beside "
             "the result."
         ) from error
-    except (OSError, TypeError, ValueError) as error:
+    except (OSError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path} holds no actions, or is damaged; make the result again.") from error
     if digest(passes) != expected:
         raise InputError(f"{path} holds the actions of another result; put its own beside the result.")
@@ -71,12 +72,6 @@ def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
         "steps": np.array([len(each.actions) for each in passes]),
         "washout": np.array([each.washout for each in passes]),
     }
-
-
-def _passes(actions: NDArray[np.float64], steps: NDArray[np.int64], washout: Array) -> list[Played]:
-    """The inverse of ``_arrays``."""
-    each = np.split(actions, np.cumsum(steps)[:-1])
-    return [Played(one, float(time)) for one, time in zip(each, washout, strict=True)]
 
 
 STRIDE = 0.5
@@ -98,6 +93,11 @@ class Trace:
     force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
     frequency: tuple[float, ...]  # (m,): up to 20 Hz (Hz)
     amplitude: tuple[float, ...]  # (m,): of the unfiltered contact force over all evaluated spans (N)
+
+    @property
+    def place(self) -> LineAtSpeed:
+        """Line, pantograph and speed."""
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
 
 
 def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:

@@ -31,9 +31,8 @@ from ..line import OPTIONS
 from .run import SUFFIXES, run
 
 if TYPE_CHECKING:
-    from .returns import Returned
     from .settings import BenchmarkSettings
-    from .submission import Checked, Replayed
+    from .submission import Checked
 
 
 PLACE = (*OPTIONS, "pantographs")
@@ -179,25 +178,20 @@ def replay(
         rows = [{**each.row, "difference": each.difference} for each in played.rows]
         print_json({"follows": played.follows, "rows": rows})
     else:
-        print_table(_replay_table(result, list(played.rows)))
+        groups: dict[str, list[float]] = {}
+        for each in played.rows:
+            groups.setdefault(each.row["policy"], []).append(each.difference)
+        rows_of = [
+            (policy, str(len(found)), str(found.count(0.0)), f"{max(found):.2g}")
+            for policy, found in groups.items()
+        ]
+        headings = ("policy", "passes", "bit for bit", "maximum relative difference")
+        print_table(Table(f"{result.name}, played again", headings, rows_of))
     apart = [each for each in played.rows if each.difference > tolerance]
     if apart or played.follows is False:
         what = f"{len(apart)} of {len(played.rows)} rows do" if apart else "its cells or standings do"
         alert("No:", f"{what} not follow from the actions.")
         raise typer.Exit(1)
-
-
-def _replay_table(result: Path, rows: list[Replayed]) -> Table:
-    """One line per policy."""
-    groups: dict[str, list[float]] = {}
-    for each in rows:
-        groups.setdefault(each.row["policy"], []).append(each.difference)
-    lines = tuple(
-        (policy, str(len(found)), str(found.count(0.0)), f"{max(found):.2g}")
-        for policy, found in groups.items()
-    )
-    headings = ("policy", "passes", "bit for bit", "maximum relative difference")
-    return Table(f"{result.name}, played again", headings, lines)
 
 
 def returns(
@@ -238,18 +232,14 @@ def returns(
     if json:
         print_json({name: as_dict(each) for name, each in found.items()})
         return
-    print_table(_returns_table(f"{environment}, {episodes} episodes beside {result.name}", found["all"]))
-    rows = tuple((name, f"{rank_correlation(each):.3f}") for name, each in found.items())
-    print_table(Table("rank correlation of return and benchmark", ("reward", "Spearman's ρ"), rows))
-
-
-def _returns_table(title: str, found: list[Returned]) -> Table:
-    """Policies in the order of their returns."""
-    rows = tuple(
+    rows = [
         (each.policy, f"{each.mean:.1f} ± {each.error:.1f}", f"{each.change:+.1f}", each.disqualified or "–")
-        for each in sorted(found, key=lambda each: -each.mean)
-    )
-    return Table(title, ("policy", "return", "Δσ (%)", "disqualified"), rows)
+        for each in sorted(found["all"], key=lambda each: -each.mean)
+    ]
+    title = f"{environment}, {episodes} episodes beside {result.name}"
+    print_table(Table(title, ("policy", "return", "Δσ (%)", "disqualified"), rows))
+    correlations = [(name, f"{rank_correlation(each):.3f}") for name, each in found.items()]
+    print_table(Table("rank correlation of return and benchmark", ("reward", "Spearman's ρ"), correlations))
 
 
 submission = typer.Typer(no_args_is_help=True, help="Submissions to the leaderboard.")
@@ -299,8 +289,6 @@ def check(
 
 def _report(checked: Checked, others: list[float]) -> list[str]:
     """What is said of a submission, line by line."""
-    from .submission import place_among
-
     card, standing, tape = checked.card, checked.standing, checked.tape
     interval = standing.interval
     within = f", 95 % interval {interval[0]:.1f} to {interval[1]:.1f}" if interval else ""
@@ -315,5 +303,5 @@ def _report(checked: Checked, others: list[float]) -> list[str]:
         lines.append(f"It requires: {', '.join(checked.requirements)}")
     if standing.disqualified:
         return [*lines, f"It would not be ranked: {standing.disqualified}."]
-    where = f", at place {place_among(standing.change, others)} of {len(others) + 1}" if others else ""
-    return [*lines, f"It would be ranked{where}."]
+    place = 1 + sum(other < standing.change for other in others)
+    return [*lines, f"It would be ranked{f', at place {place} of {len(others) + 1}' if others else ''}."]

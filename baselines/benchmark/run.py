@@ -25,9 +25,17 @@ from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played, Trace
 from .overall import Standing, standings
-from .settings import ORACLE_TAPE, BenchmarkSettings, Line, control_of, policy_of, salt_hash
+from .settings import (
+    ORACLE_TAPE,
+    BenchmarkSettings,
+    Line,
+    LineAtSpeed,
+    control_of,
+    policy_of,
+    salt_hash,
+)
 from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
-from .statistics import Cell, LineAtSpeed, compare
+from .statistics import Cell, compare
 
 SUFFIXES = (".json", *TABLES)
 """Suffixes of the files that an outcome can be saved to."""
@@ -171,9 +179,9 @@ def stored_bounds(
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            changes = stored_changes(along(settings, line) | {"speed_kmh": speed}, covered)
-            found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
-    return {place: changes for place, changes in found.items() if changes}
+            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered):
+                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
+    return found
 
 
 def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

@@ -12,17 +12,18 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from itertools import chain
+from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_configs import find
 from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
-from panto_env.base.settings import Between, Positive, Settings, parse
+from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control.observation import Context
 from panto_env.control.settings import (
     ControlInterval,
@@ -31,13 +32,27 @@ from panto_env.control.settings import (
     default,
     description,
 )
-from panto_env.plant.actuators import ActuatorSettings, actuator_settings
-from panto_env.plant.catenary.schema import MOST_SPANS
-from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
+from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import Policy, check_named, wishes
 
-from ..line import LineAndTrain, as_clause, distinct
+from ..line import Actuator, Condition, LineAndTrain, Span, as_clause, distinct
+
+Number = Annotated[
+    float,
+    BeforeValidator(lambda value: nan if value is None else value),
+    AfterValidator(lambda value: value if isfinite(value) else nan),
+]
+"""A figure; nan if there is none, which is null in JSON."""
+
+
+class LineAtSpeed(NamedTuple):
+    """A line, the pantograph on it, and its speed (km/h)."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+
 
 TEST = range(1000)
 SELECTION = range(1000, 2000)
@@ -78,7 +93,6 @@ def salt_hash(salt: str) -> str:
 
 
 Array = NDArray[np.float64]
-
 BLIND, TAPE = "blind of ", "tape of "
 ORACLE_TAPE = TAPE + "oracle"
 OTHER_SEED = 1_000_003
@@ -132,16 +146,10 @@ class Tape:
         return self._actions[step] if step < len(self._actions) else np.zeros_like(self._actions[0])
 
 
-_Span = Annotated[int, Between(1, MOST_SPANS)]
 REFERENCE = "passive"
 """The policy that every other one is compared with."""
 
 
-def _condition(value: Any) -> LineCondition:
-    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
-
-
-_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
 _Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(as_clause(sensor_settings))]]
 
 
@@ -153,7 +161,7 @@ class Line(LineAndTrain):
     """
 
     distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
-    spans: tuple[_Span, _Span] | None = Field(
+    spans: tuple[Span, Span] | None = Field(
         None,
         description="first and last span that the figures cover, counted from 1; by default from the "
         "tenth, where the start has died out, to the last one that every run covers completely",
@@ -201,11 +209,11 @@ class BenchmarkSettings(Settings):
         description="whether installed policies run in the process of the plant instead of apart from it; "
         "those from a file never do",
     )
-    actuator: _Actuator = Field(
+    actuator: Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
-    line_condition: Annotated[LineCondition, BeforeValidator(as_clause(_condition))] = Field(
+    line_condition: Condition = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     pantograph_scatter: PantographScatter = Field(
@@ -265,10 +273,6 @@ class BenchmarkSettings(Settings):
     @model_validator(mode="after")
     def _with_distinct_names(self) -> Self:
         distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
-        return self
-
-    @model_validator(mode="after")
-    def _without_repeated_line(self) -> Self:
         # Rows and cells tell lines apart by these.
         distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
         return self

@@ -38,6 +38,8 @@ from .settings import (
     policy_of,
 )
 
+Array = NDArray[np.float64]
+
 
 class PassiveFigures(NamedTuple):
     """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
@@ -69,8 +71,6 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
     worst = passive.worst_controlled(spans).summary(spans)
     return PassiveFigures(worst.std, worst.cost_function)
 
-
-Array = NDArray[np.float64]
 
 FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
@@ -150,8 +150,11 @@ def run_pass(
     Raises InputError, naming the policy, if the policy fails.
     """
     first, recorders = _record(settings, line, policy, speed_kmh, seed, played)
-    number = 0 if first.terminated else judged(first, line, spans)
-    run, recorder = first.train[line.controlled[number] - 1], recorders[number]
+    # Of several controlled pantographs the one with the largest sigma is judged.
+    controlled = [first.train[number - 1] for number in line.controlled]
+    run = first.worst_controlled(spans)
+    recorder = next(each for each, own in zip(recorders, controlled, strict=True) if own is run)
+    several = controlled if len(controlled) > 1 else []
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
@@ -180,7 +183,9 @@ def run_pass(
         power=watts,
         pressed_std=at_same_mean.std,
         pressed_cost_function=at_same_mean.cost_function,
-        controlled_means=_controlled_means(first, line, spans) if len(line.controlled) > 1 else (),
+        controlled_means=tuple(
+            float("nan") if first.terminated else own.summary(spans).mean for own in several
+        ),
     )
     kept = traced and not run.terminated
     return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)
@@ -200,19 +205,6 @@ def drive(
     """
     run, recorders = _record(settings, line, policy, speed_kmh, seed, played)
     return run.controlled, recorders[0].forces()
-
-
-def _controlled_means(run: Trajectory, line: Line, spans: tuple[int, int]) -> tuple[float, ...]:
-    """Mean force of each controlled pantograph (N); nan if the run ended early."""
-    if run.terminated:
-        return len(line.controlled) * (float("nan"),)
-    return tuple(run.train[number - 1].summary(spans).mean for number in line.controlled)
-
-
-def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:
-    """Which of the controlled pantographs is judged, from 0: that with the largest sigma."""
-    worst = run.worst_controlled(spans)
-    return next(agent for agent, number in enumerate(line.controlled) if run.train[number - 1] is worst)
 
 
 def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: float) -> Array:

@@ -16,14 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import FiniteFloat
 
+from panto_env.base.arrays import Array
 from panto_env.base.errors import beside
 
-from .settings import REFERENCE
+from .settings import REFERENCE, LineAtSpeed, Number
 from .single_pass import Row
 
-Array = NDArray[np.float64]
-Interval = tuple[float, float]
+Interval = tuple[FiniteFloat, FiniteFloat]
 
 TRIM = 0.25
 """Share of the values that the interquartile mean leaves out at each end."""
@@ -232,14 +233,6 @@ ADVICE = "a policy's attribute washout = 1.0 keeps the mean"
 """Advice to the author of a policy that is disqualified for moving the mean."""
 
 
-class LineAtSpeed(NamedTuple):
-    """A line, the pantograph on it, and its speed (km/h)."""
-
-    catenary: str
-    pantograph: str
-    speed_kmh: float
-
-
 @dataclass(frozen=True)
 class Cell:
     """One policy on one line at one speed, over all seeds; changes are relative, pass by pass.
@@ -253,19 +246,24 @@ class Cell:
     speed_kmh: float
     seeds: int
     nominal_force: float  # N
-    figures: dict[str, float]  # interquartile means; nan if a pass ended early
-    change: float  # of sigma from the passive pantograph at the same mean (%)
+    figures: dict[str, Number]  # interquartile means; nan if a pass ended early
+    change: Number  # of sigma from the passive pantograph at the same mean (%)
     interval: Interval | None  # 95 % interval of ``change``; None: see interval_of_mean
-    cost_change: float  # of CF from the passive pantograph at the same mean (%)
-    mean_change: float  # of the mean force from the unchanged passive pantograph (%)
-    most_moved: float  # that change in the pass where it is largest (%)
+    cost_change: Number  # of CF from the passive pantograph at the same mean (%)
+    mean_change: Number  # of the mean force from the unchanged passive pantograph (%)
+    most_moved: Number  # that change in the pass where it is largest (%)
     moved: int  # passes in which it is more than 1.5 %
-    improved: float  # share of passes with a smaller sigma than the passive pantograph at the same mean
-    spread: float  # standard deviation of sigma over the seeds, relative to its mean (%)
+    improved: Number  # share of passes with a smaller sigma than the passive pantograph at the same mean
+    spread: Number  # standard deviation of sigma over the seeds, relative to its mean (%)
     oracle: float | None  # change of sigma that the stored oracle reaches (%); None without a pass of both
     oracle_share: float | None  # of the oracle's gain, over the passes that it ran; None likewise
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
+
+    @property
+    def place(self) -> LineAtSpeed:
+        """Line, pantograph and speed."""
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
 
 
 def mean_range(passive: float) -> tuple[float, float]:
@@ -319,8 +317,9 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         [row.figures.cost_function for row in rows], [row.pressed_cost_function for row in rows]
     )
     # Pass by pass, with the same line, speed, seed and noise.
-    paired = zip(rows, passive_rows, strict=True)
-    means = np.array([_mean_moved(row, passive) for row, passive in paired])
+    paired = [zip(row.means, own.means, strict=True) for row, own in zip(rows, passive_rows, strict=True)]
+    # Of several controlled pantographs the largest change in size.
+    means = np.array([max((own / its - 1 for own, its in pair), key=abs) for pair in paired])
     both = [(own, oracle[row.seed]) for own, row in zip(changes, rows, strict=True) if row.seed in oracle]
     reached, bound = np.mean(both, axis=0).tolist() if both else (0.0, None)
     return Cell(
@@ -344,12 +343,6 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         disqualified=_disqualification(rows, passive_rows, means),
         rank=None,
     )
-
-
-def _mean_moved(row: Row, passive: Row) -> float:
-    """Relative change of the mean force in a pass: of several controlled pantographs the largest in size."""
-    each = [own / its - 1 for own, its in zip(row.means, passive.means, strict=True)]
-    return max(each, key=abs)
 
 
 def relative_changes(rows: Sequence[Row]) -> Array:

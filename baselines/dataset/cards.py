@@ -42,8 +42,6 @@ def front_matter(title: str, file: str, rows: int, task: str, tags: Sequence[str
 
 TABLE = "designs.parquet"
 """Name of the table in its folder."""
-SI = {"mm": "m"}
-"""Units in the table by the unit shown elsewhere: the table uses SI units."""
 
 
 class Column(NamedTuple):
@@ -71,13 +69,12 @@ def columns(settings: DesignsSettings) -> list[Column]:
         Column("wave_speed", "float64", "wave speed of the contact wire (m/s)"),
         Column("time_step", "float64", "time step of the computation (s)"),
         Column("spacing", "float64", "spacing of the computation's grid (m)"),
-        *(Column(name, "float64", _figure(name)) for name in FIGURES),
+        *(Column(each, "float64", f"{LABELS[each].name} ({_unit(LABELS[each].unit)})") for each in FIGURES),
     ]
 
 
-def _figure(name: str) -> str:
-    label = LABELS[name]
-    return f"{label.name} ({SI.get(label.unit, label.unit)})"
+def _unit(shown: str) -> str:
+    return {"mm": "m"}.get(shown, shown)  # the table uses SI units
 
 
 def card_of_designs(
@@ -195,7 +192,7 @@ def card_of_episodes(
         "",
         "| column | description |",
         "|---|---|",
-        *(f"| `{each.name}` | {each.description} |" for each in COLUMNS),
+        *(f"| `{name}` | {meaning} |" for name, meaning in COLUMNS.items()),
         "| others | `infos` at the step's end |",
         "",
         "| | observed | value of 0 | value of 1 more |",

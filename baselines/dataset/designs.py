@@ -100,7 +100,6 @@ def load_designs(path: str | Path) -> DesignsSettings:
     return parse(DesignsSettings, read_toml(find(path, "designs")), str(path))
 
 
-Row = dict[str, Any]
 DROPPERS = "catenary.droppers.positions"
 FIGURES = tuple(name for name in Figures.__dataclass_fields__ if not name.startswith("effort"))
 """Figures of a run; a passive pantograph has no effort."""
@@ -133,9 +132,9 @@ def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Pat
     write_checked(path, {"rows": rows})
 
 
-def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> Row:
+def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> dict[str, Any]:
     """A design's row: its values, why it was refused or ended early, warnings of inaccuracy, and figures."""
-    row: Row = {"design": number, **values, "refused": "", "ending": "", "accuracy_warning": ""}
+    row: dict[str, Any] = {"design": number, **values, "refused": "", "ending": "", "accuracy_warning": ""}
     row |= dict.fromkeys(OUTCOME)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AccuracyWarning)
@@ -154,12 +153,9 @@ def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> 
         "time_step": run.time_step,
         "spacing": run.settings["spacing"],
     }
-    return row | outcome | {name: _number(figures[name]) for name in FIGURES if name in figures}
-
-
-def _number(value: float) -> float | None:
-    """A figure; None if the run does not have it, such as uplift on a line without supports."""
-    return None if np.isnan(value) else value
+    # One that the run does not have, such as uplift on a line without supports, is null.
+    kept = {name: figures[name] for name in FIGURES if name in figures}
+    return row | outcome | {name: None if np.isnan(value) else value for name, value in kept.items()}
 
 
 def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:

@@ -37,9 +37,7 @@ class Episode(NamedTuple):
     rewards: NDArray[np.float64]  # (n,)
     terminations: NDArray[np.bool_]  # (n,)
     truncations: NDArray[np.bool_]  # (n,)
-    infos: dict[
-        str, NDArray[np.float64]
-    ]  # (n + 1,): INFOS, "reward_terms/...", "policy_action" (n + 1, actions)
+    infos: dict[str, NDArray[np.float64]]  # (n + 1, ...): INFOS, "reward_terms/...", "policy_action"
     figures: dict[str, float]  # of the whole episode, from the environment's info
 
 
@@ -47,9 +45,7 @@ class Beginning(NamedTuple):
     """The start of an episode."""
 
     policy: Policy
-    twin: (
-        gymnasium.Env[Any, Any] | None
-    )  # gives the policy the observation that it requests; None: it sees the recorded one
+    twin: gymnasium.Env[Any, Any] | None  # gives the policy its observation; None: it sees the recorded one
     observation: NDArray[np.float32]  # recorded observation
     seen: NDArray[np.float32]  # observation that the policy sees
     info: dict[str, Any]
@@ -133,7 +129,9 @@ class Stage:
         steps: list[tuple[Any, ...]] = []
         ended = False
         while not ended:
-            policy_action = _action(policy, plan.policy, seen, shape)
+            with errors_name(plan.policy, "act"):
+                action = checked_action(policy.act(seen.copy()), shape)  # a copy: the policy may keep it
+            policy_action = np.clip(action, -1.0, 1.0)
             noisy = policy_action + plan.noise * random.standard_normal(shape)
             action = np.clip(noisy, -1.0, 1.0).astype(np.float32)
             observation, reward, terminated, truncated, info = env.step(action)
@@ -156,28 +154,26 @@ class Stage:
     def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
         """Begin an episode. Raises InputError if the policy cannot begin it."""
         policy = find_policy(name)
-        self._check_washout(policy, name)
-        twin = self._twin(policy)
+        twin = self._twin(policy, name)
         observation, info = self._env.reset(seed=seed, options=options)
         seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
         with errors_name(name, "reset"):
             policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
         return Beginning(policy, twin, observation, seen, info)
 
-    def _check_washout(self, policy: Policy, name: str) -> None:
-        """Raise InputError for a policy that needs another washout: its actions would mean other forces."""
-        offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
-        needed, there = wishes(policy)["washout"], offered.washout
-        if needed != there:
-            raise InputError(
-                f"The policy '{name}' needs washout = {needed:g}, and the data set's environment has "
-                f"{there:g}; set washout = {needed:g} in its environment, or leave the policy out."
-            )
+    def _twin(self, policy: Policy, name: str) -> gymnasium.Env[Any, Any] | None:
+        """Environment with the observation that a policy requests; None if that is the recorded one.
 
-    def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
-        """Environment with the observation that a policy requests; None if that is the recorded one."""
+        Raises InputError for a policy that needs another washout: its actions would mean other forces.
+        """
         offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
         changes = {key: value for key, value in wishes(policy).items() if value != getattr(offered, key)}
+        if "washout" in changes:
+            needed = changes["washout"]
+            raise InputError(
+                f"The policy '{name}' needs washout = {needed:g}, and the data set's environment has "
+                f"{offered.washout:g}; set washout = {needed:g} in its environment, or leave the policy out."
+            )
         key = repr(sorted(changes.items()))
         if changes and key not in self._twins:
             self._twins[key] = make(self._settings, **changes)
@@ -198,14 +194,6 @@ def _seen(
     return seen
 
 
-def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[Any]:
-    """A policy's action for an observation, clipped to -1..1. Raises InputError if it is not valid."""
-    with errors_name(name, "act"):
-        action = checked_action(policy.act(seen.copy()), shape)  # a copy: the policy may keep it
-    clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
-    return clipped
-
-
 def _kept(info: dict[str, Any], policy_action: NDArray[Any]) -> dict[str, Any]:
     """Recorded entries of an info, as a flat table."""
     terms = {f"reward_terms/{name}": value for name, value in info["reward_terms"].items()}
@@ -218,25 +206,18 @@ PER_GROUP = 100
 """Episodes per row group."""
 
 
-class StepColumn(NamedTuple):
-    """A column of the table."""
-
-    name: str
-    description: str
-
-
-COLUMNS = (
-    StepColumn("episode", "number of the episode, from 0"),
-    StepColumn("step", "number of the control step in its episode, from 0"),
-    StepColumn("policy", "policy that acted"),
-    StepColumn("observation", "before the step, as the environment returned it"),
-    StepColumn("action", "taken, noise included, as a share of the actuator's force limit"),
-    StepColumn("reward", "of the step"),
-    StepColumn("next_observation", "after the step"),
-    StepColumn("terminated", "whether the step ended the episode early"),
-    StepColumn("truncated", "whether the episode reached its distance"),
-)
-"""Those before the infos, which have the names of Minari's and are those at the step's end."""
+COLUMNS = {
+    "episode": "number of the episode, from 0",
+    "step": "number of the control step in its episode, from 0",
+    "policy": "policy that acted",
+    "observation": "before the step, as the environment returned it",
+    "action": "taken, noise included, as a share of the actuator's force limit",
+    "reward": "of the step",
+    "next_observation": "after the step",
+    "terminated": "whether the step ended the episode early",
+    "truncated": "whether the episode reached its distance",
+}
+"""Descriptions of the columns before the infos, which have the names of Minari's, at the step's end."""
 
 
 class StepsTable:
@@ -271,8 +252,7 @@ class StepsTable:
             pa.array(episode.truncations),
         )
         infos = {name: _column(array[1:]) for name, array in episode.infos.items()}
-        names = [column.name for column in COLUMNS]
-        self._waiting.append(pa.table(dict(zip(names, values, strict=True)) | infos))
+        self._waiting.append(pa.table(dict(zip(COLUMNS, values, strict=True)) | infos))
         if len(self._waiting) == PER_GROUP:
             self._flush()
 

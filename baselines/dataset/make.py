@@ -1,10 +1,11 @@
-"""SHA-256 of each file of a data set, in a list that `sha256sum --check` can read."""
+"""Data sets made in parts, each whole or not at all, with a list that `sha256sum --check` can read."""
 
 from __future__ import annotations
 
 import json
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -53,16 +54,13 @@ def verify(path: Path) -> list[tuple[Path, int]]:
 
 
 def _verify(folder: Path) -> int:
-    listed = {}
     try:
         lines = (folder / LIST).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{folder / LIST} could not be read, or is damaged; make or download the data set anew."
         ) from error
-    for line in lines:
-        checksum, _, name = line.partition("  ")
-        listed[name] = checksum
+    listed = {name: checksum for checksum, _, name in (line.partition("  ") for line in lines)}
     found = _files(folder)
     for name, checksum in listed.items():
         if name not in found:
@@ -80,12 +78,8 @@ def _verify(folder: Path) -> int:
 
 def _files(folder: Path) -> list[str]:
     """Relative paths of a folder's files, sorted."""
-    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    return sorted(
-        path.as_posix()
-        for path in paths
-        if path.name != LIST and not any(p.startswith(".") for p in path.parts)
-    )
+    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.name != LIST)
+    return sorted(path.as_posix() for path in paths if not any(p.startswith(".") for p in path.parts))
 
 
 DESIGNS_PER_PART = 64
@@ -159,13 +153,9 @@ def read_identity(path: Path) -> dict[str, Any]:
 def _assemble_designs(
     settings: DesignsSettings, folder: Path, parts: Sequence[Path], made_of: dict[str, Any]
 ) -> None:
-    """Write the table to a hidden folder, and rename that once it is complete."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    unfinished = folder.with_name(f".{folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
-    unfinished.mkdir()
     described = columns(settings)
     schema = pa.schema(
         [
@@ -175,10 +165,19 @@ def _assemble_designs(
         metadata={TABLE_KEY: json.dumps(made_of)},
     )
     table = pa.Table.from_pylist([row for path in parts for row in read_checked(path)["rows"]], schema=schema)
-    pq.write_table(table, unfinished / TABLE, compression="zstd")
-    (unfinished / "card.md").write_text(
-        card_of_designs(settings, described, table, made_of), encoding="utf-8"
-    )
+    with _whole_folder(folder) as unfinished:
+        pq.write_table(table, unfinished / TABLE, compression="zstd")
+        text = card_of_designs(settings, described, table, made_of)
+        (unfinished / "card.md").write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def _whole_folder(folder: Path) -> Iterator[Path]:
+    """A hidden folder to write to, which gets its checksums and its name once it is complete."""
+    unfinished = folder.with_name(f".{folder.name}")
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
+    unfinished.mkdir()
+    yield unfinished
     write_checksums(unfinished)
     unfinished.rename(folder)
 
@@ -245,7 +244,13 @@ def make_episodes(
                 _assemble_episodes(settings, one)
                 remove_parts(one.parts)
         remove_if_empty(output / PARTS)
-    return [_made_episodes(one, kept=there) for one, there in zip(sets, kept, strict=True)]
+    made = []
+    for one, there in zip(sets, kept, strict=True):
+        metadata = _metadata(one.folder)
+        size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file()) / 1e6
+        counts = metadata["total_episodes"], metadata["total_steps"]
+        made.append(Made(one.name, one.folder, *counts, size, there))
+    return made
 
 
 @dataclass(frozen=True)
@@ -288,10 +293,7 @@ class _Order:
 
 
 def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
-    """Write a data set to a hidden folder, and rename that once it is complete."""
     _make_namespaces(one.folder)
-    unfinished = one.folder.with_name(f".{one.folder.name}")
-    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
     rows: list[tuple[Plan, dict[str, float]]] = []
 
     def episodes() -> Iterator[tuple[Plan, Episode]]:
@@ -302,16 +304,14 @@ def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
                 yield plan, episode
 
     paragraph = description(settings, one.policy_set)
-    unfinished.mkdir()
-    with StepsTable(unfinished / STEPS) as table:
-        write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()
-    text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
-    (unfinished / "card.md").write_text(text, encoding="utf-8")
-    write_checksums(unfinished)
-    unfinished.rename(one.folder)
+    with _whole_folder(one.folder) as unfinished:
+        with StepsTable(unfinished / STEPS) as table:
+            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
+        text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
+        (unfinished / "card.md").write_text(text, encoding="utf-8")
 
 
 def _make_namespaces(folder: Path) -> None:
@@ -322,13 +322,6 @@ def _make_namespaces(folder: Path) -> None:
             (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
         if above.name == NAMESPACE:
             break
-
-
-def _made_episodes(one: _Order, *, kept: bool) -> Made:
-    metadata = _metadata(one.folder)
-    size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file())
-    steps, episodes = metadata["total_steps"], metadata["total_episodes"]
-    return Made(one.name, one.folder, episodes, steps, size / 1e6, kept)
 
 
 def _metadata(folder: Path) -> dict[str, Any]:

@@ -214,7 +214,8 @@ class _Group:
 
     def run(self, commands: Array) -> Array:
         """Contact force (N), (lanes, samples), under commands (N), (lanes, steps, places)."""
-        _restore(self._start)
+        for array, content in self._start:
+            np.copyto(array, content)
         self._advance(commands)
         return self._force.copy()
 
@@ -225,7 +226,8 @@ class _Group:
         of the next tests they all have the same state; each lane then runs ahead with its own test force, and
         its state is restored.
         """
-        _restore(self._start)
+        for array, content in self._start:
+            np.copyto(array, content)
         lanes, end, now = len(self._force), len(commands), 0
         forces = np.zeros((len(pushes), self._force.shape[1]))
         reach = []  # for each test force, the range of samples over which its response is followed
@@ -243,7 +245,8 @@ class _Group:
             self._advance(changed)
             forces[first : first + len(block)] = self._force[: len(block)]
             reach += [(step * self._steps, min(last, step + steps) * self._steps) for step, _ in block]
-            _restore(here)
+            for array, content in here:
+                np.copyto(array, content)
         self._advance(np.broadcast_to(commands[now:], (lanes, *commands[now:].shape)))
         plain = self._force[0]
         for force, (begin, stop) in zip(forces, reach, strict=True):
@@ -262,15 +265,6 @@ class _Group:
         for step in range(commands.shape[1]):
             now[:, self._controlled, self._places] = commands[:, step]
             self._plant.advance(now, self._steps, self._samples)
-
-
-Saved = list[tuple[Any, Any]]
-"""Arrays of a state, each with a copy of its saved content."""
-
-
-def _restore(saved: Saved) -> None:
-    for array, content in saved:
-        np.copyto(array, content)
 
 
 LEAD = 2.0
@@ -322,6 +316,8 @@ class Problem:
         before = passive.contact_force[: self.begin * self.steps - waited]
         self.every = max(1, round(RESOLUTION / passive.time_step))
         """Evaluated samples from one row of the least squares to the next."""
+        self.rows = self._inside[:: self.every]
+        """Samples of the least squares, counted from the first knot's."""
         settled = settled_at(passive.contact_force[0], passive.time_step)
         self._filter_state = low_pass_from(settled, before, passive.time_step)[1] if len(before) else settled
         """State of EN 50317's filter, (sections, 2), at the first knot."""
@@ -360,11 +356,6 @@ class Problem:
         commands = self.knots.free_commands(np.concatenate([knots[None], pushed]))
         forces = self._filtered(self._free.forces(commands))[:, self.rows]
         return np.asarray(((forces[1:] - forces[0]) / sizes[:, None]).T)
-
-    @property
-    def rows(self) -> Any:
-        """Samples of the least squares, counted from the first knot's."""
-        return self._inside[:: self.every]
 
     def replay(self, commands: Array) -> Trajectory:
         """The controlled pantograph's pass as ``simulate`` runs it under commands (N), (count, places)."""

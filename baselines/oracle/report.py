@@ -15,7 +15,7 @@ from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
-from .search import STARTS, Iteration, Oracle
+from .search import STARTS, Oracle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,21 +45,21 @@ def convergence(oracle: Oracle) -> Table:
     """Table of every iteration of every search of one pass."""
     rows, ends, passive = [], [], oracle.problem.figures
     for search in oracle.searches:
-        rows += [(search.start, *_numbers(each, passive.std)) for each in search.iterations]
+        rows += [
+            (
+                search.start,
+                str(each.number),
+                number(each.std, 3),
+                number(100 * (each.std / passive.std - 1), 2),
+                number(each.mean, 3),
+                number(100 * each.at_limits, 0),
+                number(each.step, 2),
+            )
+            for each in search.iterations
+        ]
         ends.append(len(rows) - 1)
     headings = ("start", "iteration", "σ (N)", "of passive (%)", "mean (N)", "at limits (%)", "step")
     return Table(f"{title(oracle)}: passive σ {passive.std:.3f} N", headings, rows, section_ends=tuple(ends))
-
-
-def _numbers(iteration: Iteration, passive_std: float) -> tuple[str, ...]:
-    return (
-        str(iteration.number),
-        number(iteration.std, 3),
-        number(100 * (iteration.std / passive_std - 1), 2),
-        number(iteration.mean, 3),
-        number(100 * iteration.at_limits, 0),
-        number(iteration.step, 2),
-    )
 
 
 def summary(oracles: Sequence[Oracle]) -> Table:

@@ -86,7 +86,10 @@ def descend(
     iteration. The merit, σ plus a weighted error of the mean, falls from iteration to iteration. If the mean
     is not met after ``iterations``, up to as many more follow.
     """
-    limits = of_all_places(problem.knots.limits(problem.count), problem.places)
+    one = problem.knots.limits(problem.count)
+    # Of the knots of all actuators, (count, places), flattened row by row.
+    matrix = csc_matrix(kron(one.matrix, eye_array(problem.places)))
+    limits = Limits(matrix, np.repeat(one.low, problem.places), np.repeat(one.high, problem.places))
     force, damping = problem.forces(knots[None])[0], DAMPING
     found = [_iteration(problem, 0, knots, force, 0.0)]
     if progress is not None:
@@ -198,14 +201,6 @@ def quadratic_solver() -> Any:
     return osqp.OSQP()
 
 
-def of_all_places(limits: Limits, places: int) -> Limits:
-    """Limits of the knots of all actuators, (count, places), flattened row by row, from those of one."""
-    matrix = csc_matrix(kron(limits.matrix, eye_array(places)))
-    return limits._replace(
-        matrix=matrix, low=np.repeat(limits.low, places), high=np.repeat(limits.high, places)
-    )
-
-
 def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:
     at_limits = problem.knots.at_limits(knots)
     return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)
@@ -242,7 +237,7 @@ class Oracle:
     @property
     def best(self) -> Descent:
         """The search that reached the minimum σ."""
-        return min(self.searches, key=_std)
+        return min(self.searches, key=lambda search: search.std)
 
     @property
     def change(self) -> float:
@@ -271,9 +266,9 @@ def find(
         name = f"seed {neighbour.problem.seed}"
         searches = [descend(problem, name, neighbour.best.knots, progress=progress)]
     for hop in range(1, hops + 1):
-        shaken = min(searches, key=_std).knots + noise(problem, HOP_FORCE, hop)
+        shaken = min(searches, key=lambda search: search.std).knots + noise(problem, HOP_FORCE, hop)
         searches.append(descend(problem, f"hop {hop}", problem.knots.within(shaken), progress=progress))
-    best = min(searches, key=_std)
+    best = min(searches, key=lambda search: search.std)
     commands = np.round(problem.knots.commands(best.knots), DECIMALS)
     run = problem.replay(commands)
     if run.terminated:
@@ -290,10 +285,6 @@ def find(
         zero_phase_low_pass(run.contact_force, run.time_step),
     )
     return Oracle(problem, tuple(searches), commands, run, figures, forces)
-
-
-def _std(search: Descent) -> float:
-    return search.std
 
 
 def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterator[Descent]:

@@ -98,18 +98,12 @@ class FeedbackFeedforward(ForceLaw):
 
     def force(self, observation: NDArray[np.float32]) -> float:
         """Force (N) for an observation, before the actuator's limit."""
-        return self._feedback(self.read(observation, "contact force")) + self._feedforward(
-            self._distance(observation)
-        )
-
-    def _feedback(self, contact_force: float) -> float:
         lowest, highest = FORCE_RANGE
-        shortfall = self.context.nominal_force - min(max(contact_force, lowest), highest)
-        outside_dead_zone = max(abs(shortfall) - self.dead_zone, 0.0)
-        return self._gain * math.copysign(outside_dead_zone, shortfall)
-
-    def _feedforward(self, distance: float) -> float:
-        return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
+        contact_force = min(max(self.read(observation, "contact force"), lowest), highest)
+        shortfall = self.context.nominal_force - contact_force
+        feedback = self._gain * math.copysign(max(abs(shortfall) - self.dead_zone, 0.0), shortfall)
+        distance = self._distance(observation)
+        return feedback + self.amplitude * math.sin(self._wavenumber * distance - self.theta)
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
         """Distance (m) from the support behind the start of the run, as if all spans had the mean length."""

@@ -123,10 +123,7 @@ class Disturbed:
         self.noise = np.zeros(len(self.a))
         self.noise[size:-1] = strength * harmonics**2 * falling
         self.noise[-1] = strength * wandering**2
-        self._add_sum_of_commands(interval)
-
-    def _add_sum_of_commands(self, interval: float) -> None:
-        """Add the integral of the command (N s), which is known without being read."""
+        # The integral of the command (N s), which is known without being read.
         size = len(self.a)
         whole = np.eye(size + 1)
         whole[:size, :size] = self.a

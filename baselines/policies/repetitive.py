@@ -14,7 +14,7 @@ from panto_env.base.errors import shown
 from panto_env.base.settings import NonNegative, Positive, Settings
 from panto_env.control.observation import Context
 
-from .lanes_law import Array, FromAverage, Gain, LanesLaw, Observations, Source, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, RATE, LineModel, line_model, mean_line
 
 
@@ -69,31 +69,6 @@ class Washout:
 
 PLACES = ("read", "counted")
 """Where the place within the span comes from."""
-
-
-class SpanPlace:
-    """Angle of the place within the span."""
-
-    def __init__(self, place: str) -> None:
-        """place: one of PLACES; raises ValueError for another."""
-        if place not in PLACES:
-            raise ValueError(f"place must be one of {', '.join(PLACES)}, not {shown(place)}")
-        self._counts = place == "counted"
-
-    def begin(self, lanes: int) -> None:
-        """Begin to count for new episodes in this number of lanes."""
-        self._counted = np.zeros(lanes)
-
-    def angle(self, law: LanesLaw, observations: Observations) -> Array:
-        """Angle, (lanes,), rad: 0 at a support, or counted from where the episode began.
-
-        Raises InputError where it is to be read and the observation does not hold it.
-        """
-        if not self._counts:
-            return law.span_angle(observations)
-        way = law.read(observations, "speed") * law.context.control_interval
-        self._counted = self._counted + 2 * np.pi * way / law.context.alignment.mean_length
-        return self._counted
 
 
 HIGHEST = 16.0
@@ -224,11 +199,9 @@ WASHED = WashoutSettings(time_constant=2.0)
 class Repetitive(TunableLaw):
     """Adaptive cancellation of the span's harmonics, from the measured contact force.
 
-    Its learning, which backs off where it does not help, is that of ``SpanLearner``: s dc_k/dx =
-    - learning 2 conj(G_k) / (|G_k|^2 + response^2) (F - slow average) e^(-ik phi) - forgetting c_k for the
-    force Re sum_k c_k e^(ik phi), phi the angle of the place within the span (Bodson and Douglas, Automatica
-    33:2213, 1997). G_k, the response of the contact force to a command, is that of the pantograph under the
-    mean line, delays included (``line_model``).
+    Its learning, which backs off where it does not help, is that of ``SpanLearner``. G_k, the response of the
+    contact force to a command, is that of the pantograph under the mean line, delays included
+    (``line_model``).
 
     It needs to know the pantograph, tension and mass of the wires (for the model), delays, the length of the
     spans, and the place within one; nothing of droppers or stiffness along the span. It needs some spans to
@@ -252,7 +225,9 @@ class Repetitive(TunableLaw):
         speed.
         """
         super().__init__(gains)
-        self._delays, self._place = (delay, lag), SpanPlace(place)
+        if place not in PLACES:
+            raise ValueError(f"place must be one of {', '.join(PLACES)}, not {shown(place)}")
+        self._delays, self._counts = (delay, lag), place == "counted"
 
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in this number of lanes."""
@@ -267,12 +242,15 @@ class Repetitive(TunableLaw):
         self._state = np.zeros((self._sampled.size, lanes))
         self._from_average = FromAverage(interval, 1 / span_rate)
         self._washout = Washout(WASHED, interval, limit, (lanes,))
-        self._place.begin(lanes)
+        self._counted = np.zeros(lanes)
 
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         error = self._from_average(self.read(observations, "contact force"))
-        angle = self._place.angle(self, observations)
+        if self._counts:
+            way = self.read(observations, "speed") * self.context.control_interval
+            self._counted = self._counted + 2 * np.pi * way / self.context.alignment.mean_length
+        angle = self._counted if self._counts else self.span_angle(observations)
         learnt = self._learner(error, self._sampled.c[0] @ self._state, angle)
         force = self._washout(self.whole(observations, learnt))
         self._state = self._sampled.a @ self._state + np.multiply.outer(self._sampled.b, force)

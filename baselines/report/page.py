@@ -16,8 +16,8 @@ from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.report import LEGEND
 from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH
-from .result import Result
-from .tables import BAR, signed
+from .result import Result, read_result
+from .tables import BAR, signed, summary
 from .track import track
 
 
@@ -72,44 +72,37 @@ def report(
 
     The page is self-contained, opens in any browser without a network, and can be printed.
     """
-    pass
-    from .result import read_result
-
     kinds = {file.suffix.lower() for file in files}
-    if kinds == {".parquet"} and not markdown:
-        _of_runs(files, output, figures, droppers)
-        return
-    if kinds != {".json"}:
+    of_runs = kinds == {".parquet"} and not markdown
+    if kinds != {".json"} and not of_runs:
         odd = next((file for file in files if file.suffix.lower() != ".json"), files[0])
         raise InputError(
             f"{odd}: give either runs (.parquet) or results of the benchmark (.json), not both"
             f"{'; --markdown takes results of the benchmark' if markdown else ''}."
         )
-    if figures is not None or droppers is not None:
+    if not of_runs and (figures is not None or droppers is not None):
         raise InputError(
             "--figures and --droppers are for runs (.parquet); the passes of a benchmark are written by "
             "`panto benchmark --output`."
         )
     if markdown:
-        from .tables import summary
-
         tables = [summary(read_result(file)) for file in files]
         print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
         return
     path = files[0].with_suffix(PAGES[0]) if output is None else output
     check_output(path, PAGES)
     announce_overwriting(path)
+    if of_runs:
+        _of_runs(files, path, figures, droppers)
+        return
     save([read_result(file) for file in files], path)
     console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
 
 
-def _of_runs(files: list[Path], output: Path | None, figures: str | None, droppers: str | None) -> None:
+def _of_runs(files: list[Path], path: Path, figures: str | None, droppers: str | None) -> None:
     from panto_env import Trajectory, report
     from panto_env.metrics.run_tables import save_droppers, save_figures
 
-    path = files[0].with_suffix(PAGES[0]) if output is None else output
-    check_output(path, PAGES)
-    announce_overwriting(path)
     report.save(files, path)
     console.print(f"The report is {path}.", highlight=False, soft_wrap=True)
     runs = [Trajectory.load(file) for file in files] if figures or droppers else []

@@ -13,17 +13,18 @@ from panto_env.base.table import Table
 from panto_env.metrics.figures import LABELS
 from panto_env.terminal import number
 
-from ..benchmark.overall import next_in_ranking, with_feedback
+from ..benchmark.overall import Standing, next_in_ranking, with_feedback
 from ..benchmark.report import FIGURES, OWN_LABELS
-from ..benchmark.statistics import LineAtSpeed
+from ..benchmark.settings import LineAtSpeed
+from ..benchmark.statistics import Cell
 from .charts import Scale
-from .result import Result, StoredCell, StoredStanding
+from .result import Result
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
 FAR_OFF = 25.0
 """Change of σ (%) beyond which a disqualified policy is left out of the scales of pictures and colours."""
-R = TypeVar("R", StoredStanding, StoredCell)
+R = TypeVar("R", Standing, Cell)
 
 
 class Bar(NamedTuple):
@@ -72,7 +73,7 @@ class PageTable:
 def leaderboard(result: Result) -> PageTable:
     """Table of the policies that ran on every line, over all lines, speeds and seeds."""
     after = next_in_ranking(result.standings)
-    columns: list[Column[StoredStanding]] = [
+    columns: list[Column[Standing]] = [
         *_first_columns(result.standings, result.method_of),
         Column("CL (%)", lambda one: _figure(one.contact_loss, 2)),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
@@ -89,10 +90,10 @@ def leaderboard(result: Result) -> PageTable:
     return _table("All lines, speeds and seeds", columns, result.by_rank)
 
 
-def table_of_cells(cells: Sequence[StoredCell], caption: str) -> PageTable:
+def table_of_cells(cells: Sequence[Cell], caption: str) -> PageTable:
     """Table of all policies on one line at one speed."""
     figures = {name: _of_figure(name, decimals) for name, decimals in FIGURES.items()}
-    columns: list[Column[StoredCell]] = [
+    columns: list[Column[Cell]] = [
         *_first_columns(cells),
         *(figures.pop(name) for name in ("std", "contact_loss", "cost_function")),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
@@ -136,7 +137,7 @@ def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Pag
     )
 
 
-def _of_figure(name: str, decimals: int) -> Column[StoredCell]:
+def _of_figure(name: str, decimals: int) -> Column[Cell]:
     label = (LABELS | OWN_LABELS)[name]
     return Column(
         label.short_heading.removesuffix(" (-)"),
@@ -166,7 +167,7 @@ def _share(value: float | None) -> Entry:
     return Entry(f"{100 * value:.0f} %", _key(value))
 
 
-def _better(one: StoredStanding, other: str | None) -> Entry:
+def _better(one: Standing, other: str | None) -> Entry:
     share = one.better_than.get(other or "")
     return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
 
@@ -179,19 +180,19 @@ def _key(value: float) -> str:
     return f"{value:.9g}" if isfinite(value) else ""
 
 
-def _change(one: StoredStanding | StoredCell, scale: Scale) -> Entry:
+def _change(one: Standing | Cell, scale: Scale) -> Entry:
     if not isfinite(one.change):
         return Entry("–")
     low, high = one.interval or (one.change, one.change)
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
-    if isinstance(one, StoredStanding) and one.interval_for_lines is not None:
+    if isinstance(one, Standing) and one.interval_for_lines is not None:
         note += "; other lines {} to {}".format(*(signed(end, 1) for end in one.interval_for_lines))
     inside = scale.lowest <= low and high <= scale.highest
     bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
     return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
-def _scale(rows: Sequence[StoredStanding | StoredCell]) -> Scale:
+def _scale(rows: Sequence[Standing | Cell]) -> Scale:
     """Scale of the pictures of intervals; a disqualified policy that is far off does not stretch it."""
     ends = [
         end
@@ -218,8 +219,11 @@ def summary(result: Result) -> Table:
     the policy is better than the next one, with its interval, and in how many it moves the mean by more than
     1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
     """
-    lines = {place[:2] for place in result.places}
-    headings = ("policy", *(_heading(place, len(lines) > 1) for place in result.places), *OVERALL)
+    several = len({place[:2] for place in result.places}) > 1
+    of_places = (
+        f"{at.catenary}, {at.speed_kmh:g}" if several else f"{at.speed_kmh:g} km/h" for at in result.places
+    )
+    headings = ("policy", *of_places, *OVERALL)
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     after = next_in_ranking(result.standings)
     rows = []
@@ -235,7 +239,7 @@ def summary(result: Result) -> Table:
     return Table(title, headings, tuple(rows))
 
 
-def _overall(one: StoredStanding, after: str | None) -> tuple[str, ...]:
+def _overall(one: Standing, after: str | None) -> tuple[str, ...]:
     """The columns ``OVERALL`` of a policy; after: the policy ranked next."""
     moved = f"{one.moved} of {one.passes}"
     losses = number(one.contact_loss, 2), number(one.cost_change, 0)
@@ -254,11 +258,7 @@ def _overall(one: StoredStanding, after: str | None) -> tuple[str, ...]:
     )
 
 
-def _heading(place: LineAtSpeed, several_lines: bool) -> str:
-    return f"{place.catenary}, {place.speed_kmh:g}" if several_lines else f"{place.speed_kmh:g} km/h"
-
-
-def _text(cells: Sequence[StoredCell]) -> str:
+def _text(cells: Sequence[Cell]) -> str:
     """Change in a policy's cell, or the mean over the cells of a method's trainings."""
     change, moved = mean(cell.change for cell in cells), mean(cell.mean_change for cell in cells)
     if isnan(change):

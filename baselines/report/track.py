@@ -1,24 +1,24 @@
-"""A sentence or two on what a policy is, from its name in a result; no code of a user's is run."""
+"""What the page shows of one track; no code of a user's is run for it."""
 
 from __future__ import annotations
 
 import inspect
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
 
 from panto_env.base import plugins
 from panto_env.base.errors import InputError
 from panto_env.policies import maker_of
 
-from ..benchmark.settings import BLIND, REFERENCE, TAPE, control_of, policy_of
-from ..benchmark.statistics import LineAtSpeed, Share
+from ..benchmark.actions import Trace
+from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
+from ..benchmark.statistics import Cell
+from ..line import as_toml
 from .charts import Chart, Line, Point, curves, dots
-from .result import Result, StoredCell, Trace
+from .result import Result
 from .tables import FAR_OFF, PageTable, leaderboard, signed, table_of_cells
 
 CONTROLS = {
@@ -44,37 +44,6 @@ def what_is(policy: str) -> str:
     if Path(policy).suffix[1:] in plugins.installed(plugins.LOADERS):
         return "A model from a file, which is not read for this page."
     return "It is not installed where this page was made."
-
-
-def as_toml(settings: Mapping[str, Any]) -> str:
-    """Text of a file for `panto benchmark --config`, from plain data; settings that are null are left out."""
-    plain = {key: value for key, value in settings.items() if not _is_tables(value)}
-    tables = {key: value for key, value in settings.items() if _is_tables(value)}
-    parts = ["\n".join(_lines(plain))]
-    parts += ["\n".join([f"[[{_key(key)}]]", *_lines(row)]) for key, rows in tables.items() for row in rows]
-    return "\n\n".join(parts) + "\n"
-
-
-def _lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
-
-
-def _is_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(_lines(value))} }}" if value else "{}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML alone escapes it
-    return json.dumps(value)
-
-
-def _key(key: str) -> str:
-    return key if key.isidentifier() and key.isascii() else _value(key)
 
 
 STRONGEST = 0.6
@@ -105,7 +74,6 @@ class Shade:
 class Section:
     """Table and charts of one line at one speed."""
 
-    place: LineAtSpeed
     title: str
     table: PageTable
     charts: list[Chart]
@@ -118,8 +86,8 @@ class About:
     name: str
     text: str
     rank: int | None
-    worst: StoredCell
-    disqualified: list[StoredCell]
+    worst: Cell
+    disqualified: list[Cell]
     everywhere: bool
     method: str  # of which it is a training, or ""
 
@@ -186,7 +154,7 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     }
 
 
-def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
+def _shade(cell: Cell | None, maximum: float) -> Shade | None:
     if cell is None:
         return None
     strength = cell.change / maximum if isfinite(cell.change) else 0.0
@@ -196,14 +164,14 @@ def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
     """Share of passes in which the row's policy has a smaller change of σ than the column's."""
     compared = [one for one in result.standings if one.policy not in result.method_of]
-    table: dict[str, list[Shade | None]] = {}
-    for one in compared:
-        table[one.policy] = [_shade_of_share(one.better_than.get(other.policy)) for other in compared]
-    return table
-
-
-def _shade_of_share(one: Share | None) -> Shade | None:
-    return None if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+    shares = {one.policy: [one.better_than.get(other.policy) for other in compared] for one in compared}
+    return {
+        policy: [
+            one if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+            for one in each
+        ]
+        for policy, each in shares.items()
+    }
 
 
 def _section(result: Result, place: LineAtSpeed) -> Section:
@@ -223,7 +191,6 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
     over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
     traces = [trace for trace in result.traces if trace.place == place]
     return Section(
-        place=place,
         title=title,
         table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
         charts=[

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import __version__, read_checked, write_checked
@@ -21,6 +20,7 @@ from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
 from panto_env.terminal import number
 
+from ..line import as_toml
 from ..policies.lanes_law import GainFile, Tuning, load_gains
 from .tune import PASSES, SEEDS, SPEEDS_KMH, Tuned, tunable, tune_at
 
@@ -65,14 +65,8 @@ def tune(
             progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
             take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
         )
-        return [_read(path) for path in parts.values()]
-
-
-def _read(path: Path) -> Tuned:
-    values: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in read_checked(path).items()
-    }
-    return Tuned(**values)
+        found = map(read_checked, parts.values())
+        return [Tuned(**each | {name: tuple(each[name]) for name in ("gains", "history")}) for each in found]
 
 
 DIGITS = 5
@@ -138,36 +132,15 @@ def store(path: Path, policy: str, tuning: Tuning) -> None:
     """Store a tuning in a file of gains; it replaces one for the same case, see ``_case``."""
     old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
+    file = GainFile(policy=policy, tunings=(*kept, tuning)).model_dump(mode="json")
     with write_whole(path) as temporary:
-        temporary.write_text(as_toml(GainFile(policy=policy, tunings=(*kept, tuning))), encoding="utf-8")
-
-
-def as_toml(file: GainFile) -> str:
-    """Text of a file of gains, as TOML."""
-    lines = ["# Gains of a policy, written by `panto tune`.", f"policy = {_value(file.policy)}"]
-    for tuning in file.tunings:
-        lines += ["", "[[tunings]]"]
-        for key, value in tuning:
-            if value is None:
-                continue
-            lines.append(f"{key} = {_value(value)}")
-    return "\n".join(lines) + "\n"
+        head = "# Gains of a policy, written by `panto tune`.\n"
+        temporary.write_text(head + as_toml(file), encoding="utf-8")
 
 
 def _case(tuning: Tuning) -> tuple[str | float, ...]:
     line, pantograph = tuning.catenary_sha256, tuning.pantograph_sha256
     return line or tuning.catenary, pantograph or tuning.pantograph, tuning.place, tuning.washout
-
-
-def _value(value: Any) -> str:
-    """A value as TOML, each row of gains on its own line. Strings and numbers are written as in JSON."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, tuple | list) and value and isinstance(value[0], tuple | list):
-        return "[\n" + "".join(f"    {_value(each)},\n" for each in value) + "]"
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 def table(policy: str, tuned: Sequence[Tuned]) -> Table:
