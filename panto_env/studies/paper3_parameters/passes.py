@@ -83,8 +83,8 @@ class Pass:
     def numbers(self) -> dict[str, Any]:
         """Maximum, minimum, mean, σ of force (N) and displacement (mm), and EN 50367's limits."""
         return {
-            "contact_force_n": _statistics(self.force),
-            "displacement_mm": _statistics(1e3 * self.displacement),
+            "contact_force_n": statistics(self.force),
+            "displacement_mm": statistics(1e3 * self.displacement),
             "nominal_force_n": self.nominal_force,
             "contact_lost_percent": contact_loss(self.force),
             "low_passed": self.figures.as_dict(),
@@ -151,13 +151,10 @@ def largest_static_force(one_pass: Pass) -> float:
     return limit / float(one_pass.force.max() / one_pass.nominal_force) - aerodynamic
 
 
-def _statistics(values: Array) -> dict[str, float]:
-    return {
-        "max": float(values.max()),
-        "min": float(values.min()),
-        "mean": float(values.mean()),
-        "sigma": float(values.std()),
-    }
+def statistics(values: Array) -> dict[str, float]:
+    """Extremes, mean and standard deviation."""
+    found = {"max": values.max(), "min": values.min(), "mean": values.mean(), "sigma": values.std()}
+    return {name: float(value) for name, value in found.items()}
 
 
 RUN_TIME = 12.0
