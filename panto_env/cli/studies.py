@@ -68,7 +68,7 @@ def validate(
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
     if plot is not None:
         from ..analysis.plots import save
-        from ..studies.en50318.plots import plot_reference
+        from ..studies.en50318.reference import plot_reference
     with progress_console.status("validating") as status:
         validation = study.run(
             status.update,

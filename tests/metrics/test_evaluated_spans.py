@@ -10,7 +10,7 @@ from panto_env.analysis.options import parse_spans
 from panto_env.analysis.sweep import sweep
 from panto_env.metrics.figures import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
 from panto_env.plant.alignment import Alignment
-from panto_env.studies.en50318 import start
+from panto_env.studies.en50318 import lines as start
 
 from ..command import panto
 

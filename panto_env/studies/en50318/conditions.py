@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...analysis.simulation import simulate
 from ...plant.line_condition import LINE_CONDITIONS
-from .wear import Spread
+from .wear import Spread, five_figures
 
 CASES = (
     ("en50318-2002", "en50318-2002", (200.0, 250.0, 300.0)),
@@ -42,13 +43,11 @@ def check_conditions(catenary: str, pantograph: str, speed_kmh: float) -> list[C
     """Passive runs in every named condition; a new line has no seeds."""
     checks: list[ConditionCheck] = []
     for name, condition in LINE_CONDITIONS.items():
-        rows = []
-        for seed in range(SEEDS if condition.random else 1):
-            run = simulate(
-                catenary, pantograph, speed_kmh, seed=seed, line_condition=condition, record_droppers=False
-            )
-            figures, raw = run.summary(), run.contact_force[run.inside()]
-            rows.append((figures.std, figures.max, figures.min, raw.max(), figures.contact_loss))
+        settings: dict[str, Any] = {"line_condition": condition, "record_droppers": False}
+        rows = [
+            five_figures(simulate(catenary, pantograph, speed_kmh, seed=seed, **settings))
+            for seed in range(SEEDS if condition.random else 1)
+        ]
         means, deviations = np.mean(rows, axis=0).tolist(), np.std(rows, axis=0).tolist()
         new = checks[0].std[0] if checks else means[0]
         worse, change = sum(row[0] > new for row in rows), 100 * (means[0] / new - 1)

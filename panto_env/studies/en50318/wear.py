@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...analysis.simulation import simulate
 from ...base.arrays import from_kmh
+from ...metrics.trajectory import Trajectory
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
 from .convergence import in_use
@@ -50,28 +52,27 @@ class WearCheck:
     contact_loss: Spread  # %
 
 
+def five_figures(run: Trajectory, spans: tuple[int, int] | None = None) -> tuple[float, ...]:
+    """Standard deviation, maximum, minimum, raw maximum and contact loss of a run."""
+    figures, raw = run.summary(spans), run.contact_force[run.inside(spans)]
+    return figures.std, figures.max, figures.min, raw.max(), figures.contact_loss
+
+
 def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
     """Runs of the reference model over SPANS at SPEED_KMH, one line per seed."""
-    used, rows = in_use(numerics, SPEED_KMH, condition), []
-    for seed in range(SEEDS):
-        run = simulate(
-            REFERENCE_MODEL,
-            REFERENCE_MODEL,
-            SPEED_KMH,
-            seed=seed,
-            line_condition=condition,
-            spans=LINE_SPANS,
-            record_droppers=False,
-            **used.model_dump(),
-        )
-        figures, raw = run.summary(SPANS), run.contact_force[run.inside(SPANS)]
-        rows.append((figures.std, figures.max, figures.min, raw.max(), figures.contact_loss))
-    means, deviations = np.mean(rows, axis=0).tolist(), np.std(rows, axis=0, ddof=1).tolist()
+    used = in_use(numerics, SPEED_KMH, condition)
+    settings: dict[str, Any] = {"line_condition": condition, "spans": LINE_SPANS, "record_droppers": False}
+    runs = [
+        simulate(REFERENCE_MODEL, REFERENCE_MODEL, SPEED_KMH, seed=seed, **settings, **used.model_dump())
+        for seed in range(SEEDS)
+    ]
+    rows = [five_figures(run, SPANS) for run in runs]
+    time_step = runs[0].time_step
     return WearCheck(
         condition.wear_wavelength,
         condition.wear_depth,
         used.spacing,
-        run.time_step,
-        condition.wear_wavelength / (from_kmh(SPEED_KMH) * run.time_step),
-        *zip(means, deviations, strict=True),
+        time_step,
+        condition.wear_wavelength / (from_kmh(SPEED_KMH) * time_step),
+        *zip(np.mean(rows, axis=0).tolist(), np.std(rows, axis=0, ddof=1).tolist(), strict=True),
     )
