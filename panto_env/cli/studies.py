@@ -210,7 +210,7 @@ def speed(
 
     if plot is not None:
         from ..analysis.plots import save
-        from ..studies.throughput.plots import plot_speed
+        from ..studies.throughput.tables import plot_speed
     if results:
         found = [study.read(path) for path in results]
     else:
