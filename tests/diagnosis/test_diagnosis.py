@@ -43,7 +43,7 @@ from panto_env.diagnosis.training import (
     save,
 )
 from panto_env.plant.alignment import Alignment
-from panto_env.studies.paper2.diagnosis_tables import within_interval
+from panto_env.studies.paper2.diagnosis import within_interval
 from panto_env.terminal import console
 
 SPAN, PER_SPAN, SPANS = 60.0, 120, 40

@@ -1,12 +1,11 @@
 """Paper 2's study: every figure of its comparisons, and the page that shows its tables."""
 
-from __future__ import annotations
-
 import pytest
 
-from panto_env.studies import Outcome, find_study, write
+from panto_env.studies import write
 
 from ..pages import check_page, statements_table, tables_of
+from . import check, made
 
 PAGE, STATEMENTS = "paper2.md", "The paper's words beside ours"
 EXPECTED = {  # ours, and how far it may move before somebody must look
@@ -52,23 +51,15 @@ pytestmark = pytest.mark.study
 
 
 @pytest.fixture(scope="module")
-def outcome() -> Outcome:
-    told: list[float] = []
-    found = find_study("paper2")(lambda what, share: told.append(share))
-    assert told == sorted(told)
-    assert 0 <= told[0] < told[-1] < 1
-    return found
+def outcome():
+    return made("paper2")
 
 
-def test_every_comparison_is_what_the_documents_say(outcome: Outcome) -> None:
-    ours = {item.quantity: item.ours for item in outcome.comparisons}
-    assert set(ours) == set(EXPECTED)
-    for quantity, (value, tolerance) in EXPECTED.items():
-        assert ours[quantity] == pytest.approx(value, abs=tolerance), quantity
-    assert {item.quantity for item in outcome.comparisons if not item.agrees} == DIFFER
+def test_every_comparison_is_what_the_documents_say(outcome):
+    check(outcome, EXPECTED, DIFFER)
 
 
-def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
+def test_the_page_shows_what_the_study_prints(outcome):
     printed = {each.title: each for each in outcome.tables}
     headings = ("statement", "unit", "ours", "the paper", "agrees")
     printed[STATEMENTS] = statements_table(STATEMENTS, headings, outcome)
@@ -78,7 +69,7 @@ def test_the_page_shows_what_the_study_prints(outcome: Outcome) -> None:
     check_page(PAGE, printed)
 
 
-def test_figures_and_numbers_are_written(outcome: Outcome, tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_figures_and_numbers_are_written(outcome, tmp_path):
     names = {path.name for path in write(outcome, tmp_path)}
     figures = {
         "fig05-08-rig",

@@ -13,6 +13,8 @@ from panto_env.studies.paper2.estimation import (
     OBSERVATIONS,
     cases,
     comparisons,
+    delay_plot,
+    figure_11_12,
     known_pantograph,
     noise_table,
     over_noise,
@@ -22,7 +24,6 @@ from panto_env.studies.paper2.estimation import (
     run,
     ways_table,
 )
-from panto_env.studies.paper2.estimator import delay_plot, figure_11_12
 
 BOTH, ONE = OBSERVATIONS
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.studies import Outcome, find_study, write
+from panto_env.studies import Outcome, write
 from panto_env.studies.spacing.passes import (
     CASES,
     INTERVAL,
@@ -24,10 +24,11 @@ from panto_env.studies.spacing.passes import (
     frequencies,
     strongest,
     wake,
-)
+)  # fmt: skip
 from panto_env.studies.spacing.study import distances_table, extremes_table, verdict
 
 from ..pages import check_page
+from . import made
 
 DISTANCES = np.arange(35.0, 400.0, 2.5)
 SPEED = 250.0
@@ -136,7 +137,7 @@ DIFFER = {"correlation of the second's σ with the wire's upward velocity when i
 
 @pytest.mark.study
 def test_the_wire_s_own_swing_says_which_distances_are_bad():
-    outcome = find_study("spacing")(lambda what, share: None)
+    outcome = made("spacing")
     check_page("train-spacing.md", {table.title: table for table in outcome.tables})
     mean = outcome.numbers["mean_correlation"]
     assert mean["measured"] > 0.75
