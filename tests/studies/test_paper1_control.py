@@ -28,7 +28,7 @@ from panto_env.studies.paper1_control.passes import (
 )  # fmt: skip
 
 from ..pages import check_page, same_row, statements_table, tables_of
-from . import check, made, table
+from . import made, table
 
 PAGE = "paper1-control.md"
 CLAIMS = "The paper's claims beside ours"
@@ -99,58 +99,9 @@ def test_the_passive_pantograph_has_the_mean_asked_for_and_the_same_nominal_forc
     assert result.mean_deviation > 54 - 48.0  # CF counts from 54 N, not from the larger static force
 
 
-EXPECTED = {  # ours, and how far it may move before somebody must look
-    "CL without control, 400 km/h": (5.46, 0.1),
-    "CL with FB+FF, gain 1.75, 300 km/h": (0.0, 0.0),
-    "CL with FB+FF, gain 1.75, 350 km/h": (0.0, 0.0),
-    "CL with FB+FF, gain 1.75, 400 km/h": (0.0, 0.0),
-    "CL with FB+FF, gain 1, 300 km/h": (1.50, 0.1),
-    "CL with FB+FF, gain 1, 350 km/h": (0.55, 0.1),
-    "CL with FB+FF, gain 1, 400 km/h": (0.0, 0.0),
-    "maximum CL with FB+FF, gain 1.75, 100-400 km/h": (0.0, 0.0),
-    # Not converged, and no grid settles it: 33 to 38 % by grid, step and window.
-    "maximum CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator": (35.5, 4.0),
-    "maximum CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator": (5.14, 0.1),
-    "raw σ with over without control, 300 km/h": (1.133, 0.01),
-    "raw σ with over without control, 350 km/h": (0.813, 0.01),
-    "raw σ with over without control, 400 km/h": (0.775, 0.01),
-    "CF with over without control, 300 km/h": (1.080, 0.01),
-    "CF with over without control, 350 km/h": (0.765, 0.01),
-    "CF with over without control, 400 km/h": (0.731, 0.01),
-    "CF with over without control, maximum of 100-400 km/h": (1.080, 0.01),
-    "θ of the minimum CF, 100 km/h": (60, 1),  # in steps of 15
-    "θ of the minimum CF, 150 km/h": (30, 1),
-    "θ of the minimum CF, 200 km/h": (-30, 1),
-    "θ of the minimum CF, 250 km/h": (-105, 1),
-    "θ of the minimum CF, 300 km/h": (-105, 1),
-    "θ of the minimum CF, 350 km/h": (-45, 1),
-    "θ of the minimum CF, 400 km/h": (45, 15),  # the minimum is flat there
-}
-DIFFER = {
-    "CL with FB+FF, gain 1, 300 km/h",
-    "CL with FB+FF, gain 1, 350 km/h",
-    "maximum CL with FB+FF, gain 1.75, 300-400 km/h, realistic actuator",
-    "maximum CL with FB+FF, best gain 0.5, 300-400 km/h, realistic actuator",
-    "raw σ with over without control, 300 km/h",
-    "CF with over without control, 300 km/h",
-    "CF with over without control, maximum of 100-400 km/h",
-    "θ of the minimum CF, 100 km/h",
-    "θ of the minimum CF, 200 km/h",
-    "θ of the minimum CF, 250 km/h",
-    "θ of the minimum CF, 300 km/h",
-    "θ of the minimum CF, 350 km/h",
-}
-
-
 @pytest.fixture(scope="module")
 def outcome():
     return made("paper1-control")
-
-
-@pytest.mark.study
-def test_every_comparison_is_what_the_documents_say(outcome):
-    check(outcome, EXPECTED, DIFFER)
-    assert all(item.note for item in outcome.comparisons if not item.agrees)
 
 
 @pytest.mark.study
@@ -165,44 +116,27 @@ def test_gains_are_chosen_by_the_rules_that_their_comments_give(outcome):
 
 
 @pytest.mark.study
-def test_two_fifths_of_the_loss_at_400_kmh_are_saved_by_pressing_harder_alone(outcome):
-    found = table(outcome, "Control and its parts")
-    rows = {row[0]: row for row in found.rows if row[1] == "400"}
-    loss, mean = found.headings.index("CL (%)"), found.headings.index("F_m (N)")
-    passive, active = rows["passive, pressed to that mean"], rows[f"FB+FF, gain {GAIN}"]
-    assert passive[mean] == active[mean]
-    assert float(passive[loss]) == pytest.approx(3.16, abs=0.1)
-
-
-def _losses_on_both_grids(outcome):
+def test_contact_is_kept_where_the_page_says_so_and_lost_at_400_kmh_on_the_other_line(outcome):
     found = table(outcome, "Time step and grid")
     usual, fine = (k for k, heading in enumerate(found.headings) if heading.startswith("CL"))
-    return {(row[0], row[1]): (float(row[usual]), float(row[fine])) for row in found.rows}
-
-
-@pytest.mark.study
-def test_frame_damping_as_shipped_loses_contact_through_the_realistic_actuator(outcome):
-    """At 400 km/h alone, and on both grids: a coarser grid with delays of whole steps found no loss."""
-    cells = _losses_on_both_grids(outcome)
-    lost = {"frame damping alone": 1.18, "FB + frame damping": 0.57, SHIPPED: 0.35}
-    for name, loss in lost.items():
-        assert cells[f"{LINE}, realistic: {name}", "400"] == pytest.approx((loss, loss), abs=0.06), name
-        for speed in ("300", "350"):
-            assert cells[f"{LINE}, realistic: {name}", speed] == (0.0, 0.0), name
-
-
-@pytest.mark.study
-def test_feedback_with_frame_damping_stands_delay_but_not_every_lag(outcome):
-    """The largest loss at 300, 350 and 400 km/h: ideal, delay of 5 ms, lag of 15 ms, realistic."""
-    rows = {
-        str(row[0]): [float(cell) for cell in row[1:]]
-        for row in table(outcome, "of 300, 350 and 400 km/h").rows
-    }
-    assert rows["FB + frame damping"] == pytest.approx([0, 0, 0.11, 0.55], abs=0.05)
-    assert rows["FB + frame damping"][:2] == [0, 0]
-    assert rows[SHIPPED] == pytest.approx([0, 0, 0, 0.31], abs=0.05)
-    assert rows[SHIPPED][:3] == [0, 0, 0]
-    assert rows[STRONG] == [0, 0, 0, 0]
+    lost = {(row[0], row[1]): (float(row[usual]), float(row[fine])) for row in found.rows}
+    for name in ("frame damping alone", "FB + frame damping", SHIPPED, STRONG):
+        assert (
+            lost[f"{LINE}, realistic: {name}", "300"] == lost[f"{LINE}, realistic: {name}", "350"] == (0, 0)
+        )
+    for name, speed in (
+        ("ideal: passive", "300"),
+        (f"ideal: FB+FF, gain {GAIN}", "350"),
+        (f"realistic: {STRONG}", "300"),
+        (f"realistic: {STRONG}", "350"),
+    ):
+        assert lost[f"{OTHER_LINE}, {name}", speed] == (0, 0)
+    other = [each for (name, speed), each in lost.items() if name.startswith(OTHER_LINE) and speed == "400"]
+    assert min(map(min, other)) > 15  # whatever the control
+    worst = {row[0]: [float(cell) for cell in row[1:]] for row in table(outcome, "of 300, 350 and 400").rows}
+    assert worst["FB + frame damping"][:2] == [0, 0]  # ideal, delay of 5 ms
+    assert worst[SHIPPED][:3] == [0, 0, 0]  # lag of 15 ms
+    assert worst[STRONG] == [0, 0, 0, 0]  # realistic
 
 
 @pytest.mark.study
@@ -216,28 +150,6 @@ def test_a_lower_gain_with_twice_the_damping_keeps_contact_at_all_speeds(outcome
     column = over_speed.headings.index(f"{STRONG}, realistic actuator")
     assert len(over_speed.rows) == 2 * len(SPEEDS)
     assert {row[column] for row in over_speed.rows} == {"0.00"}
-
-
-@pytest.mark.study
-def test_the_other_line_is_lost_at_400_kmh(outcome):
-    found = table(outcome, "The same on")
-    loss = found.headings.index("CL (%)")
-    cells = {(row[0], row[1]): float(row[loss]) for row in found.rows}
-    active = f"FB+FF, gain {GAIN}"
-    assert (cells["passive", "350"], cells[active, "350"]) == (pytest.approx(2.60, abs=0.1), 0.0)
-    assert cells["passive", "400"] == pytest.approx(28.7, abs=0.5)
-    assert cells[active, "400"] == pytest.approx(17.1, abs=0.5)
-    assert min(loss for (_, speed), loss in cells.items() if speed == "400") > 15  # whatever the control
-
-
-@pytest.mark.study
-def test_frame_damping_as_shipped_does_harm_on_the_other_line(outcome):
-    """At 300 km/h through the realistic actuator, where nothing is lost without control, on both grids."""
-    cells = _losses_on_both_grids(outcome)
-    assert cells[f"{OTHER_LINE}, ideal: passive", "300"] == (0.0, 0.0)
-    assert cells[f"{OTHER_LINE}, realistic: {SHIPPED}", "300"] == pytest.approx((6.04, 6.04), abs=0.1)
-    for speed in ("300", "350"):
-        assert cells[f"{OTHER_LINE}, realistic: {STRONG}", speed] == (0.0, 0.0)
 
 
 @pytest.mark.study
@@ -283,7 +195,8 @@ def test_a_row_of_the_page_is_known_by_every_cell():
 
 @pytest.mark.study
 def test_the_page_shows_what_the_study_prints(outcome):
-    """Each table of the page with a title above it, cell by cell."""
+    """Each table of the page with a title above it, cell by cell; all claims among them."""
+    assert all(item.note for item in outcome.comparisons if not item.agrees)
     printed = {each.title: each for each in outcome.tables}
     printed[CLAIMS] = statements_table(CLAIMS, ("claim", "unit", "ours", "the paper", "agrees"), outcome)
     shown = tables_of(PAGE)
