@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import save
 from ..base.checksums import write_checked
@@ -69,21 +69,14 @@ class Outcome:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: nan becomes None."""
-        comparisons = [comparison.as_dict() for comparison in self.comparisons]
-        said = {"verdict": self.verdict} if self.verdict else {}
-        table: dict[str, Any] = finite(
-            {"title": self.title, **said, "comparisons": comparisons, **self.numbers}
-        )
+        comparisons = {"comparisons": [comparison.as_dict() for comparison in self.comparisons]}
+        verdict = {"verdict": self.verdict} if self.verdict else {}
+        table: dict[str, Any] = finite({"title": self.title} | verdict | comparisons | dict(self.numbers))
         return table
 
 
-class Study(Protocol):
-    """A study of one part of a paper."""
-
-    def __call__(self, report: Report) -> Outcome:
-        """Run it, on all cores where it takes long."""
-
-
+Study = Callable[[Report], Outcome]
+"""A study of one part of a paper: run it, on all cores where it takes long."""
 Cell = str | Callable[[Any], str | float]
 """Of an entry: a format such as "{.std:.2f}", or a function."""
 Columns = Sequence[tuple[str, Cell]]

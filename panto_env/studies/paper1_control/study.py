@@ -275,7 +275,7 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
     rows = []
     for (gain, reading, fine), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
         curve = cost_over_angle(results, speed, gain, reading, fine)
-        costs = (curve.minimum, curve.at_paper, max(curve.cost), curve.without)
+        costs = (min(curve.cost), curve.at_paper, max(curve.cost), curve.without)
         rows.append(
             (
                 f"{reading}, gain {gain:g}, {_numerics(fine)}",
@@ -369,7 +369,7 @@ def phase_angle(results: Results) -> Figure:
             curve = cost_over_angle(results, speed, GAIN, reading)
             colour = series_colour(k)
             axis.plot(np.degrees(THETAS), curve.cost, color=colour, label=f"{speed} km/h")
-            axis.plot(math.degrees(curve.best), curve.minimum, "o", color=colour)
+            axis.plot(math.degrees(curve.best), min(curve.cost), "o", color=colour)
         axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
     figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
