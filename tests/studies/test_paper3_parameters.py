@@ -75,9 +75,7 @@ def outcome():
 def test_every_comparison_is_pinned(outcome):
     assert {each.quantity: each.ours for each in outcome.comparisons} == pytest.approx(OURS, rel=0.01)
     assert {each.quantity for each in outcome.comparisons if not each.agrees} == DIFFER
-
-
-def test_same_statements_hold_with_a_contact_that_can_only_push(outcome):
+    # The same hold with a contact that can only push.
     pushing = outcome.numbers["comparisons_can_only_push"]
     assert {each["quantity"] for each in pushing if not each["agrees"]} == DIFFER
     assert {each["quantity"] for each in pushing} == set(OURS)
