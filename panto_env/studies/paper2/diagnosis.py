@@ -152,8 +152,16 @@ def within_interval(place: float, defect: float, droppers: Sequence[float] | np.
     return bool(low - 1e-6 <= place <= high + 1e-6)
 
 
-def broken_only(track: Track, healthy: Sequence[Trajectory]) -> list[Case]:
-    """Broken droppers and controls on one track, held against these healthy passes."""
+def broken_only(count: int, scatter: float | None, track: Track) -> list[Case]:
+    """Broken droppers and controls on one track, held against so many healthy passes over the same line.
+
+    scatter: of droppers (m), where they are over other lines alike instead.
+    """
+    if scatter is None:
+        healthy = [drive(track, k) for k in range(count)]
+    else:
+        track = replace(track, scatter=scatter)
+        healthy = [drive(replace(track, seed=track.seed + 1000 * (k + 1)), 0) for k in range(count)]
     random = np.random.default_rng([track.seed, 1])
     broken = [each for each in every_defect(track, random, BROKEN_EACH) if each.kind == BROKEN]
     return judge_defects(track, [*broken, *[None] * CONTROLS], (1,), (FALSE_ALARMS,), healthy)
@@ -320,17 +328,6 @@ def tracks(seeds: Sequence[int] = SEEDS, lines: Sequence[str] = LINES) -> list[T
     ]
 
 
-def with_fewer_healthy(count: int, track: Track) -> list[Case]:
-    """Broken droppers held against so many healthy passes over the same line."""
-    return broken_only(track, [drive(track, k) for k in range(count)])
-
-
-def against_other_lines(scatter: float, track: Track) -> list[Case]:
-    """Broken droppers held against healthy passes over other lines alike, whose droppers scatter (m)."""
-    own = replace(track, scatter=scatter)
-    return broken_only(own, [drive(replace(own, seed=own.seed + 1000 * (k + 1)), 0) for k in range(HEALTHY)])
-
-
 def rate_rows(cases: Sequence[Case]) -> list[dict[str, float]]:
     """Share of broken droppers located, and false alarms measured, for each threshold."""
     rows = []
@@ -346,14 +343,13 @@ def rate_rows(cases: Sequence[Case]) -> list[dict[str, float]]:
 def reference_table(progress: Progress | None = None) -> Table:
     """Broken droppers by number of healthy passes over the same line, or over other lines instead."""
     here = tracks(REFERENCE_SEEDS, LINES[:1])
-    references = {f"{count} over the same line": partial(with_fewer_healthy, count) for count in COUNTS}
-    references |= {
-        f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms": partial(
-            against_other_lines, scatter
-        )
-        for scatter in SCATTERS
+    references: dict[str, tuple[int, float | None]] = {
+        f"{count} over the same line": (count, None) for count in COUNTS
     }
-    jobs = [partial(job, track) for job in references.values() for track in here]
+    for scatter in SCATTERS:
+        words = f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms"
+        references[words] = HEALTHY, scatter
+    jobs = [partial(broken_only, *how, track) for how in references.values() for track in here]
     found = in_processes(jobs, progress=progress)
     rows = []
     for k, name in enumerate(references):
@@ -397,8 +393,8 @@ def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
 def example() -> Figure:
     """Picture of a line with a broken dropper, a hard spot and a raised support, each some spans apart."""
     random = np.random.default_rng(EXAMPLE.seed)
-    chosen = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
-    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in chosen)
+    three = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
+    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in three)
     healthy = [drive(EXAMPLE, k) for k in range(HEALTHY)]
     found = diagnose([drive(EXAMPLE, HEALTHY, defects)], healthy)
     figure = plot_diagnosis(
