@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +94,7 @@ def run(report: Report) -> Outcome:
     report("plots", 0.95)
     return Outcome(
         title="Paper 1, active control (section 5, Figs 13 to 18)",
-        comparisons=(*_losses(results), *_calm(results), *_angles(results)),
+        comparisons=tuple(_comparisons(results)),
         tables=tuple(_tables(results, at_same_mean)),
         plots={
             "fig13-phase-angle": phase_angle(results),
@@ -116,52 +116,36 @@ def _plain(result: Result) -> dict[str, Any]:
     return dataclasses.asdict(result.case) | result.figures.as_dict() | others
 
 
-def _losses(results: Results) -> list[Comparison]:
+def _comparisons(results: Results) -> Iterator[Comparison]:
     def loss(speed: int, policy: str) -> float:
         return results[Case(speed, policy)].figures.contact_loss
 
-    compared = [said("control-passive", loss(400, "passive"))]
-    compared += [
-        said("control-loss", loss(speed, control(gain)), gain=gain, speed=speed, note=note)
-        for gain, note in ((GAIN, CALIBRATED), (DEFAULT_GAIN, UNCALIBRATED))
-        for speed in SHOWN_SPEEDS
-    ]
+    yield said("control-passive", loss(400, "passive"))
+    for gain, note in ((GAIN, CALIBRATED), (DEFAULT_GAIN, UNCALIBRATED)):
+        for speed in SHOWN_SPEEDS:
+            yield said("control-loss", loss(speed, control(gain)), gain=gain, speed=speed, note=note)
     most = max(loss(speed, control()) for speed in SPEEDS)
-    compared.append(said("control-most", most, gain=GAIN, note=CALIBRATED))
-    worst = {gain: _worst(results, control(gain), "realistic") for gain in GAINS}
-    best = min(worst, key=worst.__getitem__)
-    for gains, ours in ((f"gain {GAIN}", worst[GAIN]), (f"best gain {best:g}", worst[best])):
-        compared.append(said("control-real", ours, gains=gains))
-    return compared
-
-
-def _worst(results: Results, policy: str, actuator: str) -> float:
-    """The maximum contact loss (%) of ``SHOWN_SPEEDS``."""
-    return max(results[sampled(speed, policy, actuator)].figures.contact_loss for speed in SHOWN_SPEEDS)
-
-
-def _calm(results: Results) -> list[Comparison]:
-    both = {speed: (results[Case(speed, control())], results[Case(speed)]) for speed in SPEEDS}
-    ratio = {
-        speed: active.mean_deviation / passive.mean_deviation for speed, (active, passive) in both.items()
+    yield said("control-most", most, gain=GAIN, note=CALIBRATED)
+    worst = {
+        gain: max(
+            results[sampled(speed, control(gain), "realistic")].figures.contact_loss for speed in SHOWN_SPEEDS
+        )
+        for gain in GAINS
     }
-    notes = {speed: STIFF if speed == 300 else "" for speed in SHOWN_SPEEDS}
-    raw = {speed: active.raw_std / passive.raw_std for speed, (active, passive) in both.items()}
-    worst = max(ratio, key=ratio.__getitem__)
-    return [
-        *(said("control-raw", raw[speed], speed=speed, note=note) for speed, note in notes.items()),
-        *(said("control-cost", ratio[speed], speed=speed, note=note) for speed, note in notes.items()),
-        said("control-costs", ratio[worst], speed=worst),
-    ]
-
-
-def _angles(results: Results) -> list[Comparison]:
+    best = min(worst, key=worst.__getitem__)
+    for gain, gains in ((GAIN, f"gain {GAIN}"), (best, f"best gain {best:g}")):
+        yield said("control-real", worst[gain], gains=gains)
+    for key, name in (("control-raw", "raw_std"), ("control-cost", "mean_deviation")):
+        both = {speed: (results[Case(speed, control())], results[Case(speed)]) for speed in SPEEDS}
+        ratio = {speed: getattr(on, name) / getattr(off, name) for speed, (on, off) in both.items()}
+        for speed in SHOWN_SPEEDS:
+            yield said(key, ratio[speed], speed=speed, note=STIFF if speed == 300 else "")
+    highest = max(ratio, key=ratio.__getitem__)
+    yield said("control-costs", ratio[highest], speed=highest)
     paper, low, high = map(math.degrees, (THETA, THETA - THETA_STEP, THETA + THETA_STEP))
-    best = {speed: cost_over_angle(results, speed, GAIN, SPAN).best for speed in ANGLE_SPEEDS}
-    return [
-        said("control-angle", math.degrees(theta), speed=speed, paper=paper, low=low, high=high)
-        for speed, theta in best.items()
-    ]
+    for speed in ANGLE_SPEEDS:
+        theta = math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best)
+        yield said("control-angle", theta, speed=speed, paper=paper, low=low, high=high)
 
 
 def _figure(name: str, decimals: int) -> tuple[str, Callable[[Result], str]]:

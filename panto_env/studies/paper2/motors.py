@@ -346,15 +346,15 @@ def outcome(report: Report) -> Outcome:
     report("one collector on a bench", 0.0)
     record = without_motors(BENCH_KMH).record
     bench = [bench_run(record, gain) for gain in (None, *BENCH_GAINS)]
-    tables, numbers, comparisons = [], {}, []
+    tables, numbers = [], {}
     for k, speed_kmh in enumerate(SPEEDS_KMH):
         report(f"motors at {speed_kmh:g} km/h", 0.1 + 0.45 * k)
         passive, at = without_motors(speed_kmh), f"{speed_kmh:g} km/h"
         at_watts = [at_power(speed_kmh, place, WATTS) for place in PLACES]
         at_newtons = [at_force_limit(speed_kmh, place, NEWTONS) for place in PLACES]
         gained = [motor_pass(speed_kmh, "head", HEAD_GAIN, passive.figures.mean)]
-        if speed_kmh == SPEEDS_KMH[0]:
-            comparisons = _statements(passive, at_watts[0], at_watts[1])
+        if k == 0:
+            comparisons = _statements(passive, at_watts[0], at_watts[1], bench[0], bench[2])
         numbers[at] = {"none": _plain(passive)}
         for title, words, passes in (
             (f"Motors at {at} that take {WATTS:g} W", f"{WATTS:g} W", at_watts),
@@ -366,32 +366,29 @@ def outcome(report: Report) -> Outcome:
     of_bench = [{name: getattr(one, name) for name in ("gain", "std", "bands", "power")} for one in bench]
     return Outcome(
         "Paper 2, section 4.3: motors in the head",
-        (*comparisons, *_bench_statements(bench[0], bench[2])),
+        comparisons,
         tuple(tables),
         {"fig14-15-bench": _plot(bench)},
         {"motors": numbers, "bench": of_bench},
     )
 
 
-def _statements(passive: MotorPass, frame: MotorPass, head: MotorPass) -> list[Comparison]:
-    """The paper's words on where actuators work, at equal power."""
+def _statements(
+    passive: MotorPass, frame: MotorPass, head: MotorPass, free: BenchRun, controlled: BenchRun
+) -> tuple[Comparison, ...]:
+    """The paper's words on where actuators work, at equal power, and on the bench."""
     on_frame, on_head = _changes(passive, frame), _changes(passive, head)
     names = {
         "at": f"at {passive.speed_kmh:g} km/h and {WATTS:g} W",
         "low": f"{BANDS[LOW][0]:g}-{BANDS[LOW][1]:g} Hz",
         "medium": f"{BANDS[MEDIUM[0]][0]:g}-{BANDS[MEDIUM[-1]][1]:g} Hz",
     }
-    return [
-        said("motors-frame-low", on_frame[LOW], **names),
-        said("motors-frame-medium", max(on_frame[k] for k in MEDIUM), **names),
-        said("motors-head-medium", max(on_head[k] for k in MEDIUM), **names),
-    ]
-
-
-def _bench_statements(free: BenchRun, controlled: BenchRun) -> tuple[Comparison, ...]:
     before, after = free.spectrum[1], controlled.spectrum[1]
     worst = float((after / np.maximum(before, 1e-9))[before > LARGE * before[1:].max()].max())
     return (
+        said("motors-frame-low", on_frame[LOW], **names),
+        said("motors-frame-medium", max(on_frame[k] for k in MEDIUM), **names),
+        said("motors-head-medium", max(on_head[k] for k in MEDIUM), **names),
         said("bench-std", controlled.std / free.std, gain=controlled.gain),
         said("bench-harmonic", worst, gain=controlled.gain),
     )
