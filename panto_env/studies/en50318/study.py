@@ -13,7 +13,7 @@ from ...metrics.figures import LABELS
 from ...metrics.trajectory import Trajectory
 from ...terminal import number
 from ..study import Cell, Columns, tabled
-from . import conditions, convergence, lines, reference, wear
+from . import conditions, convergence, lines, reference
 
 Report = Callable[[str], None]
 """Called with what is being run."""
@@ -140,12 +140,12 @@ EXTREMES: Columns = (
 )
 
 
-def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
+def wear_table(checks: Sequence[conditions.WearCheck]) -> Table:
     """Figures on worn lines over grid and time step."""
-    first, last = wear.SPANS
+    first, last = conditions.SPANS
     return tabled(
-        f"Worn line of EN 50318:2002 at {wear.SPEED_KMH:g} km/h, spans {first} to {last}; "
-        f"mean ± standard deviation over {wear.SEEDS} seeds",
+        f"Worn line of EN 50318:2002 at {conditions.SPEED_KMH:g} km/h, spans {first} to {last}; "
+        f"mean ± standard deviation over {conditions.SEEDS} seeds",
         (
             ("wave\n(m)", "{.wavelength:g}"),
             ("depth\n(mm)", lambda check: f"{1e3 * check.depth:g}"),
@@ -163,7 +163,7 @@ def wear_table(checks: Sequence[wear.WearCheck]) -> Table:
 def conditions_table(checks: Sequence[conditions.ConditionCheck]) -> Table:
     """Figures on lines in each named condition."""
     return tabled(
-        f"Passive runs in each condition; mean ± standard deviation over {conditions.SEEDS} seeds",
+        f"Passive runs in each condition; mean ± standard deviation over {conditions.LEVEL_SEEDS} seeds",
         (
             ("line", "{.catenary}"),
             ("pantograph", "{.pantograph}"),
@@ -274,9 +274,9 @@ PARTS = {
         (windows_table,),
     ),
     "wear": _Part(
-        lambda: product(wear.CONDITIONS, wear.DISCRETISATIONS),
+        lambda: product(conditions.CONDITIONS, conditions.DISCRETISATIONS),
         lambda case: f"{case[0]}, {case[1]}",
-        lambda case: [wear.check_wear(*case)],
+        lambda case: [conditions.check_wear(*case)],
         (wear_table,),
     ),
     "conditions": _Part(
