@@ -25,48 +25,23 @@ from ...base.plotting import (
 from ...base.table import Table
 from ...metrics.figures import LABELS
 from ..study import Columns, Comparison, Outcome, Report, panels, row, said, tabled
+from . import passes
 from .passes import (
-    ACTUATORS,
-    ANGLE_CONTROLS,
     ANGLE_SPEEDS,
-    BANDS,
-    DAMPED_GAINS,
-    DAMPING,
-    DAMPINGS,
-    DEFAULT_GAIN,
-    FAST_SPEEDS,
-    FINE,
     GAIN,
-    GAINS,
-    KMH,
     LINE,
-    LOOPS,
     ON_A_TRAIN,
     OTHER_LINE,
-    OVER_SPEED,
-    OVER_SPEED_ON_A_TRAIN,
     PARTS,
-    REAL_GAIN,
-    SHIPPED,
     SHOWN_SPEEDS,
     SPAN,
     SPANS,
     SPEEDS,
-    STRONG,
     THETA,
-    THETA_STEP,
-    THETAS,
-    USUAL,
     Case,
     Result,
-    all_cases,
-    amplification,
     control,
     cost_over_angle,
-    damped,
-    passive_at_mean,
-    records,
-    run_all,
     sampled,
 )
 
@@ -86,10 +61,13 @@ Results = Mapping[Case, Result]
 
 def run(report: Report) -> Outcome:
     """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
-    results = run_all(all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total)))
+    results = passes.run_all(
+        passes.all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total))
+    )
     report("passive passes at the same mean force", 0.9)
     at_same_mean = {
-        speed: passive_at_mean(speed, results[Case(speed, control())].figures.mean) for speed in SHOWN_SPEEDS
+        speed: passes.passive_at_mean(speed, results[Case(speed, control())].figures.mean)
+        for speed in SHOWN_SPEEDS
     }
     report("plots", 0.95)
     return Outcome(
@@ -121,7 +99,7 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
         return results[Case(speed, policy)].figures.contact_loss
 
     yield said("control-passive", loss(400, "passive"))
-    for gain, note in ((GAIN, CALIBRATED), (DEFAULT_GAIN, UNCALIBRATED)):
+    for gain, note in ((GAIN, CALIBRATED), (passes.DEFAULT_GAIN, UNCALIBRATED)):
         for speed in SHOWN_SPEEDS:
             yield said("control-loss", loss(speed, control(gain)), gain=gain, speed=speed, note=note)
     most = max(loss(speed, control()) for speed in SPEEDS)
@@ -130,7 +108,7 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
         gain: max(
             results[sampled(speed, control(gain), "realistic")].figures.contact_loss for speed in SHOWN_SPEEDS
         )
-        for gain in GAINS
+        for gain in passes.GAINS
     }
     best = min(worst, key=worst.__getitem__)
     for gain, gains in ((GAIN, f"gain {GAIN}"), (best, f"best gain {best:g}")):
@@ -142,7 +120,7 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
             yield said(key, ratio[speed], speed=speed, note=STIFF if speed == 300 else "")
     highest = max(ratio, key=ratio.__getitem__)
     yield said("control-costs", ratio[highest], speed=highest)
-    paper, low, high = map(math.degrees, (THETA, THETA - THETA_STEP, THETA + THETA_STEP))
+    paper, low, high = map(math.degrees, (THETA, THETA - passes.THETA_STEP, THETA + passes.THETA_STEP))
     for speed in ANGLE_SPEEDS:
         theta = math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best)
         yield said("control-angle", theta, speed=speed, paper=paper, low=low, high=high)
@@ -176,7 +154,7 @@ GRID_COLUMNS = tuple(
 
 
 def _numerics(fine: bool) -> str:
-    grid = FINE if fine else USUAL
+    grid = passes.FINE if fine else passes.USUAL
     return f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m"
 
 
@@ -223,10 +201,10 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
     yield losses(
         "CL (%) of FB+FF over the gain",
         ("gain (N/N)",),
-        {(f"{gain:g}",): gain for gain in GAINS},
+        {(f"{gain:g}",): gain for gain in passes.GAINS},
         {
             f"{speed} km/h, {actuator}, {1e3 * interval:g} ms": (speed, actuator, interval)
-            for (actuator, interval), speed in product(LOOPS, SHOWN_SPEEDS)
+            for (actuator, interval), speed in product(passes.LOOPS, SHOWN_SPEEDS)
         },
         lambda gain, loop: [Case(loop[0], control(gain), actuator=loop[1], control_interval=loop[2])],
     )
@@ -234,7 +212,7 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         "Actuators, control every 10 ms",
         [
             (f"{actuator}: {name}", results[sampled(speed, policy, actuator)])
-            for actuator, (name, policy), speed in product(ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
+            for actuator, (name, policy), speed in product(passes.ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
         ],
         "actuator: control",
     )
@@ -242,7 +220,7 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         "Maximum CL (%) of 300, 350 and 400 km/h, control every 10 ms",
         ("control",),
         {("passive",): "passive"} | {(name,): policy for name, policy in ON_A_TRAIN.items()},
-        {name: name for name in ACTUATORS},
+        {name: name for name in passes.ACTUATORS},
         lambda policy, actuator: [
             Case(speed) if policy == "passive" else sampled(speed, policy, actuator) for speed in SHOWN_SPEEDS
         ],
@@ -250,14 +228,14 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
     yield losses(
         "Maximum CL (%) of 300, 325, ... 400 km/h: pd over gain and damping, realistic actuator",
         ("damping (N s/m)", "time step, grid"),
-        {(f"{damping:g}", grid): (damping, GRIDS[grid]) for damping, grid in product(DAMPINGS, GRIDS)},
-        {f"gain {gain:g}": gain for gain in DAMPED_GAINS},
+        {(f"{damping:g}", grid): (damping, GRIDS[grid]) for damping, grid in product(passes.DAMPINGS, GRIDS)},
+        {f"gain {gain:g}": gain for gain in passes.DAMPED_GAINS},
         lambda each, gain: [
-            sampled(speed, damped(gain, each[0]), "realistic", each[1]) for speed in FAST_SPEEDS
+            sampled(speed, passes.damped(gain, each[0]), "realistic", each[1]) for speed in passes.FAST_SPEEDS
         ],
     )
     rows = []
-    for (gain, reading, fine), speed in product(ANGLE_CONTROLS, ANGLE_SPEEDS):
+    for (gain, reading, fine), speed in product(passes.ANGLE_CONTROLS, ANGLE_SPEEDS):
         curve = cost_over_angle(results, speed, gain, reading, fine)
         costs = (min(curve.cost), curve.at_paper, max(curve.cost), curve.without)
         rows.append(
@@ -279,7 +257,10 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
             ("control", "{[0]}"),
             ("km/h", "{[1].case.speed_kmh}"),
             ("once per span", lambda each: f"{abs(each[1].once_per_span) / math.sqrt(2):.1f}"),
-            *((f"{low:g}-{high:g} Hz", f"{{[1].bands[{k}]:.1f}}") for k, (low, high) in enumerate(BANDS)),
+            *(
+                (f"{low:g}-{high:g} Hz", f"{{[1].bands[{k}]:.1f}}")
+                for k, (low, high) in enumerate(passes.BANDS)
+            ),
             ("all", "{[1].raw_std:.1f}"),
         ],
         [(name, results[Case(speed, PARTS[name])]) for speed, name in product(ANGLE_SPEEDS, shown)],
@@ -290,16 +271,16 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         "Linear model: contact force over the passive one's",
         ("frequency (Hz)", *laws),
         [
-            (f"{frequency}", *(f"{amplification(frequency, *law):.2f}" for law in laws.values()))
+            (f"{frequency}", *(f"{passes.amplification(frequency, *law):.2f}" for law in laws.values()))
             for frequency in (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 20, 25)
         ],
     )
     named = []
     for speed in SPEEDS:
-        named += [(name, results[Case(speed, policy)]) for name, policy in OVER_SPEED.items()]
+        named += [(name, results[Case(speed, policy)]) for name, policy in passes.OVER_SPEED.items()]
         named += [
             (f"{name}, realistic actuator", real(speed, policy))
-            for name, policy in OVER_SPEED_ON_A_TRAIN.items()
+            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
         ]
     yield listed("Over speed (Figs 17 and 18)", named)
     named = [
@@ -335,8 +316,11 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         "CL (%) over speed on both grids",
         ("km/h", "time step, grid"),
         {(str(speed), grid): (speed, GRIDS[grid]) for speed, grid in product(SPEEDS, GRIDS)},
-        {name: (policy, False) for name, policy in OVER_SPEED.items()}
-        | {f"{name}, realistic actuator": (policy, True) for name, policy in OVER_SPEED_ON_A_TRAIN.items()},
+        {name: (policy, False) for name, policy in passes.OVER_SPEED.items()}
+        | {
+            f"{name}, realistic actuator": (policy, True)
+            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
+        },
         lambda each, column: [
             sampled(each[0], column[0], "realistic", each[1])
             if column[1]
@@ -348,11 +332,11 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
 def phase_angle(results: Results) -> Figure:
     """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
     figure, axes = panels((10, 5.2), 1, 2, sharey=True)
-    for axis, reading in zip(axes, (SPAN, KMH), strict=True):
+    for axis, reading in zip(axes, (SPAN, passes.KMH), strict=True):
         for k, speed in enumerate(ANGLE_SPEEDS):
             curve = cost_over_angle(results, speed, GAIN, reading)
             colour = series_colour(k)
-            axis.plot(np.degrees(THETAS), curve.cost, color=colour, label=f"{speed} km/h")
+            axis.plot(np.degrees(passes.THETAS), curve.cost, color=colour, label=f"{speed} km/h")
             axis.plot(math.degrees(curve.best), min(curve.cost), "o", color=colour)
         axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
@@ -365,7 +349,7 @@ def phase_angle(results: Results) -> Figure:
 
 def forces_along_line(speed: int) -> Figure:
     """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
-    passive, active = records([Case(speed), Case(speed, control())])
+    passive, active = passes.records([Case(speed), Case(speed, control())])
     figure, (upper, lower) = panels((7.5, 4.7), 2, sharex=True, height_ratios=(3, 2))
     upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
     upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
@@ -397,14 +381,14 @@ def over_speed(results: Results, number: int, name: str, caption: str) -> Figure
     panel = {
         "ideal actuator": {
             "without control": (passive, WITHOUT, "o-"),
-            "with control, gain 1": ([Case(v, control(DEFAULT_GAIN)) for v in SPEEDS], ORANGE, "^--"),
+            "with control, gain 1": ([Case(v, control(passes.DEFAULT_GAIN)) for v in SPEEDS], ORANGE, "^--"),
             f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
         },
         "realistic actuator": {
             "without control": (passive, WITHOUT, "o-"),
-            f"with control, gain {REAL_GAIN}": (real(control(REAL_GAIN)), "0.5", "x--"),
-            "feedback and frame damping (pd)": (real(DAMPING[SHIPPED]), PURPLE, "d--"),
-            STRONG: (real(DAMPING[STRONG]), SKY, "v-"),
+            f"with control, gain {passes.REAL_GAIN}": (real(control(passes.REAL_GAIN)), "0.5", "x--"),
+            "feedback and frame damping (pd)": (real(passes.DAMPING[passes.SHIPPED]), PURPLE, "d--"),
+            passes.STRONG: (real(passes.DAMPING[passes.STRONG]), SKY, "v-"),
         },
     }
     figure, axes = panels((10.5, 5), 1, 2, sharey=True)

@@ -13,20 +13,8 @@ from ...base.table import Table
 from ...catalog import load_catenary
 from ...metrics.compliance import STD_OF_MEAN
 from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
-from .passes import (
-    BEST,
-    CASES,
-    DISTANCES,
-    SPEEDS_KMH,
-    THEORIES,
-    Case,
-    Curve,
-    Fit,
-    at_arrival,
-    curves,
-    fits,
-    wake,
-)
+from . import passes
+from .passes import BEST, THEORIES, Case, Curve, at_arrival, curves, fits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,20 +28,20 @@ CLOSE = 0.05
 KEPT = ("distances", "speed_kmh", "catenary", "pantograph_number", "pantograph", "spans", "mean", "std",
         "max", "min", "contact_loss", "max_uplift")  # fmt: skip
 """Columns of the CSV."""
-Found = Mapping[str, Fit]
+Found = Mapping[str, passes.Fit]
 
 
 def run(report: Report) -> Outcome:
     """Curves of two lines at three speeds, fits of theories, and what others found."""
     by_case, rows = {}, []
-    for k, case in enumerate(CASES):
+    for k, case in enumerate(passes.CASES):
         report(case.line, 0.4 * k)
         by_case[case], own = curves(case)
         rows += [{key: row[key] for key in KEPT} for row in own]
     found, arrivals = [], []
     for k, curve in enumerate(curve for each in by_case.values() for curve in each):
         report("the wire behind one pantograph", 0.8 + 0.03 * k)
-        after = wake(curve.case, curve.speed_kmh)
+        after = passes.wake(curve.case, curve.speed_kmh)
         found.append((curve, fits(curve, after)))
         arrivals.append((curve, at_arrival(curve, after)))
     measured = {(curve.case, curve.speed_kmh): each["measured"] for curve, each in found}
@@ -68,8 +56,8 @@ def run(report: Report) -> Outcome:
         ),
         plots={"spacing-sigma": plot_std(by_case, measured), "spacing-uplift": plot_uplift(by_case)},
         numbers={
-            "distances_m": list(DISTANCES),
-            "speeds_kmh": list(SPEEDS_KMH),
+            "distances_m": list(passes.DISTANCES),
+            "speeds_kmh": list(passes.SPEEDS_KMH),
             "mean_correlation": means(found),
             "fits": [
                 {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
@@ -176,7 +164,7 @@ def _comparisons(
     by_case: Mapping[Case, Sequence[Curve]], arrivals: Sequence[tuple[Curve, Mapping[str, float]]]
 ) -> Iterator[Comparison]:
     """Ours beside others, those of the reference line; arrivals: correlations of ``at_arrival``."""
-    at = {curve.speed_kmh: curve for curve in by_case[CASES[0]]}
+    at = {curve.speed_kmh: curve for curve in by_case[passes.CASES[0]]}
 
     def std(speed: float, *distances: float, whose: str = "second") -> float:
         curve = at[speed]
@@ -197,7 +185,7 @@ def _comparisons(
         }
         names |= {"low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
         yield said("spacing-std", std(speed, distance, whose=whose), **names)
-    ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in SPEEDS_KMH}
+    ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in passes.SPEEDS_KMH}
     other = ", ".join(f"{ratios[speed]:.2f} at {speed:g}" for speed in (200.0, 300.0))
     yield said("spacing-ratio", ratios[250.0], other=other)
     firsts = [curve.first["std"][curve.distances >= FAR] for curve, _ in arrivals]
@@ -210,7 +198,7 @@ def _comparisons(
     yield said("spacing-arrival", float(np.mean(velocities)), low=low, high=high)
 
 
-def plot_std(curves: Mapping[Case, Sequence[Curve]], fits: Mapping[tuple[Case, float], Fit]) -> Figure:
+def plot_std(curves: Mapping[Case, Sequence[Curve]], fits: Mapping[tuple[Case, float], passes.Fit]) -> Figure:
     """σ over the distance, a column for each line and a row for each speed.
 
     fits: of the frequency measured behind one pantograph, by line and speed.
@@ -272,7 +260,7 @@ def plot_uplift(curves: Mapping[Case, Sequence[Curve]]) -> Figure:
     return figure
 
 
-def _wave(curve: Curve, best: Fit) -> np.ndarray:
+def _wave(curve: Curve, best: passes.Fit) -> np.ndarray:
     """The cosine of a fit, with the height and the mean that fit σ, (n,)."""
     angle = 2 * np.pi * (best.frequency * curve.distances / from_kmh(curve.speed_kmh) - best.phase)
     slope, mean = np.polyfit(np.cos(angle), curve.second["std"], 1)
