@@ -10,22 +10,7 @@ from panto_env import simulate
 from panto_env.policies import find_policy
 from panto_env.studies import write
 from panto_env.studies.paper1_control import passes
-from panto_env.studies.paper1_control.passes import (
-    GAIN,
-    GAINS,
-    LINE,
-    OTHER_LINE,
-    REAL_GAIN,
-    SHIPPED,
-    SPEEDS,
-    STRONG,
-    STRONG_DAMPING,
-    STRONG_GAIN,
-    THETAS,
-    Case,
-    control,
-    sampled,
-)  # fmt: skip
+from panto_env.studies.paper1_control.passes import STRONG, THETAS, control
 
 from ..pages import check_page, same_row, statements_table, tables_of
 from . import made, table
@@ -55,11 +40,11 @@ def test_longest_loss_counts_samples_in_a_row(lost, samples):
 
 
 def test_a_lane_is_the_pass_that_simulate_makes():
-    cases = [sampled(400, control(0.5), "realistic"), sampled(400, "passive", "realistic")]
+    cases = [passes.sampled(400, control(0.5), "realistic"), passes.sampled(400, "passive", "realistic")]
     for case, record in zip(cases, passes.records(cases), strict=True):
         alone = simulate(
-            LINE, passes.PANTOGRAPH, 400, case.policy, actuator="realistic", control_interval=passes.SAMPLED,
-            distance=record.position[-1], **passes.USUAL,
+            passes.LINE, passes.PANTOGRAPH, 400, case.policy, actuator="realistic",
+            control_interval=passes.SAMPLED, distance=record.position[-1], **passes.USUAL,
         )  # fmt: skip
         n = len(alone.contact_force)
         assert n > 0.98 * len(record.contact_force)
@@ -67,7 +52,7 @@ def test_a_lane_is_the_pass_that_simulate_makes():
 
 
 def test_bands_and_the_part_once_per_span_stay_below_the_whole():
-    (result,) = passes.run([Case(400)])
+    (result,) = passes.run([passes.Case(400)])
     rms = math.hypot(*result.bands)
     assert 0.9 * result.raw_std < rms < result.raw_std
     assert 0.3 * result.bands[0] < abs(result.once_per_span) / math.sqrt(2) < result.bands[0]
@@ -109,10 +94,10 @@ def test_gains_are_chosen_by_the_rules_that_their_comments_give(outcome):
     """Least gain without loss; least of the largest losses with the realistic actuator."""
     rows = [[float(cell) for cell in row] for row in table(outcome, "over the gain").rows]
     free = [row[0] for row in rows if max(row[1:4]) == 0]
-    assert min(free) == GAIN
+    assert min(free) == passes.GAIN
     assert not [row for row in rows if max(row[4:7]) == 0]  # sampled every 10 ms, none is free of loss
-    assert min(rows, key=lambda row: max(row[7:10]))[0] == REAL_GAIN
-    assert [row[0] for row in rows] == list(GAINS)
+    assert min(rows, key=lambda row: max(row[7:10]))[0] == passes.REAL_GAIN
+    assert [row[0] for row in rows] == list(passes.GAINS)
 
 
 @pytest.mark.study
@@ -120,22 +105,21 @@ def test_contact_is_kept_where_the_page_says_so_and_lost_at_400_kmh_on_the_other
     found = table(outcome, "Time step and grid")
     usual, fine = (k for k, heading in enumerate(found.headings) if heading.startswith("CL"))
     lost = {(row[0], row[1]): (float(row[usual]), float(row[fine])) for row in found.rows}
-    for name in ("frame damping alone", "FB + frame damping", SHIPPED, STRONG):
-        assert (
-            lost[f"{LINE}, realistic: {name}", "300"] == lost[f"{LINE}, realistic: {name}", "350"] == (0, 0)
-        )
+    for name in ("frame damping alone", "FB + frame damping", passes.SHIPPED, STRONG):
+        slower = [lost[f"{passes.LINE}, realistic: {name}", speed] for speed in ("300", "350")]
+        assert slower == [(0, 0)] * 2
     for name, speed in (
         ("ideal: passive", "300"),
-        (f"ideal: FB+FF, gain {GAIN}", "350"),
+        (f"ideal: FB+FF, gain {passes.GAIN}", "350"),
         (f"realistic: {STRONG}", "300"),
         (f"realistic: {STRONG}", "350"),
     ):
-        assert lost[f"{OTHER_LINE}, {name}", speed] == (0, 0)
-    other = [each for (name, speed), each in lost.items() if name.startswith(OTHER_LINE) and speed == "400"]
+        assert lost[f"{passes.OTHER_LINE}, {name}", speed] == (0, 0)
+    other = [each for (name, speed), each in lost.items() if passes.OTHER_LINE in name and speed == "400"]
     assert min(map(min, other)) > 15  # whatever the control
     worst = {row[0]: [float(cell) for cell in row[1:]] for row in table(outcome, "of 300, 350 and 400").rows}
     assert worst["FB + frame damping"][:2] == [0, 0]  # ideal, delay of 5 ms
-    assert worst[SHIPPED][:3] == [0, 0, 0]  # lag of 15 ms
+    assert worst[passes.SHIPPED][:3] == [0, 0, 0]  # lag of 15 ms
     assert worst[STRONG] == [0, 0, 0, 0]  # realistic
 
 
@@ -143,12 +127,12 @@ def test_contact_is_kept_where_the_page_says_so_and_lost_at_400_kmh_on_the_other
 def test_a_lower_gain_with_twice_the_damping_keeps_contact_at_all_speeds(outcome):
     """With the realistic actuator and on both grids; so do the dampings beside it."""
     found = table(outcome, "pd over gain and damping")
-    column = found.headings.index(f"gain {STRONG_GAIN:g}")
+    column = found.headings.index(f"gain {passes.STRONG_GAIN:g}")
     free = [float(row[0]) for row in found.rows if row[column] == "0.00"]
-    assert free == [k for damping in (250.0, STRONG_DAMPING, 350.0) for k in (damping, damping)]
+    assert free == [k for damping in (250.0, passes.STRONG_DAMPING, 350.0) for k in (damping, damping)]
     over_speed = table(outcome, "over speed on both grids")
     column = over_speed.headings.index(f"{STRONG}, realistic actuator")
-    assert len(over_speed.rows) == 2 * len(SPEEDS)
+    assert len(over_speed.rows) == 2 * len(passes.SPEEDS)
     assert {row[column] for row in over_speed.rows} == {"0.00"}
 
 
@@ -158,7 +142,7 @@ def test_a_finer_grid_and_time_step_say_the_same(outcome):
     found = table(outcome, "Time step and grid")
     for name, speed, *cells in found.rows:
         loss, fine_loss, mean, fine_mean, _, _, cost, fine_cost = map(float, cells)
-        if str(name).endswith(f"realistic: FB+FF, gain {GAIN}"):
+        if str(name).endswith(f"realistic: FB+FF, gain {passes.GAIN}"):
             assert min(loss, fine_loss) > 15
             continue
         assert fine_loss == pytest.approx(loss, abs=0.1, rel=0.02), (name, speed)

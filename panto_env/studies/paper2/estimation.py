@@ -99,24 +99,17 @@ def filtered(force_model: str, lag: float, motion: Motion, known: PantographData
     return estimate(motion, known, settings).force
 
 
-def by_unknown_input(motion: Motion, known: PantographData, observation: str) -> Array:
-    """Contact force (N), (n,), of which nothing is believed, low-passed."""
-    settings = EstimatorSettings(observation=observation)
-    return unknown_input(motion, known, settings, cutoff=CUTOFFS[observation])
-
-
-def by_inertia(motion: Motion, known: PantographData, observation: str) -> Array:
-    """Contact force (N), (n,), from the suspension less the head's inertia, low-passed."""
-    velocities = observation == OBSERVATIONS[0]
-    return inertia_corrected(motion, known, velocities=velocities, cutoff=CUTOFFS[observation])
-
-
 METHODS: dict[str, Callable[[Motion, PantographData, str], Array]] = {
     **{f"filter, {name}": partial(filtered, name, 0.0) for name in FORCE_MODELS},
     f"smoother, {1e3 * LAG:g} ms": partial(filtered, "random-walk", LAG),
-    "unknown input": by_unknown_input,
-    "inertia-corrected": by_inertia,
+    "unknown input": lambda motion, known, observation: unknown_input(
+        motion, known, EstimatorSettings(observation=observation), cutoff=CUTOFFS[observation]
+    ),
+    "inertia-corrected": lambda motion, known, observation: inertia_corrected(
+        motion, known, velocities=observation == OBSERVATIONS[0], cutoff=CUTOFFS[observation]
+    ),
 }
+"""Contact force (N), (n,), with these observations: by belief, then by none, which needs a low-pass."""
 
 
 def settled_scores(motion: Motion, force: Array) -> tuple[Score, ...]:
@@ -249,28 +242,14 @@ def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
 
 def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
     """What noise does to delay and correlation in 0 to 20 Hz."""
-    sets = dict(zip(("both", "displacements"), OBSERVATIONS, strict=True))
-    return tabled(
-        f"Noise, velocities' in proportion; {SPEED_KMH:g} km/h, 0 to 20 Hz",
-        [
-            ("noise of displacements (mm)", lambda noise: f"{1e3 * noise:g}"),
-            *(
-                (
-                    f"delay, {name} (ms)",
-                    lambda noise, which=which: number(1e3 * scores[which, noise].delay, 2),
-                )
-                for name, which in sets.items()
-            ),
-            *(
-                (
-                    f"correlation, {name}",
-                    lambda noise, which=which: number(scores[which, noise].correlation, 4),
-                )
-                for name, which in sets.items()
-            ),
-        ],
-        list(dict.fromkeys(noise for _, noise in scores)),
-    )
+    rows = []
+    for noise in dict.fromkeys(noise for _, noise in scores):
+        both = [scores[observation, noise] for observation in OBSERVATIONS]
+        late = (number(1e3 * each.delay, 2) for each in both)
+        rows.append((f"{1e3 * noise:g}", *late, *(number(each.correlation, 4) for each in both)))
+    title = f"Noise, velocities' in proportion; {SPEED_KMH:g} km/h, 0 to 20 Hz"
+    delays = ("noise of displacements (mm)", "delay, both (ms)", "delay, displacements (ms)")
+    return Table(title, (*delays, "correlation, both", "correlation, displacements"), rows)
 
 
 def parameters_table(estimated: ParameterInformation) -> Table:
