@@ -1,8 +1,7 @@
 """What a study of a paper returns, how it is written to a folder, and what all studies are made with.
 
 Statements stand in ``statements.toml``: for each key the quantity, its unit, what the paper says, the range
-in which ours agrees, and perhaps a note. Ranges follow from the paper's words and were written down before
-ours were computed, but where a note says otherwise.
+in which ours agrees by the paper's words, and perhaps a note.
 """
 
 from __future__ import annotations
