@@ -1,4 +1,4 @@
-"""What the paper says of its Figs 11 and 12, and the tables around them, with figures that may not drift."""
+"""Ways to estimate the force, noise and parameters; statements and tables are held in ``test_paper2``."""
 
 import numpy as np
 import pytest
@@ -12,29 +12,15 @@ BOTH, ONE = OBSERVATIONS
 
 
 @pytest.fixture(scope="module")
-def at_250():
-    return estimation.cases((250.0,))
-
-
-@pytest.fixture(scope="module")
 def trajectory():
     return estimation.run(250.0)
 
 
-def test_every_statement_holds(at_250):
-    found = estimation.comparisons(at_250)
-    assert {each.quantity: each.ours for each in found} == {
-        "displacements and velocities: correlation": pytest.approx(0.9872, abs=0.002),
-        "displacements: correlation": pytest.approx(0.9571, abs=0.004),
-        "displacements: delay": pytest.approx(5.10, abs=0.2),
-        "displacements: delay over that with velocities": pytest.approx(1.90, abs=0.15),
-        "displacements, smoothed: correlation": pytest.approx(0.9998, abs=2e-4),
-    }
-    assert all(each.agrees for each in found)
-
-
-def test_the_ways_rank_as_told(at_250):
+def test_the_ways_rank_as_told(monkeypatch):
     """Errors at all frequencies, at equal noise: beliefs about the force pay, none at all costs most."""
+    monkeypatch.setattr(estimation, "SEEDS", 1)
+    at_250 = estimation.cases((250.0,))
+    assert all(each.agrees for each in estimation.comparisons(at_250))
     errors = {(case.observation, case.method): case.scores[-1].whole_rms for case in at_250}
     for observation in OBSERVATIONS:
         by_method = {method: errors[observation, method] for method in METHODS}
