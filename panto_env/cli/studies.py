@@ -25,10 +25,10 @@ from ..rig import report
 from ..rig.computer import compare, load_rig
 from ..rig.report import plot_pairs
 from ..studies.en50318 import study
-from ..studies.en50318.plots import plot_reference
+from ..studies.en50318.reference import plot_reference
 from ..studies.throughput import study as measured
 from ..studies.throughput import tables as shown
-from ..studies.throughput.plots import plot_speed
+from ..studies.throughput.tables import plot_speed
 from ..terminal import (
     ALARM,
     Json,

@@ -14,9 +14,9 @@ from panto_env.base.checksums import with_checksum
 from panto_env.base.errors import InputError
 from panto_env.cli import studies as speed
 from panto_env.envs import IDS
-from panto_env.studies.throughput import plants as environments
 from panto_env.studies.throughput import study, tables
-from panto_env.studies.throughput.plots import plot_speed
+from panto_env.studies.throughput import study as environments
+from panto_env.studies.throughput.tables import plot_speed
 
 ROOT = Path(panto_env.__file__).parents[1]
 chooses_cores = pytest.mark.skipif(

@@ -49,7 +49,7 @@ from panto_env.diagnosis.training import (
 )
 from panto_env.plant.alignment import Alignment
 from panto_env.plant.line_condition import LineCondition
-from panto_env.studies.paper2.diagnosis_tables import within_interval
+from panto_env.studies.paper2.diagnosis import within_interval
 from panto_env.terminal import console
 
 from .conftest import TRACK

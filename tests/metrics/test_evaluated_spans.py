@@ -9,7 +9,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.sweep import sweep
 from panto_env.metrics.figures import FIRST_SETTLED, LAST_USUAL, chosen_spans, in_words
 from panto_env.plant.alignment import Alignment
-from panto_env.studies.en50318 import start
+from panto_env.studies.en50318 import lines as start
 
 from ..command import panto
 

@@ -17,7 +17,7 @@ from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
 from panto_env.plant.catenary.schema import CLEAR
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.studies.en50318 import window as windows
+from panto_env.studies.en50318 import lines as windows
 
 
 @kernel

@@ -301,16 +301,12 @@ def _mean(record: Trajectory) -> float:
     return float(record.contact_force[record.inside(SPANS)].mean())
 
 
-ZERO = THETAS[len(THETAS) // 2 - 1]  # 0 as it stands in THETAS, so that its pass is not run twice
-
-
 @dataclass(frozen=True)
 class CostOverAngle:
     """Cost function over the phase angle at one speed."""
 
     cost: tuple[float, ...]  # CF at THETAS (N m)
     best: float  # theta of the minimum CF (rad)
-    minimum: float  # CF there (N m)
     without: float  # CF of the feedback alone (N m)
     at_paper: float  # CF at the paper's pi/6 (N m)
     cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
@@ -319,40 +315,27 @@ class CostOverAngle:
 def cost_over_angle(
     results: Mapping[Case, Result], speed: int, gain: float, reading: str, fine: bool = False
 ) -> CostOverAngle:
-    """At one speed (km/h)."""
+    """At one speed (km/h).
 
-    def cost(amplitude: float, theta: float) -> float:
-        policy = control(gain, amplitude, theta, reading)
-        return results[Case(speed, policy, fine=fine)].figures.cost_function
+    The feed-forward, once per span, opposes the force's part once per span at an angle by what is measured:
+    that part with feedback alone, and what the feed-forward at angle 0 adds to it. Shifting A sin(kx) by
+    theta turns what it adds by -theta.
+    """
 
-    costs = tuple(cost(AMPLITUDE, theta) for theta in THETAS)
-    minimum = min(costs)
+    def at(theta: float, reading: str, amplitude: float = AMPLITUDE) -> Result:
+        return results[Case(speed, control(gain, amplitude, theta, reading), fine=fine)]
+
+    costs = tuple(at(theta, reading).figures.cost_function for theta in THETAS)
+    alone = at(THETA, SPAN, 0.0)
+    zero, paper = (min(THETAS, key=lambda theta: abs(theta - angle)) for angle in (0.0, THETA))
+    added = at(zero, SPAN).once_per_span - alone.once_per_span
     return CostOverAngle(
         cost=costs,
-        best=THETAS[costs.index(minimum)],
-        minimum=minimum,
-        without=without_feedforward(results, speed, gain, fine).figures.cost_function,
-        at_paper=cost(AMPLITUDE, min(THETAS, key=lambda theta: abs(theta - THETA))),
-        cancelling=cancelling(results, speed, gain, fine),
+        best=THETAS[costs.index(min(costs))],
+        without=alone.figures.cost_function,
+        at_paper=costs[THETAS.index(paper)],
+        cancelling=wrap(cmath.phase(added) - cmath.phase(-alone.once_per_span)),
     )
-
-
-def without_feedforward(
-    results: Mapping[Case, Result], speed: int, gain: float, fine: bool = False
-) -> Result:
-    """The feedback alone."""
-    return results[Case(speed, control(gain, amplitude=0.0), fine=fine)]
-
-
-def cancelling(results: Mapping[Case, Result], speed: int, gain: float, fine: bool = False) -> float:
-    """The angle (rad) at which the feed-forward, once per span, opposes the force's part once per span.
-
-    Both are measured: the part with feedback alone, and what the feed-forward at angle 0 adds to it.
-    Shifting A sin(kx) by theta turns what it adds by -theta.
-    """
-    part = without_feedforward(results, speed, gain, fine).once_per_span
-    added = results[Case(speed, control(gain, AMPLITUDE, ZERO), fine=fine)].once_per_span - part
-    return wrap(cmath.phase(added) - cmath.phase(-part))
 
 
 def wrap(angle: float) -> float:

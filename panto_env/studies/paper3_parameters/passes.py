@@ -13,7 +13,6 @@ from ...analysis.simulation import simulate
 from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary, load_pantograph
 from ...metrics import compliance as en50367
-from ...metrics.compliance import Criterion
 from ...metrics.figures import Figures, arcing, contact_loss
 from ...plant.catenary.schema import PowerSystem
 
@@ -63,7 +62,7 @@ class Pass:
     displacement: Array  # (n,): of the head, z_1 (m)
     nominal_force: float  # F(v), Eq. 6 (N)
     figures: Figures  # as EN 50317 sees the same way: force low-passed at 20 Hz
-    compliance: tuple[Criterion, ...]  # with EN 50367
+    within_en50367: dict[str, bool]  # whether each limit of EN 50367 is kept, by its key
 
     @property
     def swing(self) -> float:
@@ -75,16 +74,11 @@ class Pass:
         """Maximum less minimum of the head's displacement (m)."""
         return float(np.ptp(self.displacement))
 
-    @property
-    def within_en50367(self) -> dict[str, bool]:
-        """Whether each limit of EN 50367 is kept, by its key."""
-        return {criterion.key: bool(criterion.kept) for criterion in self.compliance}
-
     def numbers(self) -> dict[str, Any]:
         """Maximum, minimum, mean, σ of force (N) and displacement (mm), and EN 50367's limits."""
         return {
-            "contact_force_n": _statistics(self.force),
-            "displacement_mm": _statistics(1e3 * self.displacement),
+            "contact_force_n": statistics(self.force),
+            "displacement_mm": statistics(1e3 * self.displacement),
             "nominal_force_n": self.nominal_force,
             "contact_lost_percent": contact_loss(self.force),
             "low_passed": self.figures.as_dict(),
@@ -137,7 +131,10 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
         displacement=run.head[shown],
         nominal_force=run.nominal_force,
         figures=figures,
-        compliance=tuple(en50367.criteria(figures, nq, from_kmh(speed_kmh), SYSTEM, "own choice")),
+        within_en50367={
+            each.key: bool(each.kept)
+            for each in en50367.criteria(figures, nq, from_kmh(speed_kmh), SYSTEM, "own choice")
+        },
     )
 
 
@@ -151,13 +148,10 @@ def largest_static_force(one_pass: Pass) -> float:
     return limit / float(one_pass.force.max() / one_pass.nominal_force) - aerodynamic
 
 
-def _statistics(values: Array) -> dict[str, float]:
-    return {
-        "max": float(values.max()),
-        "min": float(values.min()),
-        "mean": float(values.mean()),
-        "sigma": float(values.std()),
-    }
+def statistics(values: Array) -> dict[str, float]:
+    """Extremes, mean and standard deviation."""
+    found = {"max": values.max(), "min": values.min(), "mean": values.mean(), "sigma": values.std()}
+    return {name: float(value) for name, value in found.items()}
 
 
 RUN_TIME = 12.0
