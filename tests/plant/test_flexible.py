@@ -7,9 +7,9 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant import functions as interpolation
 from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD, STENCIL
-from panto_env.plant.catenary.flexible.attached import dropper_positions
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
+from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.catenary.flexible.static import solve

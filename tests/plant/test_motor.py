@@ -15,7 +15,7 @@ from panto_env.plant.actuators.motor.schema import motor_power
 from panto_env.plant.actuators.motor.step import MotorRow, age, decay
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.plant.pantograph.build import matrices
+from panto_env.plant.pantograph.schema import matrices
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train

@@ -12,12 +12,11 @@ from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
-from panto_env.plant.catenary.flexible.overlaps import tension_lengths
+from panto_env.plant.catenary.flexible.overlaps import stitches_of, tension_lengths
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang, solve
-from panto_env.plant.catenary.flexible.stitches import stitches_of
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 

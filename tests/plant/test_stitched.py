@@ -14,9 +14,9 @@ from panto_env.plant.catenary.flexible.arrays import CONTACT, HUNG, LINK, MESSEN
 from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.build import at_rest
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.overlaps import moving, stitches_of
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
-from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
 from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.line_condition import NEW, LineCondition
 from panto_env.plant.numerics import Numerics

@@ -20,9 +20,9 @@ import numpy as np
 from ....base.arrays import Array, to_kmh
 from ....base.table import Table
 from ...line_condition import NEW, LineCondition
-from .attached import dropper_positions
 from .defects import DefectiveLine, shape_left, with_tension_left
 from .fixed_wires import SPANS, tensions_of_fixed
+from .on_grid import dropper_positions
 from .overlaps import tension_lengths
 from .parts import Conductor, Span, places_of
 from .schema import FlexibleCatenaryData

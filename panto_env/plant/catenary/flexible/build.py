@@ -13,18 +13,16 @@ from ....base.errors import InputError
 from ...numerics import Numerics
 from ...state import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
-from .attached import joined_springs, links_of, springs_of
-from .beams import Located, Profile, located
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
 from .near import near_droppers
-from .on_grid import in_equal_rows, on_grid
-from .overlaps import heights_of_pair, pairs_of, tension_lengths
+from .on_grid import in_equal_rows, joined_springs, links_of, on_grid, springs_of
+from .overlaps import heights_of_pair, moving_stitches, pairs_of, tension_lengths
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
+from .shape import Located, Profile, located
 from .static import StaticShape
-from .stitches import moving_stitches
 from .wire_defects import NO_DEFECTS, WireDefects
 from .wires import lay_out, places
 

@@ -27,13 +27,12 @@ from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
-from .overlaps import joined, tension_lengths
+from .overlaps import as_wire, joined, moving, stitches_of, tension_lengths
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
+from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
 from .spans import spans_of
 from .static import StaticShape, solve
-from .stitches import as_wire, moving, stitches_of
 from .wire_defects import WireDefects, locate
 
 

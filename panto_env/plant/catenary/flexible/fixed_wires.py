@@ -19,14 +19,14 @@ from ....base.errors import InputError, beside
 from ...line_condition import LineCondition
 from ...numerics import Numerics, Runs
 from ..schema import LOWEST_TENSION
-from . import window
-from .beams import Profile
+from . import resolution as window
 from .defects import DefectiveLine, shape_left, with_tension_left
+from .overlaps import stitched
 from .parts import Conductor
 from .schema import FlexibleCatenaryData
+from .shape import Profile
 from .spans import spans_of
 from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, STEEPEST, StaticShape
-from .stitches import stitched
 
 UNCHANGED = (1.0, 1.0)
 SPANS = 9

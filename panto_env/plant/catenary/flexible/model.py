@@ -15,12 +15,12 @@ from ...wind import draw_side_wind
 from ..protocol import LineView, StartPoint, check_speeds
 from ..schema import FEWEST_SPANS
 from .arrays import Beside, FlexibleLine
-from .attached import dropper_positions
 from .blown import air_about, start_wind
 from .build import Tensioned, at_rest, constants, of_tension, settle
 from .defects import DefectiveLine, StaticState, check_places, shape_left, with_tension_left
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
+from .on_grid import dropper_positions
 from .overlaps import TensionLength, tension_lengths
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData

@@ -15,13 +15,11 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError, beside
 from ....base.table import Table
-from .beams import GRAVITY, PeriodicWire
-from .overlaps import joined, tension_lengths
+from .overlaps import joined, stitches_of, tension_lengths
 from .parts import Span
 from .schema import FlexibleCatenaryData
-from .shape import StaticShape, settled, stiffness_of, unloaded
+from .shape import GRAVITY, PeriodicWire, StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
-from .stitches import stitches_of
 from .whole_line import StitchedMessenger, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]

@@ -10,11 +10,9 @@ import numpy as np
 from ....base.arrays import Array, Index
 from ..protocol import LineView
 from .arrays import CONTACT, MESSENGER, PAD
-from .beams import Profile
-from .overlaps import FAR, heights_of_pair, tension_lengths
+from .overlaps import FAR, heights_of_pair, moving_stitches, tension_lengths
 from .scattered_build import present, rope_nodes
-from .shape import StaticShape
-from .stitches import moving_stitches
+from .shape import Profile, StaticShape
 from .wires import along
 
 if TYPE_CHECKING:

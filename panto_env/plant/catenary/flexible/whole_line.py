@@ -19,12 +19,11 @@ import numpy as np
 
 from ....base.arrays import Array
 from ..schema import Wire
-from .beams import GRAVITY, HELD, Beams, LongWire, Profile
+from .overlaps import Stitches, as_wire, stitches_of
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import Rope, StaticShape, settled, stiffness_of, unloaded
+from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
-from .stitches import Stitches, as_wire, stitches_of
 
 
 class StitchedMessenger:
