@@ -192,14 +192,8 @@ class LineCondition(Settings):
     @property
     def along_line(self) -> LineCondition:
         """What changes the wires' tension and mass all along the line, and nothing else."""
-        names = (
-            "lost_contact_tension",
-            "lost_messenger_tension",
-            "ice",
-            "temperature",
-            "reference_temperature",
-        )
-        return LineCondition(**{name: getattr(self, name) for name in names})
+        names = {"lost_contact_tension", "lost_messenger_tension", "ice", "temperature"}
+        return LineCondition(**self.model_dump(include=names | {"reference_temperature"}))
 
     @property
     def temperature_in_words(self) -> str:

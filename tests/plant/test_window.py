@@ -9,8 +9,12 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.arrays import CONTACT
 from panto_env.plant.catenary.flexible.build import at_rest, constants
-from panto_env.plant.catenary.flexible.fixed_wires import clear_spans
-from panto_env.plant.catenary.flexible.resolution import STITCHED_ERROR, STITCHED_SHARE, resolution
+from panto_env.plant.catenary.flexible.resolution import (
+    STITCHED_ERROR,
+    STITCHED_SHARE,
+    clear_spans,
+    resolution,
+)
 from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact

@@ -74,7 +74,7 @@ def constants(
         springs = springs_of(part, masts, resolution.time_step, wrong.springs_of_nodes(x, dx))
         begin, end = part.in_use
         used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
-        held.append((part, springs._replace(number=np.where(used, springs.number, -1))))
+        held.append(springs._replace(number=np.where(used, springs.number, -1)))
     ropes = moving_stitches(data, covered)
     links = links_of(data, covered, shape, ropes)
     grid = on_grid(data, shape, joined_springs(held), links, ropes, covered, x, resolution.time_step, defects)

@@ -1,15 +1,13 @@
-"""A line whose wires have another tension, or another mass, than those that it was designed for.
+"""Static state of a whole line at rest, with defects of its droppers, supports and wires.
 
 Its droppers and steady arms were cut and set for the design's wires. A line designed for the tension that is
 left, and for wires with ice, would have other droppers: the real ones are too long or too short by the
 difference.
 
-Static state of a whole line at rest, with defects of its droppers, supports and wires.
-
 Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
-and taut droppers. Nodes of their exact elements (``beams``) stand at supports, droppers and defects of the
-contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
+and taut droppers. Nodes of their exact elements (``shape.Beams``) stand at supports, droppers and defects of
+the contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
 """
 
 from __future__ import annotations
@@ -149,7 +147,7 @@ class DefectiveLine:
         each = spans_of(data, spans).each
         self._data, self._spans, self._condition = data, spans, condition
         alignment = data.alignment(spans)
-        self._broken, self._miscut, height = _locate(
+        self._broken, self._miscut, height = located_defects(
             data, [len(span.droppers.sag) for span in each], condition
         )
         self._own = own = locate(data, spans, condition)
@@ -355,31 +353,23 @@ def _divided(
     return breaks, np.diff(breaks), index_at(breaks, span.droppers.positions)
 
 
-def _own(counts: Sequence[int], span: int) -> str:
-    last = min(span, len(counts))
-    return f"and span {last} has {counts[last - 1]} droppers"
-
-
-def check_places(data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition) -> None:
-    """Raise InputError for a dropper or support that a line has not; counts: of the droppers of each span."""
-    _locate(data, counts, condition)
-
-
-def _locate(
+def located_defects(
     data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
 ) -> tuple[Any, Array, Array]:
     """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m).
 
-    counts: of the droppers of each span.
+    counts: of the droppers of each span. Raises InputError for a dropper or support that the line has not.
     """
     spans, firsts = len(counts), np.cumsum([0, *counts])
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
         for span, number in places:
             if span > spans or number > counts[span - 1]:
+                last = min(span, spans)
+                each = f", and span {last} has {counts[last - 1]} droppers."
                 raise InputError(
                     f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans"
-                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else f", {_own(counts, span)}.")
+                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else each)
                 )
         return [int(firsts[span - 1]) + number - 1 for span, number in places]
 

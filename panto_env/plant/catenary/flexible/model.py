@@ -1,8 +1,8 @@
-"""Static state of a line with overlaps and defects: that of each tension length, in the line's tables."""
+"""A flexible catenary for a number of lanes, and the defects of its tension lengths in the line's tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..schema import FEWEST_SPANS
 from .arrays import Beside, FlexibleLine
 from .blown import air_about, start_wind
 from .build import Tensioned, at_rest, constants, of_tension, settle
-from .defects import DefectiveLine, StaticState, check_places, shape_left, with_tension_left
+from .defects import DefectiveLine, StaticState, located_defects, shape_left, with_tension_left
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
 from .on_grid import dropper_positions
@@ -46,7 +46,7 @@ class DefectiveParts:
         itself are on the wire in use there.
         """
         self._parts = tension_lengths(data)
-        check_places(data, _counts(self._parts, spans), condition)
+        located_defects(data, _counts(self._parts, spans), condition)
         locate(data, spans, condition)
         self.lines = [
             DefectiveLine(part.line, part.spans, _of_part(part, data, condition), tensions)
@@ -119,29 +119,21 @@ def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
 def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCondition) -> LineCondition:
     """The condition of one tension length, with its own numbers of spans, droppers and supports."""
 
-    def local(span: int, number: int) -> tuple[int, int] | None:
-        k = span - 1 - part.first_span
-        if not 0 <= k < part.spans:
-            return None
-        counts = [len(table.positions) for table in part.line.dropper_tables]
-        first = int(part.droppers[sum(counts[:k])]) - firsts[span - 1]
-        return (k + 1, number - first) if 1 <= number - first <= counts[k] else None
+    def numbered(counts: list[int]) -> list[tuple[int, int]]:
+        """Span and number in it of all droppers, both from 1."""
+        return [(span, n) for span, count in enumerate(counts, 1) for n in range(1, count + 1)]
 
-    firsts = np.append(0, np.cumsum(_counts(tension_lengths(data), data.spans))).tolist()
-
-    def droppers(places: tuple[tuple[int, int], ...]) -> Iterator[tuple[int, int, int]]:
-        for n, place in enumerate(places):
-            found = local(*place)
-            if found is not None:
-                yield n, *found
-
-    cut = condition.miscut_droppers
+    along = numbered(_counts(tension_lengths(data), data.spans))
+    its = numbered([len(table.positions) for table in part.line.dropper_tables])
+    own = dict(zip([along[k] for k in part.droppers.tolist()], its, strict=True))
     supports, (begin, end) = data.alignment().supports, part.in_use
     return condition.model_copy(
         update={
-            "broken_droppers": tuple((a, b) for _, a, b in droppers(condition.broken_droppers)),
+            "broken_droppers": tuple(own[place] for place in condition.broken_droppers if place in own),
             "miscut_droppers": tuple(
-                (a, b, cut[n][2]) for n, a, b in droppers(tuple((span, number) for span, number, _ in cut))
+                (*own[span, number], wrong)
+                for span, number, wrong in condition.miscut_droppers
+                if (span, number) in own
             ),
             "raised_supports": tuple(
                 (support - part.first_span, wrong)
@@ -285,14 +277,9 @@ class FlexibleCatenary:
         for own, now, line in parts:
             check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
 
-    def _tensions(self, drawn: DrawnLine) -> tuple[float, float]:
-        """Tensions of a drawn line's wires, relative to those that they have not lost."""
-        (contact, messenger), fixed = drawn.tensions, self._fixed
-        return contact * fixed[0], messenger * fixed[1]
-
     def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
         """What depends on the tensions of a drawn line."""
-        tensions = self._tensions(drawn)
+        tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]
         own = with_tension_left(designed, drawn.condition, tensions)
         shape = shape_left(designed, own)
         defective = self._defective[drawn.condition]

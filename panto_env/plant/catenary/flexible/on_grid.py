@@ -16,7 +16,7 @@ from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .grid import implicit_share, missing_yield, point_gain, spring_levels
 from .overlaps import Stitches, TensionLength, pairs_of, tension_lengths
 from .schema import FlexibleCatenaryData
-from .spans import spans_of
+from .spans import hung_at, spans_of
 from .static import StaticShape
 from .wire_defects import WireDefects
 from .wires import places
@@ -31,10 +31,6 @@ class Springs(NamedTuple):
     place: Array  # (springs,): along the line, in nodes
     levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
     mass: Array  # (springs,): that moves with the wire (kg)
-
-    def rows(self, which: slice) -> tuple[Index, Array, Array, Array]:
-        """Wire, place, levels and mass of some springs."""
-        return self.wire[which], self.place[which], self.levels[which], self.mass[which]
 
 
 class Links(NamedTuple):
@@ -79,12 +75,7 @@ def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
         for part in parts:
             found[part.droppers] = part.begin + dropper_positions(part.line, part.spans)
         return found
-    if not data.sequence:
-        offsets = np.array(data.droppers.positions)
-        return np.asarray(np.add.outer(np.arange(spans) * data.span_length, offsets).ravel())
-    supports = data.alignment(spans).supports
-    hung = zip(supports, spans_of(data).each, strict=False)
-    return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung][:spans])
+    return hung_at(data, spans)
 
 
 def springs_of(part: TensionLength, places: Array, step: float, spots: Array) -> Springs:
@@ -137,21 +128,18 @@ def links_of(data: FlexibleCatenaryData, spans: int, shape: StaticShape, stitche
     )
 
 
-def joined_springs(each: Sequence[tuple[TensionLength, Springs]]) -> Springs:
-    """Those of several tension lengths: masts in their order along the line, then all hard spots.
-
-    Uplift is recorded at masts where the tension length is in use.
-    """
-    if len(each) == 1:
-        return each[0][1]
-    masts: list[tuple[float, int, int, int]] = []  # place, number, which tension length, which of its masts
-    for k, (_, own) in enumerate(each):
-        for n in range(own.masts):
-            masts.append((float(own.place[2 * n]), int(own.number[n]), k, n))
-    masts.sort()
-    rows = [each[k][1].rows(slice(2 * n, 2 * n + 2)) for _, _, k, n in masts]
-    rows += [own.rows(slice(2 * own.masts, None)) for _, own in each]
-    wire, place, levels, mass = (np.concatenate(found) for found in zip(*rows, strict=True))
+def joined_springs(each: Sequence[Springs]) -> Springs:
+    """Those of several tension lengths: masts in their order along the line, then all hard spots."""
+    masts = sorted(
+        (float(own.place[2 * n]), int(own.number[n]), k, n)
+        for k, own in enumerate(each)
+        for n in range(own.masts)
+    )
+    some = [(each[k], slice(2 * n, 2 * n + 2)) for _, _, k, n in masts]
+    some += [(own, slice(2 * own.masts, None)) for own in each]
+    wire, place, levels, mass = (
+        np.concatenate([np.asarray(own[k])[which] for own, which in some]) for k in range(2, 6)
+    )
     return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)
 
 
@@ -243,6 +231,10 @@ def stitch_grid(
     np.add.at(mass, (carrying, node[on] + 1), share[on] * links.mass[on, 1])
     moves = np.ones(intervals + 1)
     moves[[0, -1]] = 0.0
+
+    def over(wire: int) -> Stitches:
+        return stitches.some(stitches.wire == wire, stitches.carrying[:0])
+
     return StitchGrid(
         stitches=stitches._replace(carrying=links.stitch),
         intervals=intervals,
@@ -253,7 +245,7 @@ def stitch_grid(
         bare_mobility=step**2 / bare[:, 0] / settle,
         node=node,
         share=share,
-        deficit=np.stack([stitches.over(2 * k).deficit(x - dx, x) for k in range(pairs_of(data))]),
+        deficit=np.stack([over(2 * k).deficit(x - dx, x) for k in range(pairs_of(data))]),
     )
 
 

@@ -19,7 +19,7 @@ from .arrays import CONTACT
 from .parts import CLOSEST, SAME, Overlap, Span, nearer
 from .schema import FlexibleCatenaryData
 from .shape import InUse, Profile, Rope, StaticShape
-from .spans import spans_of, stitch_at_end, valid
+from .spans import hung_at, spans_of, stitch_at_end, valid
 
 FAR = 100.0
 """Height (m) at which a wire counts that is not there: no pantograph reaches it."""
@@ -256,22 +256,9 @@ class Stitches(NamedTuple):
         """Places of all clamps (m), (2 stitches,)."""
         return np.sort(np.append(self.begin, self.end))
 
-    def over(self, wire: int) -> Stitches:
-        """Those over a contact wire, without their droppers."""
-        return self.some(self.wire == wire, self.carrying[:0])
-
     def some(self, which: Any, carrying: Index) -> Stitches:
         """Some of them, in another order, that carry droppers in this way."""
-        return Stitches(
-            self.support[which],
-            self.begin[which],
-            self.end[which],
-            self.tension[which],
-            self.mass[which],
-            self.clamp_mass[which],
-            self.wire[which],
-            carrying,
-        )
+        return Stitches._make([*(each[which] for each in self[:-1]), carrying])
 
     def deficit(self, begin: Array, end: Array) -> Array:
         """By how much the messenger's tension is less (N), the mean from ``begin`` to ``end`` (m), (n,)."""
@@ -294,8 +281,7 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
     wires = [stitch for k in there if (stitch := found[k]) is not None]
     place = np.array([supports[k] for k in there])
     half = np.array([stitch.length / 2 for stitch in wires])
-    hung = zip(supports, each, strict=False)
-    x = np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung])
+    x = hung_at(line, spans)
     begin, end, carrying = place - half, place + half, np.full(len(x), -1)
     for number in range(len(there)):
         carrying[(x > begin[number] + SAME) & (x < end[number] - SAME)] = number
@@ -317,34 +303,20 @@ def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitche
 def moving_stitches(line: FlexibleCatenaryData, spans: int) -> Stitches:
     """The stitch wires of a line of so many spans that move, of all tension lengths, in their order."""
     parts = tension_lengths(line, spans)
-    each = [
-        placed(moving(stitches_of(part.line, part.spans), part.spans), part.begin, part.wire)
-        for part in parts
-    ]
-    return together(each, [part.droppers for part in parts])
-
-
-def placed(stitches: Stitches, begin: float, wire: int) -> Stitches:
-    """Those of a tension length that begins at a place of the line (m), over a contact wire."""
-    return stitches._replace(
-        begin=stitches.begin + begin, end=stitches.end + begin, wire=stitches.wire + wire
-    )
-
-
-def together(each: Sequence[Stitches], droppers: Sequence[Index]) -> Stitches:
-    """Those of several tension lengths, in their order along the line.
-
-    droppers: of each tension length, their numbers along the line.
-    """
-    if len(each) == 1:
+    each = [moving(stitches_of(part.line, part.spans), part.spans) for part in parts]
+    if len(parts) == 1:
         return each[0]
+    each = [
+        own._replace(begin=own.begin + part.begin, end=own.end + part.begin, wire=own.wire + part.wire)
+        for part, own in zip(parts, each, strict=True)
+    ]
     firsts = np.append(0, np.cumsum([len(own.support) for own in each]))
     all_of_them = Stitches(*(np.concatenate(found) for found in zip(*each, strict=True)))
     order = np.argsort(all_of_them.begin, kind="stable")
     rank = np.append(np.argsort(order), -1)  # the last entry is that of droppers on a messenger
-    carrying = np.full(sum(len(numbers) for numbers in droppers), -1)
-    for first, own, numbers in zip(firsts, each, droppers, strict=False):
-        carrying[numbers] = rank[np.where(own.carrying < 0, -1, first + own.carrying)]
+    carrying = np.full(sum(len(part.droppers) for part in parts), -1)
+    for first, own, part in zip(firsts, each, parts, strict=False):
+        carrying[part.droppers] = rank[np.where(own.carrying < 0, -1, first + own.carrying)]
     return all_of_them.some(order, carrying)
 
 

@@ -1,18 +1,14 @@
 """Grid, time step and window of a flexible catenary: fine enough for the runs that it is built for.
 
 A step is given by the speed as a share of the wave speed, and the grid is the finest that is stable with it:
-near that limit waves of all lengths travel as on the wire. A coarse grid fails in two ways. The waves ahead
-of a train are short: without bending stiffness a force at f Hz sends waves of length (c - v) / f ahead
-(``waves``). And a slow train passes a node every dx / v, and the force has a ripple of this period, which the
-20 Hz filter removes only while it is short. A long step makes the force of slow trains, which changes by
-little, too even. docs/validation.md compares the figures at every speed, on every line, with converged ones.
-
-Spans of a line that a run needs: about the train, and beyond the end of its pass.
+near that limit waves of all lengths travel as on the wire. A coarse grid fails in two ways: the waves ahead
+of a train are short (``grid.wave_ahead``), and a slow train passes a node every dx / v, with a ripple of the
+force that the 20 Hz filter removes only while it is short. docs/validation.md compares the figures at every
+speed, on every line, with converged ones.
 
 What a line sends back from beyond the window is missing. Waves come back from the farther, the slower the
-train is, and first along the faster wire; so the share of that wire's wave speed decides how many spans are
-enough. A whole line has an anchor at its far end, which reflects waves too: a line is long enough if the
-train meets none of them before its pass ends.
+train is, and first along the faster wire, whose wave speed decides how many spans are enough. A whole line is
+long enough if the train meets no wave from its far anchor before its pass ends.
 """
 
 from __future__ import annotations
@@ -30,6 +26,8 @@ from ....base.errors import AccuracyWarning, InputError
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from ..schema import CLEAR, MOST_SPANS, Wire
+from .defects import with_tension_left
+from .fixed_wires import tensions_of_fixed
 from .grid import carrying_grid, finest_stable, nodes_per_span, stable
 from .overlaps import stitched
 from .schema import FlexibleCatenaryData
@@ -379,15 +377,13 @@ def window_of(
     return max(enough, WITH_OVERLAPS if overlaps else 0)
 
 
-def clear_spans(
-    wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs, last: int, stitched: bool = False
-) -> int:
-    """Spans of a line beyond the ``last`` one of a pass that keep its far anchor's waves from the train.
+def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last: int) -> int:
+    """As ``CatenaryKind.clear_spans``; a whole line needs more of them for a slower train.
 
-    Waves and the train leave the line's start together. Raises InputError where a whole line would be too
-    long.
+    Waves and the train leave the line's start together.
     """
-    window = window_of(wires, numerics, runs, stitched=stitched)
+    wires = _wires_in(data, runs)
+    window = window_of(wires, numerics, runs, stitched=stitched(data))
     if window:
         return max(CLEAR, window // 2)
     speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
@@ -403,28 +399,35 @@ def clear_spans(
     return max(CLEAR, needed - last)
 
 
-def warn_if_slow(wires: tuple[Wire, Wire], runs: Runs) -> None:
-    """Warn of slow trains on a line with stitch wires."""
-    limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
-    if runs.speeds[0] < limit:
-        warnings.warn(
-            f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
-            f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
-            "spans; give window=0 for the whole line.",
-            AccuracyWarning,
-            stacklevel=4,
-        )
-
-
-def warn_if_short(wires: tuple[Wire, Wire], numerics: Numerics, runs: Runs) -> None:
-    """Warn where a given window costs more than 1 % of the figures."""
-    window, enough = numerics.window, enough_spans(wires, runs)
-    if numerics.accuracy == "full" and window and window < enough:
+def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
+    """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires."""
+    wires, window = _wires_in(data, runs), numerics.window
+    if numerics.accuracy != "full":
+        return
+    enough = enough_spans(wires, runs)
+    if window and window < enough:
         error = next(percent for spans, percent in ERRORS if window >= spans)
         warnings.warn(
             f"A window of {window} spans is too short at {to_kmh(runs.speeds[0]):.0f} km/h, where "
             f"{enough} are needed: standard deviation, maximum and minimum may be wrong by up to about "
             f"{error} %; leave out window.",
             AccuracyWarning,
-            stacklevel=4,
+            stacklevel=3,
         )
+    limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
+    if window is None and stitched(data) and runs.speeds[0] < limit:
+        warnings.warn(
+            f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
+            f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
+            "spans; give window=0 for the whole line.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+
+
+def _wires_in(data: FlexibleCatenaryData, runs: Runs) -> tuple[Wire, Wire]:
+    """The wires with their tension and ice in these runs."""
+    condition = runs.conditions[0]
+    if not (condition.temperature or condition.ice):
+        return data.wires
+    return with_tension_left(data, condition, tensions_of_fixed(data, condition)).wires

@@ -122,20 +122,31 @@ def _check_wires(each: _Placed, shape: StaticShape) -> None:
             f"At rest the messenger wire of {each.where} would hang {below.max():.2g} m below "
             f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
         )
-    heights = float(np.ptp(contact - each.rise / each.span.span_length * x))
-    if heights > HEIGHT_RANGE:
-        raise InputError(
-            f"At rest the contact wire of {each.where} would differ by "
-            f"{beside(heights, HEIGHT_RANGE, '.2g')} m in height along a span, more than "
-            f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
-        )
-    for name, height in (("contact", contact), ("messenger", messenger)):
+    straight = each.rise / each.span.span_length * x
+    too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+    too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
+    check_level(each.where, x, (contact, messenger), straight, too_high, too_steep)
+
+
+def check_level(
+    where: str, x: Array, heights: tuple[Array, Array], straight: Array, too_high: str, too_steep: str
+) -> None:
+    """Raise InputError for a wire that is too steep, or a contact wire of too many heights.
+
+    heights: of contact wire and messenger (m) at even places x (m) of a span, (n,); straight: of the line
+    between the supports (m). too_high, too_steep: ends of the sentences.
+    """
+    uneven = float(np.ptp(heights[0] - straight))
+    if uneven > HEIGHT_RANGE:
+        most = beside(uneven, HEIGHT_RANGE, ".2g")
+        raise InputError(f"At rest the contact wire of {where} would differ by {most} m in height{too_high}")
+    for name, height in zip(("contact", "messenger"), heights, strict=True):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
+            most = beside(slope, STEEPEST, ".2g")
             raise InputError(
-                f"At rest the {name} wire of {each.where} would have a slope of "
-                f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
-                "level wires; give it more tension, or shorter spans."
+                f"At rest the {name} wire of {where} would have a slope of {most}, more than {STEEPEST}"
+                f"{too_steep}"
             )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ..protocol import LineView
+from ..protocol import NONE, LineView
 from .arrays import CONTACT, MESSENGER, PAD
 from .overlaps import FAR, heights_of_pair, moving_stitches, tension_lengths
 from .scattered_build import present, rope_nodes
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 VIEW_POINTS = 401
 """Number of points of a span at which the messenger's height is kept for pictures."""
-NONE = np.zeros(0)
 
 
 def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> LineView:

@@ -23,7 +23,7 @@ from .overlaps import Stitches, as_wire, stitches_of
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
 from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, settled, stiffness_of, unloaded
-from .spans import spans_of
+from .spans import hung_at, spans_of
 
 
 class StitchedMessenger:
@@ -176,9 +176,7 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     tops = heights + np.array(encumbrances)  # of the messenger's supports without load
     counts = [len(span.droppers.positions) for span in spans]
     own = [slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True)]
-    x = np.concatenate(
-        [begin + span.droppers.positions for begin, span in zip(supports, spans, strict=False)]
-    )
+    x = hung_at(line)
     sag = np.concatenate([span.droppers.sag for span in spans])
     masts = np.arange(len(supports)) + np.append(0, np.cumsum(counts))  # nodes
     hung = np.delete(np.arange(len(supports) + len(x)), masts)
