@@ -78,7 +78,6 @@ class Runs(NamedTuple):
 
     @property
     def _shortest_gust(self) -> float:
-        """Time (s) in which the fastest train passes the shortest gust, infinite where there are none."""
         winds = [condition.wind for condition in self.conditions if condition.weather.gusts]
         return SHORTEST_GUST / (self.speeds[1] + max(winds)) if winds else math.inf
 

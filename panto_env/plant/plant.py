@@ -1,10 +1,4 @@
-"""Lanes of trains on one line: the arrays behind the kernels.
-
-A lane's run on a flexible line that goes on, in other lanes, on lines that differ ahead of the train only.
-
-Waves run ahead of a train, but they have died out after some spans: what differs there has no effect before.
-So a line that differs at its end need not be computed from its beginning.
-"""
+"""Lanes of trains on one line: the arrays behind the kernels; and how lanes go on with one lane's state."""
 
 from __future__ import annotations
 
@@ -17,7 +11,6 @@ from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Index, Lanes
 from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
-from .catenary.flexible.model import FlexibleCatenary
 from .catenary.flexible.scattered_build import slots_of_links
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
@@ -151,7 +144,6 @@ class Plant:
         check_speeds(self.catenary.name, self.model.wave_speed, [speed])
 
     def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
-        """Set a collector's pantograph, with the moving mass of its actuator if it has one."""
         own = self.train.collectors[collector]
         reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
         self.pantographs.set_lanes(collector, lanes, pantograph, self.model, reflected)
@@ -238,7 +230,6 @@ class Plant:
         return table
 
     def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> None:
-        """Let the wind of the drawn lines blow in lanes, (n,)."""
         if self.run.wind.shape[1]:
             mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
             rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
@@ -274,7 +265,6 @@ class Plant:
         self._advance(samples, command, steps, 0, count)
 
     def _check_way(self, steps: int, samples: Samples, lanes: int) -> None:
-        """Raise InputError unless lanes can advance by ``steps``, and the samples have rows for them."""
         end, rows = self.row(Row.STEP)[:lanes] + steps, samples.rows.shape[1]
         if rows > 1 and end.max() >= rows:
             raise InputError(
@@ -294,77 +284,52 @@ class Plant:
         self.advance(np.zeros((self.lanes, len(self.train.collectors), len(Place))), steps, samples, lanes)
 
 
-class WireKept(NamedTuple):
-    """State of one lane's wires."""
+class Kept(NamedTuple):
+    """State of one lane of a flexible line, to go on with."""
 
-    arrays: tuple[Array, ...]  # its row of each array of the wires
+    wire: tuple[Array, ...]  # its row of each array of the wires
     static: Array  # (links,): of its line (N)
     gap: Array  # (links,): (m)
-
-
-def keep_wire(model: FlexibleCatenary, lane: int) -> WireKept:
-    """The present state of one lane's wires, to go on with."""
-    arrays = tuple(array[_row(array, lane)].copy() for array in _arrays(model.wire))
-    tables = model.line.link_static, model.line.link_gap
-    return WireKept(arrays, *(table[_row(table, lane)].copy() for table in tables))
-
-
-def go_on_with(model: FlexibleCatenary, lane: int, drawn: DrawnLine, kept: WireKept) -> None:
-    """Put one lane's wires into a kept state, on the line ``drawn``, of the same tensions."""
-    model.settle(lane, drawn, 0.0)
-    for array, own in zip(_arrays(model.wire), kept.arrays, strict=True):
-        array[_row(array, lane)] = own
-    line, wire = model.line, model.wire
-    if len(line.link_static) == 1:
-        return  # all lanes have one line
-    numbers, sets, segments = slots_of_links(line, wire, lane)
-    longer = (line.link_gap[lane] - kept.gap)[numbers]
-    wire.static[lane, sets, segments] += (line.link_static[lane] - kept.static)[numbers]
-    wire.gap[lane, sets, segments] += longer
-    wire.extension[lane, sets, segments] -= longer
-
-
-def _row(table: Array, lane: int) -> int:
-    return min(lane, len(table) - 1)
-
-
-def _arrays(tuples: Any) -> Iterator[Array]:
-    """Arrays of nested named tuples."""
-    for each in tuples:
-        if isinstance(each, np.ndarray):
-            yield each
-        else:
-            yield from _arrays(each)
-
-
-class Kept(NamedTuple):
-    """State of one lane, to go on with."""
-
-    wire: WireKept
     speed: float  # m/s
     rows: tuple[Array, ...]  # of pantographs, actuators and trains
 
 
 def keep(plant: Plant, lane: int) -> Kept:
     """The present state of one lane of a flexible line."""
-    assert isinstance(plant.model, FlexibleCatenary)
+    line = plant.model.line
+    wire = tuple(array[min(lane, len(array) - 1)].copy() for array in _arrays(plant.model.wire))
+    static, gap = (each[min(lane, len(each) - 1)].copy() for each in (line.link_static, line.link_gap))
     rows = tuple(table[..., min(lane, table.shape[-2] - 1), :].copy() for table in _tables(plant))
-    return Kept(keep_wire(plant.model, lane), float(plant.speed[lane]), rows)
+    return Kept(wire, static, gap, float(plant.speed[lane]), rows)
 
 
 def go_on(plant: Plant, drawn: Sequence[DrawnLine], kept: Kept) -> None:
     """Put the first lanes into a kept state, of this plant or of one like it, each on a line of its own.
 
-    The drawn lines must not differ from the kept lane's where the train has been, nor for some spans ahead of
-    it: three for a dropper, six for a support. Closer, the force would differ from that of a run from the
-    line's start.
+    The lines must have the kept one's tensions, and not differ from it where the train has been, nor for some
+    spans ahead of it: three for a dropper, six for a support. Closer, the force would differ from that of a
+    run from the line's start; waves ahead of a train have died out farther away.
     """
-    assert isinstance(plant.model, FlexibleCatenary)
-    for lane, line in enumerate(drawn):
-        go_on_with(plant.model, lane, line, kept.wire)
+    line, wire = plant.model.line, plant.model.wire
+    for lane, own_line in enumerate(drawn):
+        plant.model.settle(lane, own_line, 0.0)
+        for array, own in zip(_arrays(wire), kept.wire, strict=True):
+            array[min(lane, len(array) - 1)] = own
+        if len(line.link_static) > 1:  # else all lanes have one line
+            numbers, sets, segments = slots_of_links(line, wire, lane)
+            longer = (line.link_gap[lane] - kept.gap)[numbers]
+            wire.static[lane, sets, segments] += (line.link_static[lane] - kept.static)[numbers]
+            wire.gap[lane, sets, segments] += longer
+            wire.extension[lane, sets, segments] -= longer
     plant.speed[: len(drawn)] = kept.speed
     for table, row in zip(_tables(plant), kept.rows, strict=True):
         table[..., : len(drawn), :] = np.expand_dims(row, -2)
+
+
+def _arrays(tuples: Any) -> Iterator[Array]:
+    """Arrays of nested named tuples."""
+    for each in tuples:
+        yield from [each] if isinstance(each, np.ndarray) else _arrays(each)
 
 
 def _tables(plant: Plant) -> tuple[Array, ...]:

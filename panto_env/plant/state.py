@@ -1,4 +1,4 @@
-"""Where a run ends early: the bounds within which the plant is valid, and the reason given beyond them."""
+"""What kernels know of all lanes, and where a run ends early: the bounds within which the plant is valid."""
 
 from __future__ import annotations
 

@@ -1,15 +1,13 @@
-"""Shape of a line at one moment, for pictures.
-
-What a kind of catenary provides: a class for Python, and its operations for kernels.
+"""What a kind of catenary provides: a class for Python, and its operations for kernels.
 
 A step of a lane calls ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
 point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. ``ending_by_wire`` is called once per
 control step. A class of line constants has its own sources of ``place_contact`` and ``look_at_contact``, and
 of the other operations that it needs; the default of an operation is written here: nothing moves.
 
-A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
-the step is read there with the weights with which the force acts there, so the work of the force on the wire
-is exactly force times change of that height, and no contact is too stiff to be stable.
+A contact point stays where it is at mid-step. The wire's height at both ends of the step is read there with
+the weights with which the force acts there, so the work of the force on the wire is exactly force times
+change of that height, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations

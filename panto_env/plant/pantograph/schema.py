@@ -1,4 +1,4 @@
-"""Data of a pantograph. All values in SI units, up is positive."""
+"""A pantograph: its data, in SI units, up positive; its equations, discretised exactly; its rest."""
 
 from __future__ import annotations
 

@@ -164,7 +164,6 @@ def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Arr
 
 @remembered
 def _table(period: float, breaks: tuple[float, ...], repeats: bool) -> Located:
-    """Places of the table of the static height: the same for all tensions."""
     return located(np.array(breaks), _table_places(period), repeats)
 
 

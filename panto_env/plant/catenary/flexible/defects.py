@@ -220,7 +220,6 @@ class DefectiveLine:
         self._carry(left)
 
     def _stitch(self, messenger: Wire) -> None:
-        """Add the messenger and the stitch wires."""
         places, stitches, lengths, size = self._places, self._stitches, self._lengths, self._size
         above = self._unknowns + 2 * (MESSENGER - CONTACT)
         tensions = messenger.tension - stitches.deficit(places, places + lengths)

@@ -1,12 +1,9 @@
-"""Finite differences of a flexible catenary: their weights, stability, and error at a point force.
-
-Waves of the contact wire that run ahead of a train, and the grid that carries them.
+"""Finite differences of a flexible catenary: weights, stability, error at a point force, waves carried.
 
 A force that changes at f Hz and travels at v sends waves ahead whose length shrinks with the train's distance
-from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. Two errors of a grid
-grow with k: it carries no wave of less than two nodes, and a clamp, which hangs on two nodes, reflects too
-little. Both limits were set where figures of the catalogue's lines and of drawn ones leave their bounds,
-those of ``fine_enough`` in ``resolution``.
+from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. A grid carries no wave
+of less than two nodes, and a clamp, which hangs on two nodes, reflects too little. Both limits were set where
+figures of the catalogue's lines and of drawn ones leave the bounds of ``fine_enough`` in ``resolution``.
 """
 
 from __future__ import annotations
@@ -203,7 +200,6 @@ def _fitted(share: float) -> tuple[Array, Array]:
 
 
 def _frequency(wire: Wire, number: Any) -> Any:
-    """Frequency (rad/s) of a wire's free waves of a wavenumber (rad/m)."""
     return np.sqrt((wire.tension * number**2 + wire.bending_stiffness * number**4) / wire.mass)
 
 
@@ -258,7 +254,6 @@ def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:
 
 
 def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
-    """Spacing (m) on which a contact wire's clamp reflects waves well enough."""
     wire, mass = data.contact_wire, max(own.contact_clamp_mass for own in data.dropper_tables)
     number = wave_ahead(wire, speed, CLAMP_HZ)
     share = (2 * math.pi * CLAMP_HZ + speed * number) * mass / (2 * wire.impedance)

@@ -108,7 +108,6 @@ class DefectiveParts:
 
 
 def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
-    """Number of droppers in each span of the line."""
     counts = [0] * spans
     for part in parts:
         for k, table in enumerate(part.line.dropper_tables):
@@ -237,7 +236,6 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        """Write the defects into the line, or tables for them where each lane draws its own."""
         kind = DefectiveParts if data.overlaps else DefectiveLine
         self._defective = {condition: kind(data, spans, condition, self._fixed) for condition in conditions}
         first = conditions[0]
@@ -278,7 +276,6 @@ class FlexibleCatenary:
             check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
 
     def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
-        """What depends on the tensions of a drawn line."""
         tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]
         own = with_tension_left(designed, drawn.condition, tensions)
         shape = shape_left(designed, own)
@@ -288,7 +285,6 @@ class FlexibleCatenary:
         return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
 
     def _write_tension(self, row: int, shape: StaticShape, tensioned: Tensioned) -> None:
-        """Write the stencil and the static shape for a lane's own tensions."""
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
         self._shapes[row] = shape
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.

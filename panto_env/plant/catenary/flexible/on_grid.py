@@ -1,4 +1,4 @@
-"""What is attached to the wires of a flexible catenary: springs to the ground, and links between wires."""
+"""What is attached to the wires, on the grid: springs to the ground, droppers, and stitch wires."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tension lengths of a line: pairs of wires from anchor to anchor, two of them side by side in each overlap.
+"""Tension lengths of a line, pairs of wires from anchor to anchor that overlap; and its stitch wires.
 
 Each is a line of its own: spans with heights of their own, its static shape, its defects. The wires of every
 second tension length form one pair of wires on the grid.
@@ -140,7 +140,6 @@ def _own_line(
     entering: Overlap | None,
     leaving: Overlap | None,
 ) -> FlexibleCatenaryData:
-    """The line of one tension length, whose contact wire rises over the line's own in overlaps."""
     each, _, encumbrances = spans_of(line)
     rise = np.zeros(last - first + 1)  # at its supports
     tables: list[dict[str, Any]] = [each[span].model_dump(exclude_none=True) for span in range(first, last)]

@@ -145,7 +145,6 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
 
 @remembered
 def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple[Resolution, tuple[str, ...]]:
-    """The resolution, and what to warn of."""
     fast = numerics.accuracy == "fast"
     required = _fast(data, runs) if fast else fine_enough(data, runs, numerics.time_step)
     found = _stable(data, numerics, runs, required)
@@ -252,7 +251,6 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
 
 
 def _lightest(runs: Runs) -> float:
-    """Mass of the most worn contact wire, as a share of a new one's."""
     worn = [share for condition in runs.conditions for *_, share in condition.worn_stretches]
     return 1 - max(worn, default=0.0)
 

@@ -142,7 +142,6 @@ def _along(
 
 
 def _stitches(grid: OnGrid, real: Any) -> AlongLine:
-    """Stitch wires along the line."""
     ropes, count = grid.ropes, len(grid.ropes.spacing)
     empty = np.zeros(STITCH.INERTIA + ropes.intervals + 1, real)
     above = np.repeat(ropes.stitches.wire, 2)[:, None] + MESSENGER

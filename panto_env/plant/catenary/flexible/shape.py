@@ -1,4 +1,4 @@
-"""A wire as tensioned beams from node to node, by elements of their exact shape.
+"""The static shape of a line: wires as tensioned beams from node to node, and how droppers settle.
 
 A tensioned beam obeys T y'' - EI y'''' + p = 0, up positive. Between two nodes a distance l apart, under an
 even load p per length, it has the shape ``a + b s + c exp(-kappa s) + d exp(-kappa (l - s)) + e s (l - s)``,

@@ -159,7 +159,6 @@ def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, 
 
 
 def _changed(own: Table, changes: Any, where: str) -> Span:
-    """A span with the values of a table in the place of its own."""
     if not isinstance(changes, Mapping):
         raise InputError(f"The {where} must be a table of a span's values.")
     table = {**own, **changes}

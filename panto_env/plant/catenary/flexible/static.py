@@ -96,7 +96,6 @@ def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
 
 
 def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
-    """Raise InputError for a support of the messenger that gives way, the one that yields most."""
     places, tops = np.zeros(1), np.full(1, line.encumbrance)
     if line.sequence:
         _, heights, encumbrances = spans_of(line)
@@ -178,7 +177,6 @@ def _check_droppers(each: _Placed, shape: StaticShape) -> None:
 
 
 def _settle(line: FlexibleCatenaryData) -> StaticShape:
-    """The static shape of a span that repeats."""
     droppers, messenger = line.droppers, line.messenger_wire
     x, sag = np.array(droppers.positions), np.array(droppers.sag)
     breaks = np.concatenate([[0.0], x, [line.span_length]])
@@ -218,7 +216,6 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
-    """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
     if line.stitch_wire is None:
         return None
     found = stitches_of(line, 1)

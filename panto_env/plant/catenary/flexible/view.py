@@ -70,7 +70,6 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
 
 
 def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
-    """Static change of a contact wire's height by defects (m), (n,), as ``rise_by_defects``."""
     if not tables.rise.shape[1]:
         return np.zeros(len(x))
     row = min(lane, len(tables.rise) - 1)
@@ -78,7 +77,6 @@ def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
 
 
 def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
-    """Height of a pair's messenger at rest (m), (n,)."""
     if model.data.overlaps:
         return heights_of_pair(model.data, shape, pair, x, MESSENGER)
     heights = messenger_heights(shape)
@@ -124,7 +122,6 @@ def _ends(
     messengers: list[Array],
     ropes: dict[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    """Heights of the upper and of the lower ends of droppers (m)."""
     pair = np.zeros(len(model.droppers), dtype=int)
     for part in tension_lengths(model.data, model.alignment.spans):
         pair[part.droppers] = part.pair

@@ -1,13 +1,9 @@
-"""Messenger with stitch wires at rest, on its supports: about a support that repeats, or from end to end.
-
-Between the clamps of a stitch wire the messenger carries its tension less the stitch wire's. Nodes stand at
-supports, clamps and droppers; the height of a stitch wire's end is that of the messenger there.
-
-Static shape of a line whose spans differ, from end to end.
+"""Static shape of a line whose spans differ, from end to end, and of a messenger with stitch wires.
 
 Both wires are solved along the whole line. Its ends are as if the line went on there, mirrored: at the
 gradient of the outermost span, with half of a support's stiffness and load. A line of equal spans that are
-symmetric has the shape of one span that repeats, up to its ends.
+symmetric has the shape of one span that repeats, up to its ends. Between the clamps of a stitch wire the
+messenger carries its tension less the stitch wire's.
 """
 
 from __future__ import annotations
@@ -94,7 +90,6 @@ class StitchedMessenger:
         self._solve = splu(self._matrix()).solve
 
     def _at(self, places: Array) -> Any:
-        """Unknowns that are the messenger's height at places where it has nodes (m)."""
         return self._height[index_at(self.breaks, places)]
 
     def _add(self, wire: Wire, lengths: Array, unknowns: Any) -> tuple[Beams, Array]:
@@ -246,6 +241,5 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _end_slopes(supports: Array, heights: Array) -> tuple[float, float]:
-    """Slopes of the straight lines between the first two and the last two supports."""
     slopes = np.diff(heights) / np.diff(supports)
     return float(slopes[0]), float(slopes[-1])

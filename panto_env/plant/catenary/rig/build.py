@@ -1,4 +1,4 @@
-"""Data of a hardware-in-the-loop rig."""
+"""A hardware-in-the-loop rig: its data, and the constants of the computed line, cylinder and load cell."""
 
 from __future__ import annotations
 
@@ -116,7 +116,6 @@ class RigData(CatenaryData):
     @model_validator(mode="before")
     @classmethod
     def _as_its_line(cls, values: Any) -> Any:
-        """Take the data that lines of every kind have from ``line``."""
         if not isinstance(values, dict):
             return values
         line = values.get("line")
@@ -292,12 +291,6 @@ def second_order(omega: float, ratio: float, time_step: float) -> Array:
     return exponential(system * time_step)[:2].copy()
 
 
-def other_delays(computer: Computer) -> float:
-    """Delay (s) between command and cylinder without its own lag: the computer's, and the held output's."""
-    delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
-    return delay + computer.interval / 2
-
-
 def force_age(data: RigData) -> float:
     """Delay of a sample of the force (s): by its filter, and by half an interval, since it is held."""
     return math.sqrt(2) / (2 * np.pi * data.load_cell.filter_frequency) + data.computer.interval / 2
@@ -318,7 +311,8 @@ def assumed(data: RigData) -> Array:
     computer, cylinder = data.computer, data.cylinder
     omega = 2 * np.pi * (computer.assumed_frequency or cylinder.natural_frequency)
     ratio = cylinder.damping_ratio if computer.assumed_damping is None else computer.assumed_damping
-    delay = other_delays(computer)
+    delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
+    delay += computer.interval / 2  # of the output, which is held
     return np.array([1.0, 2 * ratio / omega + delay, 1 / omega**2 + 2 * ratio / omega * delay + delay**2 / 2])
 
 
@@ -332,8 +326,7 @@ def lead(data: RigData) -> Array:
 
 def bank(data: RigData) -> Array:
     """Each term of a command from the past heights of the contact point, an interval apart, (terms, past)."""
-    computer: Computer = data.computer
-    h = computer.interval
+    computer, h = data.computer, data.computer.interval
     if computer.compensation in ("inverse", "adaptive"):
         return np.array([[1, 0, 0, 0], np.array([3, -4, 1, 0]) / (2 * h), np.array([2, -5, 4, -1]) / h**2])
     weights = np.zeros((TERMS, 1))

@@ -1,6 +1,4 @@
-"""Arrays of a rig: its constants and the state of all lanes.
-
-The step of a rig: the cylinder follows commands, the load cell reads, and at each sample the line moves.
+"""The step of a rig: the cylinder follows commands, the load cell reads, and at each sample the line moves.
 
 The cylinder yields to the force only through the oil, so the contact sees a height that is known beforehand
 and a massless spring. Up is positive; the load cell reads the collectors' upward force minus the inertial
