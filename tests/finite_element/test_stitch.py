@@ -148,18 +148,6 @@ def test_a_stitch_wire_of_no_tension_without_droppers_is_none():
     )
 
 
-def test_equal_stitched_spans_of_a_sequence_move_as_one_span_repeated():
-    """The shape of a whole line, with half a stitch wire at its ends, and of a periodic span."""
-    line = stitched("re330", CLAMPED)
-    unlike = {"sequence": [{}, {}, {"encumbrance": line.encumbrance + 1e-9}, {}, {}]}
-    many = stitched("re330", CLAMPED | unlike)
-    assert many.sequence
-    one, other = (simulate(each, load_pantograph("cx"), 250.0, spans=5) for each in (line, many))
-    for key in ("contact_force", "head", "wire", "uplift", "support_position", "dropper_tension"):
-        expected = getattr(one, key)
-        np.testing.assert_allclose(getattr(other, key), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-
-
 def test_every_support_has_its_own_span_s_stitch_wire_and_the_ends_have_none_in_motion():
     """Droppers hang from it between its clamps, elsewhere from the messenger; clamps' masses are there."""
 

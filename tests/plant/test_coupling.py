@@ -100,7 +100,7 @@ def test_a_stiff_contact_loses_no_contact_by_grid_or_step(catenary, pantograph, 
 
 
 @pytest.mark.filterwarnings("ignore:A grid of")
-@pytest.mark.parametrize("stiffness", [50e3, 200e3, 500e3, 1e6])
+@pytest.mark.parametrize("stiffness", [50e3, 1e6])
 @pytest.mark.parametrize("settings", [{"accuracy": "fast"}, {"time_step": 5e-3}, {}], ids=str)
 def test_a_contact_that_may_pull_never_grows(stiffness, settings):
     run = simulate("en50318-2002", stiff(stiffness), 300, bilateral=True, record_droppers=False, **settings)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from panto_env import InputError, simulate
+from panto_env import InputError
 from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
@@ -94,15 +94,6 @@ def test_values_of_a_sequence_have_the_source_of_their_table(tmp_path):
     assert [found[f"sequence.{number}"] for number in (1, 2, 3)] == 3 * ["masts.csv"]
     assert found["droppers.mass"] == BY_DEFAULT
     assert found["droppers.stiffness"] == ""
-
-
-def test_equal_spans_written_out_run_as_the_uniform_line():
-    name = "en50318-2002"
-    written = FlexibleCatenaryData.model_validate(spelt_out(name))
-    uniform = load_catenary(name).model_copy(update={"spans": 6})
-    runs = [simulate(line, name, 250.0, distance=60.0) for line in (uniform, written)]
-    np.testing.assert_array_equal(runs[0].contact_force, runs[1].contact_force)
-    np.testing.assert_array_equal(runs[0].dropper_force, runs[1].dropper_force)
 
 
 def test_what_a_type_leaves_out_is_the_line_s_own(tmp_path):

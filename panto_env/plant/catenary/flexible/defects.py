@@ -24,7 +24,7 @@ from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
-from .arrays import CONTACT, MESSENGER, FlexibleLine
+from .arrays import CONTACT, MESSENGER
 from .overlaps import as_wire, joined, moving, stitches_of, tension_lengths
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
@@ -176,7 +176,7 @@ class DefectiveLine:
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
-        self._repeats = not data.sequence
+        self._repeats, self.pieces = not data.sequence, len(self._lengths)
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
         self._size = per_node * len(number)
         self._in_band = places_in_band(self._unknowns, self._size)
@@ -254,28 +254,6 @@ class DefectiveLine:
             self._error = self._miscut + np.tile(fit.too_long, self._times)
             self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
             self._load[self._masts] += fit.lift
-
-    def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
-        """The line with tables for ``rows`` defective ones, which ``write`` fills."""
-        droppers, real = len(self._static), line.link_static.dtype
-        return line._replace(
-            link_static=np.zeros((rows, droppers), dtype=real),
-            link_gap=np.zeros((rows, droppers), dtype=real),
-            rise=np.zeros((rows, len(self._unknowns), 5)),
-            rise_breaks=self.breaks,
-            rise_decay=np.full(rows, self.decay),
-        )
-
-    def write(
-        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
-    ) -> StaticState:
-        """Write the state under these errors, as ``solve`` takes them, into the line's tables."""
-        state = self.solve(scatter, heights)
-        line.link_static[row] = state.tension
-        line.link_gap[row] = state.gap
-        line.rise[row] = state.rise
-        line.rise_decay[row] = self.decay
-        return state
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""

@@ -17,7 +17,7 @@ from ..schema import FEWEST_SPANS
 from .arrays import Beside, FlexibleLine
 from .blown import air_about, start_wind
 from .build import Tensioned, at_rest, constants, of_tension, settle
-from .defects import DefectiveLine, StaticState, located_defects, shape_left, with_tension_left
+from .defects import DefectiveLine, located_defects, shape_left, with_tension_left
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
 from .on_grid import dropper_positions
@@ -30,7 +30,7 @@ from .wire_defects import locate
 
 
 class DefectiveParts:
-    """All tension lengths of a line with the defects of a condition; used as a ``DefectiveLine``."""
+    """All tension lengths of a line with the defects of a condition; most lines have only one."""
 
     def __init__(
         self,
@@ -45,16 +45,19 @@ class DefectiveParts:
         the beginning wires. Both messengers' supports at a mast are raised alike. Defects of the contact wire
         itself are on the wire in use there.
         """
-        self._parts = tension_lengths(data)
-        located_defects(data, _counts(self._parts, spans), condition)
-        locate(data, spans, condition)
+        self._parts = parts = tension_lengths(data, spans)
+        conditions = [condition]
+        if len(parts) > 1:
+            located_defects(data, _counts(parts, spans), condition)
+            locate(data, spans, condition)
+            conditions = [_of_part(part, data, condition) for part in parts]
         self.lines = [
-            DefectiveLine(part.line, part.spans, _of_part(part, data, condition), tensions)
-            for part in self._parts
+            DefectiveLine(part.line, part.spans, own, tensions)
+            for part, own in zip(parts, conditions, strict=True)
         ]
         """The static state of each tension length."""
-        self._droppers = sum(len(part.droppers) for part in self._parts)
-        self._breaks = [self._breaks_of(pair)[0] for pair in (0, 1)]
+        self._droppers = sum(len(part.droppers) for part in parts)
+        self._pieces = self._pieces_of(0), self._pieces_of(1)
 
     def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
         """The same line with wires of other tensions, as ``DrawnLine`` has them."""
@@ -62,8 +65,11 @@ class DefectiveParts:
         other.lines = [each.with_tensions(tensions) for each in self.lines]
         return other
 
-    def _breaks_of(self, pair: int) -> tuple[Array, list[slice]]:
-        """Limits of all pieces of a pair's contact wire (m), and which are those of each tension length."""
+    def _pieces_of(self, pair: int) -> tuple[Array, int, list[slice]]:
+        """Limits of a pair's contact wire's pieces (m), their number, and which are those of each part."""
+        if len(self._parts) == 1:
+            own = self.lines[0]
+            return (np.zeros(0), 0, []) if pair else (own.breaks, own.pieces, [slice(None)])
         breaks, pieces = [0.0], []
         for part, own in zip(self._parts, self.lines, strict=True):
             if part.pair == pair:
@@ -72,28 +78,33 @@ class DefectiveParts:
                 pieces.append(slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2))
                 breaks += (part.begin + own.breaks[1:]).tolist()
         end = self._parts[-1].end
-        return np.array([*breaks, end] if breaks[-1] < end else breaks), pieces
+        breaks += [end] if breaks[-1] < end else []
+        return np.array(breaks), len(breaks) - 1, pieces
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
         """The line with tables for ``rows`` defective ones, which ``write`` fills."""
         real = line.link_static.dtype
-        first, second = self._breaks
+        (first, count, _), (second, others, _) = self._pieces
+        beside = Beside(line.beside.shape, np.zeros((rows, others, 5)), second)
         return line._replace(
             link_static=np.zeros((rows, self._droppers), dtype=real),
             link_gap=np.zeros((rows, self._droppers), dtype=real),
-            rise=np.zeros((rows, len(first) - 1, 5)),
+            rise=np.zeros((rows, count, 5)),
             rise_breaks=first,
             rise_decay=np.full(rows, self.lines[0].decay),
-            beside=Beside(line.beside.shape, np.zeros((rows, len(second) - 1, 5)), second),
+            beside=beside if others else line.beside,
         )
 
     def write(
         self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
-    ) -> StaticState:
-        """Write the state under these errors, as ``DefectiveLine.solve`` takes them, into the tables."""
+    ) -> Array:
+        """Write the state under these errors, as ``DefectiveLine.solve`` takes them, into the tables.
+
+        Returns the tension of all droppers (N).
+        """
         tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
-        rises = line.rise[row], line.beside.rise[row]
-        places = iter(self._breaks_of(0)[1]), iter(self._breaks_of(1)[1])
+        rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
+        places = [iter(slices) for _, _, slices in self._pieces]
         for part, own in zip(self._parts, self.lines, strict=True):
             inner = slice(part.first_span, part.first_span + part.spans - 1)
             state = own.solve(
@@ -104,7 +115,7 @@ class DefectiveParts:
             rises[part.pair][next(places[part.pair])] = state.rise
         line.link_static[row], line.link_gap[row] = tension, gap
         line.rise_decay[row] = self.lines[0].decay
-        return StaticState(tension, gap, line.rise[row], np.zeros(0))
+        return tension
 
 
 def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
@@ -155,7 +166,7 @@ def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCon
 
 DESIGNED = -1
 """Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
-Own = tuple[StaticShape, Tensioned, DefectiveLine | DefectiveParts]
+Own = tuple[StaticShape, Tensioned, DefectiveParts]
 """What depends on tensions: shape, stencil, and the line with its defects."""
 
 
@@ -222,7 +233,7 @@ class FlexibleCatenary:
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
         # Of the line drawn last: lanes of a fit mostly share their tensions.
         self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
-        self._defective: dict[LineCondition, DefectiveLine | DefectiveParts] = {}
+        self._defective: dict[LineCondition, DefectiveParts] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
@@ -236,8 +247,7 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        kind = DefectiveParts if data.overlaps else DefectiveLine
-        self._defective = {condition: kind(data, spans, condition, self._fixed) for condition in conditions}
+        self._defective = {each: DefectiveParts(data, spans, each, self._fixed) for each in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -262,15 +272,13 @@ class FlexibleCatenary:
                 self._latest = key, self._tensioned(self._designed, drawn)
             shape, tensioned, defective = self._latest[1]
             self._write_tension(row, shape, tensioned)
-        state = defective.write(self.line, row, drawn.scatter, drawn.heights)
-        self._tension[row] = state.tension
+        self._tension[row] = defective.write(self.line, row, drawn.scatter, drawn.heights)
 
     def _check_loaded(
         self, designed: FlexibleCatenaryData, left: FlexibleCatenaryData, condition: LineCondition, spans: int
     ) -> None:
         """Raise InputError where a tension length does not hang with its wires as they are."""
-        defective = self._defective[condition]
-        lines = defective.lines if isinstance(defective, DefectiveParts) else [defective]
+        lines = self._defective[condition].lines
         parts = zip(tension_lengths(designed, spans), tension_lengths(left, spans), lines, strict=True)
         for own, now, line in parts:
             check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
