@@ -16,7 +16,14 @@ from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
-from .pantograph.schema import NONE_REFLECTED, PantographData, check_compression, pantographs, rest_state
+from .pantograph.schema import (
+    NONE_REFLECTED,
+    PantographData,
+    check_compression,
+    pantographs,
+    parts,
+    rest_state,
+)
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
@@ -146,7 +153,8 @@ class Plant:
     def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
         own = self.train.collectors[collector]
         reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
-        self.pantographs.set_lanes(collector, lanes, pantograph, self.model, reflected)
+        constants = parts(pantograph, self.model, reflected)
+        self.pantographs.table[collector, lanes, : len(constants)] = constants
 
     def start(
         self,
@@ -176,7 +184,11 @@ class Plant:
             own_waves[: line.waves.size] = line.waves.ravel()
         run.waves[lanes] = waves
         run.drift[lanes] = 0.0 if drift is None else drift
-        self._blow(lanes, drawn)
+        if run.wind.shape[1]:
+            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
+            run.wind[lanes] = [
+                own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)
+            ]
         heights = self.model.start_point.height
         heights = heights + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
         for collector in range(len(self.train.collectors)):
@@ -228,12 +240,6 @@ class Plant:
         table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
         return table
-
-    def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> None:
-        if self.run.wind.shape[1]:
-            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
-            rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
-            self.run.wind[lanes] = rows
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""

@@ -167,11 +167,3 @@ def draw_side_wind(wind: SideWind, time_step: float, random: np.random.Generator
     amplitude = deviation * np.sqrt(2 * np.array(shares)) * (abs(wavenumber) * SHORTEST_WAVE <= 1)
     rows[1:] = np.stack([amplitude * time_step, frequency * time_step, wavenumber, phase], axis=1).ravel()
     return rows
-
-
-def side_winds_at(rows: Array, x: float | Array, steps: float | Array) -> Array:
-    """Vertical gusts (m per step), upward, at places x (m) after numbers of steps, (n,); rows: a lane's."""
-    amplitude, frequency, wavenumber, phase = rows[1:].reshape(-1, 4).T
-    place, step = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(steps))
-    turns = frequency * step[:, None] + wavenumber * place[:, None] + phase
-    return np.asarray(np.cos(2 * np.pi * turns) @ amplitude)

@@ -110,30 +110,19 @@ class CatenaryModel(Protocol):
         """Present shape of one lane's line from begin to end (m), as far as it is computed there."""
 
 
-def accept(data: Any) -> None:
-    """Accept every line that the schema accepts."""
-
-
-def usual_clear_spans(data: Any, numerics: Numerics, runs: Runs, last: int) -> int:
-    """As ``CatenaryKind.clear_spans``, on lines along which no wave comes back from far away."""
-    return CLEAR
-
-
-def say_nothing(data: Any, numerics: Numerics, runs: Runs) -> None:
-    """As ``CatenaryKind.warn_if_short``, of lines without a window."""
-
-
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
-    check: Callable[[Any], Any] = accept  # raises InputError where a line with these values cannot exist
+    check: Callable[[Any], Any] = lambda data: (
+        None
+    )  # raises InputError where a line with these values cannot exist
     # Spans of a line beyond the last one of a pass that keep its far end from the train; raises InputError
     # where that takes too many.
-    clear_spans: Callable[[Any, Numerics, Runs, int], int] = usual_clear_spans
+    clear_spans: Callable[[Any, Numerics, Runs, int], int] = lambda data, numerics, runs, last: CLEAR
     # Warns where a given window costs more than 1 % of the figures.
-    warn_if_short: Callable[[Any, Numerics, Runs], None] = say_nothing
+    warn_if_short: Callable[[Any, Numerics, Runs], None] = lambda data, numerics, runs: None
     several_collectors: bool = False  # whether its wire carries waves from one collector to another
 
 

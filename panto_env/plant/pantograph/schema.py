@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...backend import aligned_zeros
-from ...base.arrays import Array, Lanes, to_kmh
+from ...base.arrays import Array, to_kmh
 from ...base.errors import InputError, beside
 from ...base.settings import Between, Settings, comma_hint
 from ..state import PerCollector, per_collector
@@ -169,18 +169,6 @@ class Pantographs(NamedTuple):
 
     sizes: PerCollector  # 2n: entries of each collector's state
     table: Array  # (collectors, lanes, rows of ``Part``); one row for all lanes where they are alike
-
-    def set_lanes(
-        self,
-        collector: int,
-        lanes: Lanes,
-        pantograph: PantographData,
-        catenary: CatenaryModel,
-        reflected: ReflectedMasses = NONE_REFLECTED,
-    ) -> None:
-        """Set the pantograph of a collector in some lanes."""
-        own = parts(pantograph, catenary, reflected)
-        self.table[collector, lanes, : len(own)] = own
 
 
 def parts(

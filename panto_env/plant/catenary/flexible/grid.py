@@ -55,13 +55,9 @@ def _stable(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1
     return bool(squared.min() >= -1e-9 and squared.max() * (1 + 2 * beta / step) <= 4 + 1e-9)
 
 
-def finest_stable(data: FlexibleCatenaryData, step: float) -> float:
-    """Spacing (m) of the finest grid on which a step (s) is stable."""
-    return _finest_stable(data.wires, data.damping.beta, data.stride, step)
-
-
 @remembered
-def _finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+def finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+    """Spacing (m) of the finest grid on which a step (s) is stable; beta: s; stride: of a window (m)."""
     count = WIDTH * round(stride / (step * max(wire.wave_speed for wire in wires)) / WIDTH)
     while count > WIDTH and not all(_stable(wire, stride / count, step, beta) for wire in wires):
         count -= WIDTH

@@ -59,7 +59,8 @@ def tension_lengths(line: FlexibleCatenaryData, spans: int | None = None) -> tup
     _check_overlaps(line, len(each))
     begins = [0, *(overlap.first_span - 1 for overlap in line.overlaps)]
     ends = [*(overlap.first_span - 1 + overlap.spans for overlap in line.overlaps), len(each)]
-    middles = [_middle(overlap, supports) for overlap in line.overlaps]
+    across = (overlap.first_span - 1 + overlap.spans // 2 for overlap in line.overlaps)
+    middles = [(supports[span] + supports[span + 1]) / 2 for span in across]
     # In an overlap twice as many droppers, the first half of which are the ending wires'.
     doubled = np.ones(len(each), dtype=np.int64)
     for overlap in line.overlaps:
@@ -92,12 +93,6 @@ def tension_lengths(line: FlexibleCatenaryData, spans: int | None = None) -> tup
 def pairs_of(line: FlexibleCatenaryData) -> int:
     """Number of pairs of wires on the grid: 2 where any wires overlap."""
     return 2 if line.overlaps else 1
-
-
-def _middle(overlap: Overlap, supports: tuple[float, ...]) -> float:
-    """Middle of an overlap's middle span (m): there trains pass from one wire to the other."""
-    span = overlap.first_span - 1 + overlap.spans // 2
-    return (supports[span] + supports[span + 1]) / 2
 
 
 def _check_overlaps(line: FlexibleCatenaryData, spans: int) -> None:

@@ -207,7 +207,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     samples = SAMPLES_PER_WAVE if deep else SAMPLES_PER_SHALLOW_WAVE
     longest = min(longest, runs.wave_step(samples))
     step = min(time_step or longest, runs.whole_part(longest))
-    near_limit = finest_stable(data, _margin(data, runs, step) * step)
+    near_limit = finest_stable(data.wires, data.damping.beta, data.stride, _margin(data, runs, step) * step)
     fine = _by_share(FINE, quick, wave_speed)
     return Required(min(spacing, max(near_limit, fine), COARSEST), longest)
 
