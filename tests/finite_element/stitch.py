@@ -26,8 +26,7 @@ SAME = 1e-9  # m within which two places are one
 class Stitch:
     """A stitch wire where it hangs."""
 
-    support: float
-    """Position of the support over its middle (m)."""
+    support: float  # position of the support over its middle (m)
     wire: StitchWire
 
     @property

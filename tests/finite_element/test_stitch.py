@@ -9,8 +9,7 @@ from panto_env.plant.catenary.flexible.schema import StitchWire
 
 from .contacts import Collector
 from .energy import balance
-from .pairs import pairs_of
-from .rest import at_rest
+from .rest import at_rest, pairs_of
 from .sections import BARE, STITCHED_330, sections, stitched
 from .simulation import simulate
 from .static import GRAVITY, static_shape
