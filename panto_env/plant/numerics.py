@@ -14,8 +14,7 @@ from ..base.settings import Between, Settings
 from .line_condition import LineCondition
 from .wind import SHORTEST_GUST
 
-SAMPLES_PER_WAVE = 8
-"""Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
+SAMPLES_PER_WAVE = 8  # time steps in which a train passes the shortest wave of the wire, for full accuracy
 
 
 class Numerics(Settings):
@@ -100,5 +99,4 @@ class Runs(NamedTuple):
             )
 
 
-RUNS = Runs()
-"""Runs at 250 to 300 km/h under an even wire."""
+RUNS = Runs()  # runs at 250 to 300 km/h under an even wire

@@ -30,10 +30,8 @@ from .pantograph.schema import PantographData
 LONGEST_GUST, SHORTEST_GUST = 5000.0, 5.0
 """Wavelengths of gusts (m), own choice: 95 % of the spectrum's variance. Longer ones are a steady wind to a
 run of some km. A train at 300 km/h passes the shortest at 17 to 20 Hz, where EN 50317's low-pass ends."""
-BANDS = 30
-"""Cosines, ten to a tenfold of wavelength (own choice)."""
-DAVENPORT = 1200.0
-"""Length scale of Davenport's spectrum of the wind along its mean (m) (recalled)."""
+BANDS = 30  # cosines, ten to a tenfold of wavelength (own choice)
+DAVENPORT = 1200.0  # length scale of Davenport's spectrum of the wind along its mean (m) (recalled)
 GUST_ROWS = 1 + 3 * BANDS
 """Entries of a lane's wind: its mean (m per step); then for each cosine amplitude (m per step), turns per
 metre (1/m), phase (turns)."""
@@ -112,15 +110,12 @@ def wind_at(rows, x, steps):
     return total
 
 
-HEIGHT = 6.0
-"""Of the wires over the ground (m), own choice: on an embankment or a bridge gusts are slower."""
+HEIGHT = 6.0  # of the wires over the ground (m), own choice: on an embankment or a bridge gusts are slower
 SLOWEST_GUST, QUICKEST_GUST = 0.005, 3.0
 """Reduced frequencies n z / U of gusts (-), own choice: 90 % of the spectrum's variance. Slower ones are a
 steady wind to a run of some km."""
-SIDE_BANDS = 60
-"""Cosines, twenty to a tenfold of frequency (own choice)."""
-DECAY = 8.0
-"""C of the coherence of vertical gusts side by side (-) (recalled, low confidence: 6 to 10)."""
+SIDE_BANDS = 60  # cosines, twenty to a tenfold of frequency (own choice)
+DECAY = 8.0  # c of the coherence of vertical gusts side by side (-) (recalled, low confidence: 6 to 10)
 SHORTEST_WAVE = 8.0
 """Wavelength along the track (m) below which gusts are left out: they act on a wire in both directions at
 once (own choice)."""

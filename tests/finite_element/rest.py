@@ -1,4 +1,4 @@
-"""The pairs of wires of a line of spans: one from end to end, or those that overlaps divide it into.
+"""A line at rest, pair of wires by pair: one from end to end, or those that overlaps divide it into.
 
 Each pair has its spans' droppers, supports, steady arms and stitch wires for itself. Out of use it is raised:
 both its supports and its contact wire, by as much as the overlap says.

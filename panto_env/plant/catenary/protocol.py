@@ -47,10 +47,8 @@ NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, NONE, NONE, (), slack=np.zeros(
 """View of a line that has neither wires nor supports."""
 
 
-SLOWEST = 1e-9
-"""Minimum speed of a train (m/s); below it the train counts as at rest."""
-FASTEST = from_kmh(1000)
-"""Speed that no train reaches (m/s), for lines on which no wave runs."""
+SLOWEST = 1e-9  # minimum speed of a train (m/s); below it the train counts as at rest
+FASTEST = from_kmh(1000)  # speed that no train reaches (m/s), for lines on which no wave runs
 
 
 class StartPoint(NamedTuple):

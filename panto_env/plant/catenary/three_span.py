@@ -186,10 +186,8 @@ def _record(line, wire, lane, uplift, tension):
 
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
-VIEW_POINTS = 361
-"""Number of points of the three spans in a picture."""
-TIME_STEP = 2.5e-3
-"""Default time step (s): tests/plant/test_three_span.py shows how figures converge."""
+VIEW_POINTS = 361  # number of points of the three spans in a picture
+TIME_STEP = 2.5e-3  # default time step (s): tests/plant/test_three_span.py shows how figures converge
 
 
 class ThreeSpan:

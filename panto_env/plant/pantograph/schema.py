@@ -145,8 +145,7 @@ class PantographData(Settings):
         return self.aerodynamic_coefficient * to_kmh(speed) ** 2
 
 
-STRIP_STIFFNESS = 50e3
-"""Contact spring (N/m) of a 'rigid' collector strip on a wire with mass: EN 50318's."""
+STRIP_STIFFNESS = 50e3  # contact spring (N/m) of a 'rigid' collector strip on a wire with mass: EN 50318's
 LARGEST_PART, TERMS, TINY = 0.25, 11, 1e-300
 """Norm up to which this number of terms of the exponential's series is enough: the next one is 1e-16."""
 MOST_COMPRESSED = 0.3

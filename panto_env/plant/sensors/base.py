@@ -19,8 +19,7 @@ from ...base.arrays import Array, Index, Lanes
 from ...base.settings import Settings
 from ..alignment import Alignment, mean_over_own_length
 
-AHEAD = 64
-"""Readings drawn at a time: a call of a generator takes about as long as fifty numbers."""
+AHEAD = 64  # readings drawn at a time: a call of a generator takes about as long as fifty numbers
 
 
 class Noise:
@@ -54,8 +53,7 @@ class Noise:
         sensors.noise_used[lane] = 0
 
 
-WALK = 100.0
-"""Distance (m) after which the random walk reaches its given rms."""
+WALK = 100.0  # distance (m) after which the random walk reaches its given rms
 
 
 class OdometerErrors(NamedTuple):

@@ -80,8 +80,7 @@ class MotorArrays(NamedTuple):
         return np.array(rows[..., [MotorRow.SUPPLIED, MotorRow.COPPER]])
 
 
-SMALL = 1e-9
-"""Difference from the bound (N) that counts as zero."""
+SMALL = 1e-9  # difference from the bound (N) that counts as zero
 
 
 @inlined

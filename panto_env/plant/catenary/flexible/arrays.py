@@ -20,10 +20,8 @@ from ....backend import constants
 from ....base.arrays import Array, Index
 from ...alignment import AlignmentArrays
 
-REACH = 3
-"""Cells between two nodes within which a contact point and a dropper are near each other."""
-NONE = -(2**31)
-"""Number of a dropper where there is none."""
+REACH = 3  # cells between two nodes within which a contact point and a dropper are near each other
+NONE = -(2**31)  # number of a dropper where there is none
 
 
 class Near(NamedTuple):
@@ -162,10 +160,8 @@ class ScatteredWindow(NamedTuple):
 
 
 PAD = 3  # rows beyond each end of the segments, for the seven-point stencil
-CONTACT, MESSENGER = 0, 1
-"""Indices of the wires; the pantograph touches the first."""
-LOWER, UPPER = 0, 1
-"""The two ends of a link."""
+CONTACT, MESSENGER = 0, 1  # indices of the wires; the pantograph touches the first
+LOWER, UPPER = 0, 1  # the two ends of a link
 
 
 class StencilRow(IntEnum):

@@ -26,10 +26,8 @@ from .spans import spans_of
 from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, StaticShape, check_level
 
 UNCHANGED = (1.0, 1.0)
-SPANS = 9
-"""Spans of a uniform line, of which the middle one is looked at: anchors are felt within two."""
-POINT_DISTANCE = 0.05
-"""Distance (m) of points between which a wire counts as straight."""
+SPANS = 9  # spans of a uniform line, of which the middle one is looked at: anchors are felt within two
+POINT_DISTANCE = 0.05  # distance (m) of points between which a wire counts as straight
 
 
 def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:

@@ -23,10 +23,8 @@ from .schema import FlexibleCatenaryData
 BEARABLE = 0.5
 """Share of the stiffness at which one spring is unstable that springs have at most; others are near."""
 
-FITTED = 1.6
-"""Angle from node to node up to which waves are fitted: four nodes per wave."""
-TURNED = 1.3
-"""Maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor."""
+FITTED = 1.6  # angle from node to node up to which waves are fitted: four nodes per wave
+TURNED = 1.3  # maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:

@@ -164,8 +164,7 @@ def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCon
     )
 
 
-DESIGNED = -1
-"""Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
+DESIGNED = -1  # key, instead of a lane's number, of the shape of all lanes without a shape of their own
 Own = tuple[StaticShape, Tensioned, DefectiveParts]
 """What depends on tensions: shape, stencil, and the line with its defects."""
 

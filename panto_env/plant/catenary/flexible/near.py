@@ -108,8 +108,7 @@ def _of_line(line, wire, lane, pair, cell):
     return number, apart, s + held.links.node.shape[1] if s >= 0 else s, j
 
 
-PLACES = 9
-"""Places in a cell in the tables."""
+PLACES = 9  # places in a cell in the tables
 
 
 def near_droppers(

@@ -143,10 +143,8 @@ def joined_springs(each: Sequence[Springs]) -> Springs:
     return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)
 
 
-MOST_COURANT = 0.9
-"""Maximum of omega dt / 2 of a stitch wire's grid, of 1 at which the leapfrog is unstable."""
-FEWEST = 8
-"""Least number of intervals of a stitch wire."""
+MOST_COURANT = 0.9  # maximum of omega dt / 2 of a stitch wire's grid, of 1 at which the leapfrog is unstable
+FEWEST = 8  # least number of intervals of a stitch wire
 COARSEST = 1.5
 """Maximum spacing of its nodes over the line's: droppers that share nodes would be computed side by side."""
 
@@ -249,8 +247,7 @@ def stitch_grid(
     )
 
 
-STIFFEST = 1e8
-"""Maximum stiffness of a link on the grid (N/m), in tension."""
+STIFFEST = 1e8  # maximum stiffness of a link on the grid (N/m), in tension
 
 
 class OnGrid(NamedTuple):

@@ -21,8 +21,7 @@ from .schema import FlexibleCatenaryData
 from .shape import InUse, Profile, Rope, StaticShape
 from .spans import hung_at, spans_of, stitch_at_end, valid
 
-FAR = 100.0
-"""Height (m) at which a wire counts that is not there: no pantograph reaches it."""
+FAR = 100.0  # height (m) at which a wire counts that is not there: no pantograph reaches it
 
 
 class TensionLength(NamedTuple):
@@ -227,10 +226,8 @@ def heights_of_pair(
     return found
 
 
-NEAREST = 1.0
-"""Least distance of a dropper on a stitch wire from its clamps (m)."""
-MOST_TENSION = 0.9
-"""Maximum share of the messenger's tension that a stitch wire takes."""
+NEAREST = 1.0  # least distance of a dropper on a stitch wire from its clamps (m)
+MOST_TENSION = 0.9  # maximum share of the messenger's tension that a stitch wire takes
 
 
 class Stitches(NamedTuple):

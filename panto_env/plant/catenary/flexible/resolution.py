@@ -51,25 +51,19 @@ PER_DAMPING, MOST_DAMPED = 1.6, 2.0
 the limit of a line damped five times as much as usual the maximum was wrong by 4 % of the mean force."""
 FINE = ((0.45, 0.3), (1.0, 0.2))
 """Up to a share of the wave speed: a grid (m) that is fine enough for shorter steps too."""
-COARSEST = 0.45
-"""Maximum grid (m)."""
+COARSEST = 0.45  # maximum grid (m)
 NODES_HZ = 27.0
 """Minimum rate at which a train passes nodes (Hz): well above the 20 Hz to which forces are filtered."""
-SLOWEST_HZ = 22.0
-"""Rate of nodes (Hz) below which their ripple is in the filtered force."""
-FINEST_GRID = 0.1
-"""Grid (m) for the slowest trains, and the finest one that is taken for any."""
-REACH = 1.2
-"""Up to this multiple of the grid that carries the waves ahead, figures were within their bounds."""
+SLOWEST_HZ = 22.0  # rate of nodes (Hz) below which their ripple is in the filtered force
+FINEST_GRID = 0.1  # grid (m) for the slowest trains, and the finest one that is taken for any
+REACH = 1.2  # up to this multiple of the grid that carries the waves ahead, figures were within their bounds
 NOT_CARRIED = (5, 4)
 """Errors beyond it, on the finest grid: of the standard deviation, maximum and minimum (%), and of the
 contact-loss ratio (points)."""
 LIMP, LIMP_STEP = 0.2, 0.6e-3
 """Grid (m) and time step (s) for a contact wire without bending stiffness, which kinks within a cell."""
-LIMP_NODES = 0.2
-"""Nodes to which a kink of another wire, sqrt(EI / T) wide, must spread."""
-HARD_CONTACT_GRID = 0.15
-"""Grid (m) for a hard contact."""
+LIMP_NODES = 0.2  # nodes to which a kink of another wire, sqrt(EI / T) wide, must spread
+HARD_CONTACT_GRID = 0.15  # grid (m) for a hard contact
 HARD_CONTACT_ERROR = 20
 """Error of the standard deviation (%) where a hard contact is lost, on ``HARD_CONTACT_GRID``."""
 HARD_CONTACT_MEAN_ERROR = 5
@@ -78,12 +72,10 @@ in a different order on a different grid."""
 HARD_SPOT_GRID = 0.3
 """Grid (m) for a lumped mass on the wire, which throws the head off: on 0.4 m it lands at another place, and
 the force over the spot was wrong by a tenth of what the spot does to it, here by a fiftieth."""
-DEEP = 0.5e-3
-"""Depth of wear waves (m) above which the grid must resolve the waves that they excite."""
+DEEP = 0.5e-3  # depth of wear waves (m) above which the grid must resolve the waves that they excite
 SAMPLES_PER_SHALLOW_WAVE = 4
 """Time steps in which a train passes the shortest wave of the wire, unless wear waves are deep."""
-DEEP_GRID = 0.125
-"""Finest grid (m) for them, unless clamps are heavy."""
+DEEP_GRID = 0.125  # finest grid (m) for them, unless clamps are heavy
 NODES_PER_WAVE = 4
 """Nodes per wave that runs ahead of the train at the rate at which it passes deep wear waves. With two, the
 contact loss at every wear wave was wrong by up to 6 points of 29."""
@@ -96,8 +88,7 @@ CLAMPS = (
 )
 """Up to a mass of a clamp (kg), which hangs on two nodes: a grid (m) that is fine enough, a time step (s)
 that is short enough."""
-HEAVY_CLAMP = 1.0
-"""Mass of a clamp on the contact wire (kg) above which deep wear waves need the finest grid."""
+HEAVY_CLAMP = 1.0  # mass of a clamp on the contact wire (kg) above which deep wear waves need the finest grid
 STITCHED_GRIDS = ((0.12, 0.12), (0.65, 0.25), (np.inf, 0.17))
 """Up to a share of the wave speed: a grid (m) that is fine enough for stitch wires. The messenger's tension
 jumps at their clamps, between nodes; on 0.33 m sigma was wrong by 1.2 %, above 65 % on 0.25 m the maximum by
@@ -107,8 +98,7 @@ TRAIN_ON_UNLIKE_SPANS = 0.2, 1e-2 / 16
 the second one was wrong by up to 4 % of the mean force, of the first one by 3 %, where contact is lost."""
 FAST_GRIDS = ((0.6, 0.5), (0.72, 0.4), (1.0, 1 / 3))
 """Up to a share of the wave speed: the grid (m) for ``accuracy="fast"``."""
-FAST_NODES_HZ = 40.0
-"""Minimum rate at which a train passes nodes for ``accuracy="fast"`` (Hz)."""
+FAST_NODES_HZ = 40.0  # minimum rate at which a train passes nodes for ``accuracy="fast"`` (Hz)
 FAST_STEPS = (2.5e-3, 2e-3)
 """Time steps (s) for ``accuracy="fast"``: the longer one where it is stable on the grid, else the shorter
 one, on a coarser grid if necessary."""
@@ -322,13 +312,11 @@ def _not_carried(data: FlexibleCatenaryData, found: Resolution, required: Requir
 ENOUGH = ((0.25, 32), (0.4, 24), (0.66, 16), (0.82, 8), (1.0, 4))
 """Up to a share of the faster wire's wave speed: spans about the train that make figures as of an endless
 line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (docs/validation.md)."""
-FAST = 8
-"""Maximum number of spans about a train for ``accuracy="fast"``."""
+FAST = 8  # maximum number of spans about a train for ``accuracy="fast"``
 WITH_OVERLAPS = 10
 """Minimum number of spans about a train that passes overlaps, whose anchors send waves back: with 5 or 8 of
 them sigma there is wrong by up to 13 or 6 %, with 10 by less than 1 %."""
-STITCHED = 40
-"""Spans about a slow train on a line with stitch wires, past whose supports waves travel far."""
+STITCHED = 40  # spans about a slow train on a line with stitch wires, past whose supports waves travel far
 UNLIKE_SHARE, UNLIKE = 0.58, 24
 """Share of the faster wire's wave speed up to which a line with stitch wires, or of unlike spans, needs more
 spans than others, and how many: with 16 the minimum was wrong by 2.7 % of the mean force, sigma by 1.3 %."""

@@ -29,8 +29,7 @@ from .on_grid import OnGrid
 from .scattered import take_start
 
 NODES = 4
-HUNG_NODES = NODES + 2
-"""Nodes of a dropper on a stitch wire."""
+HUNG_NODES = NODES + 2  # nodes of a dropper on a stitch wire
 
 
 def scattered(grid: OnGrid | None, real: Any) -> Scattered:

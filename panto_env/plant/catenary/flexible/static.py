@@ -27,14 +27,11 @@ __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
 HEIGHT_RANGE = 0.5
 """Maximum difference of the contact wire's heights along a span (m), beside the span's gradient; pantographs
 follow 0.3 m."""
-STEEPEST = 0.2
-"""Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+STEEPEST = 0.2  # slope up to which a wire is nearly level (-): tension is then off by 2 % at most
 MOST_STRETCH = 0.1
 """Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
-MOST_YIELD = 0.3
-"""Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
-POINTS = 401
-"""Number of points of a span at which heights are checked."""
+MOST_YIELD = 0.3  # yield of the messenger's support at rest (m): cantilevers yield by millimetres
+POINTS = 401  # number of points of a span at which heights are checked
 
 
 @remembered

@@ -18,8 +18,7 @@ from .wires import along
 if TYPE_CHECKING:
     from .model import FlexibleCatenary
 
-VIEW_POINTS = 401
-"""Number of points of a span at which the messenger's height is kept for pictures."""
+VIEW_POINTS = 401  # number of points of a span at which the messenger's height is kept for pictures
 
 
 def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> LineView:

@@ -78,8 +78,7 @@ class StitchedMessenger:
         places = np.append(stitches.begin, stitches.end)
         inside = (places > first) & (places < last)
         self._loads.append((self._at(places[inside]), weights[inside]))
-        self.masts: Any = self._at(supports)
-        """Unknown that is the messenger's height at each support."""
+        self.masts: Any = self._at(supports)  # unknown that is the messenger's height at each support
         self._springs = springs
         if slopes is not None:
             self._held += [(1, slopes[0]), (self._height[-1] + 1, slopes[1])]

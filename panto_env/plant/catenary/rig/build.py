@@ -140,11 +140,9 @@ class RigData(CatenaryData):
 
 
 LINES = {"flexible": FLEXIBLE, "three_span": THREE_SPAN}
-STEPS = 4
-"""Minimum number of time steps between two samples, for the load cell's filter and the cylinder."""
+STEPS = 4  # minimum number of time steps between two samples, for the load cell's filter and the cylinder
 NOISE_SAMPLES = 1 << 16
-ORDER = 3
-"""Order of the polynomial of "prediction", as in Horiuchi et al."""
+ORDER = 3  # order of the polynomial of "prediction", as in Horiuchi et al
 FIT_FREQUENCY, FIT_MEMORY = 25.0, 1.0
 """For "adaptive": corner (Hz) of the low-pass of both signals, and time (s) after which a sample has the
 weight exp(-1)."""

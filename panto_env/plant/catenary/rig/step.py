@@ -53,8 +53,7 @@ class FitRow(IntEnum):
 
 
 RIG_ROW, FIT_ROW = constants(RigRow), constants(FitRow)
-TERMS = 3
-"""Terms of a command: height, velocity and acceleration of the contact point."""
+TERMS = 3  # terms of a command: height, velocity and acceleration of the contact point
 
 
 class RigLine(NamedTuple):
