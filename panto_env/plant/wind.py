@@ -38,7 +38,7 @@ metre (1/m), phase (turns)."""
 
 
 class Wind(NamedTuple):
-    """Wind of a condition; head wind is positive."""
+    """Wind of a condition, along the track with a head wind positive, or across it."""
 
     mean: float  # m/s
     turbulence: float  # standard deviation of the gusts over the mean (-)
@@ -127,18 +127,6 @@ SIDE_ROWS = 1 + 4 * SIDE_BANDS
 step, turns per metre (1/m), phase (turns)."""
 
 
-class SideWind(NamedTuple):
-    """Wind of a condition across the track."""
-
-    mean: float  # m/s
-    turbulence: float  # standard deviation of the gusts along the wind over the mean (-)
-
-    @property
-    def gusts(self) -> bool:
-        """Whether it is gusty, and so another one for every seed."""
-        return self.mean > 0 and self.turbulence > 0
-
-
 def side_resolved(slowest: float = SLOWEST_GUST, quickest: float = QUICKEST_GUST) -> float:
     """Share of the variance of Panofsky's spectrum in a band of reduced frequencies f = n z / U.
 
@@ -147,7 +135,7 @@ def side_resolved(slowest: float = SLOWEST_GUST, quickest: float = QUICKEST_GUST
     return 1 / (1 + 4 * slowest) - 1 / (1 + 4 * quickest)
 
 
-def draw_side_wind(wind: SideWind, time_step: float, random: np.random.Generator | None = None) -> Array:
+def draw_side_wind(wind: Wind, time_step: float, random: np.random.Generator | None = None) -> Array:
     """A lane's wind, (SIDE_ROWS,), with gusts where there is a generator to draw them from; time_step: s."""
     rows = np.zeros(SIDE_ROWS)
     rows[0] = wind.mean * time_step

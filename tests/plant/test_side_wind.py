@@ -13,7 +13,7 @@ from panto_env.plant.wind import (
     QUICKEST_GUST,
     SHORTEST_WAVE,
     SLOWEST_GUST,
-    SideWind,
+    Wind,
     draw_side_wind,
     side_resolved,
 )
@@ -30,7 +30,7 @@ def panofsky(frequency, wind, deviation):
 
 
 def table(seed, wind=20.0, turbulence=0.17, step=1.0):
-    return draw_side_wind(SideWind(wind, turbulence), step, np.random.default_rng(seed))
+    return draw_side_wind(Wind(wind, turbulence), step, np.random.default_rng(seed))
 
 
 def test_the_variance_of_gusts_is_their_share_of_the_spectrum():

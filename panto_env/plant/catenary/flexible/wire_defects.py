@@ -48,9 +48,6 @@ class WireDefects(NamedTuple):
     spots: tuple[Spot, ...] = ()
     stretches: tuple[Stretch, ...] = ()
 
-    def __bool__(self) -> bool:
-        return bool(self.spots or self.stretches)
-
     def within(self, begin: float, end: float) -> WireDefects:
         """Those that begin from one position of the line up to before another (m); the end cuts stretches."""
         return WireDefects(
