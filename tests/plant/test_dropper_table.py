@@ -9,10 +9,10 @@ import pytest
 from panto_env.catalog import load_catenary
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import RestingDropper, as_rows, dropper_table, droppers_at_rest
 
 from ..command import panto
+from ..finite_element.sections import line_of
 from ..finite_element.static import static_shape
 from ..uniform_lines import UNIFORM
 
@@ -67,9 +67,8 @@ def test_a_rig_has_those_of_its_line():
 
 
 def test_the_table_numbers_spans_only_where_they_differ():
-    table = load_catenary("re250").model_dump(exclude={"sources", "spans"}, exclude_none=True)
     given = {"sequence": ["a", "a", {"span_length": 60.0}], "span_types": {"a": {}}}
-    differ = as_rows(droppers_at_rest(FlexibleCatenaryData.model_validate(table | given)))
+    differ = as_rows(droppers_at_rest(line_of("re250", given)))
     assert [row["span"] for row in differ] == [1] * 7 + [2] * 7 + [3] * 6  # 60 m
     alike = as_rows(droppers_at_rest(load_catenary("re250")))
     assert alike[0].keys() == differ[0].keys() - {"span"}

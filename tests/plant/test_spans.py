@@ -20,6 +20,7 @@ from panto_env.plant.catenary.flexible.static import hang, solve
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 
+from ..finite_element.sections import line_of
 from ..uniform_lines import UNIFORM
 
 FILE = """
@@ -229,9 +230,8 @@ def test_the_example_of_the_document_hangs(tmp_path):
 def test_the_examples_of_stitch_wires_and_overlaps_hang():
     page = (Path(__file__).parents[2] / "docs" / "own-section.md").read_text()
     *_, stitch, overlap = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    table = load_catenary("re330-stitched").model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table |= {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
-    line = FlexibleCatenaryData.model_validate(table)
+    own = {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
+    line = line_of("re330-stitched", own)
     hang(line)
     assert [round(part.end) for part in tension_lengths(line)] == [17 * 65, 20 * 65]
     assert stitches_of(line).support.tolist() == list(range(1, 21))

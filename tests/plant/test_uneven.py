@@ -20,6 +20,7 @@ from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train
 
 from .. import line_energy
+from ..finite_element.sections import line_of as changed
 from ..lanes import check_lanes_are_singles
 from .test_flexible import PULSES, swing, undamped
 
@@ -227,12 +228,9 @@ APPLIED = load_pantograph("dsa380").model_copy(update={"force": "applied"})
 
 def climbing(slope):
     """A line whose contact wire rises by so much per metre from the tenth support on."""
-    line, supports = load_catenary("benchmark-2015"), np.arange(26) * 55.0
-    heights = np.interp(supports, [550.0, 1375.0], [0.0, slope * 825.0])
-    spans = [{"contact_height": float(height)} for height in heights[:-1]]
-    table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    end = {"contact_height": float(heights[-1])}
-    return FlexibleCatenaryData.model_validate(table | {"sequence": spans, "end_support": end})
+    heights = np.interp(np.arange(26) * 55.0, [550.0, 1375.0], [0.0, slope * 825.0]).tolist()
+    spans, end = [{"contact_height": height} for height in heights[:-1]], {"contact_height": heights[-1]}
+    return changed("benchmark-2015", {"sequence": spans, "end_support": end})
 
 
 def test_a_climb_costs_the_damping_to_ground_times_its_speed():
@@ -246,9 +244,8 @@ def test_a_climb_costs_the_damping_to_ground_times_its_speed():
 
 def test_a_high_wire_is_no_end_of_a_run():
     heights = [0.0] * 8 + [0.1, 0.2, 0.3, 0.4] + [0.5] * 8
-    line = load_catenary("benchmark-2015").model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    line |= {"sequence": [{"contact_height": height} for height in heights]}
-    run = simulate(FlexibleCatenaryData.model_validate(line), APPLIED, 160)
+    line = changed("benchmark-2015", {"sequence": [{"contact_height": height} for height in heights]})
+    run = simulate(line, APPLIED, 160)
     assert not run.terminated
     assert run.head[-1] > 0.45
 
