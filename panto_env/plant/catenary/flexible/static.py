@@ -1,7 +1,7 @@
 """Static shape of the two-wire catenary as it is designed: one span that repeats, or a whole line of spans.
 
 The contact wire is held at the catalogue's sags by droppers, which are cut so; the messenger wire hangs
-between its supports under the droppers' pull. Both are solved by exact beam elements (``beams``).
+between its supports under the droppers' pull. Both are solved by exact beam elements (``shape``).
 """
 
 from __future__ import annotations
