@@ -248,7 +248,9 @@ def _lightest(runs: Runs) -> float:
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
-    window, lightest = _window(data, numerics, runs), _lightest(runs)
+    unlike, lightest = data.alignment().pitch is None, _lightest(runs)
+    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), unlike)
+    window = window and window + spans_of_train(data, runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(required.time_step)
@@ -265,13 +267,6 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
         if stable(data, span / count, step, lightest):
             return Resolution(span / count, step, window)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
-
-
-def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    window = window_of(
-        data.wires, numerics, runs, bool(data.overlaps), stitched(data), data.alignment().pitch is None
-    )
-    return window and window + spans_of_train(data, runs)
 
 
 def spans_of_train(data: FlexibleCatenaryData, runs: Runs) -> int:
