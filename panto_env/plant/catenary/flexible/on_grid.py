@@ -69,13 +69,11 @@ class Nodes(NamedTuple):
 
 def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
     """Positions (m), (droppers,), of the droppers of a line with this number of spans."""
-    if data.overlaps:
-        parts = tension_lengths(data)
-        found = np.zeros(sum(len(part.droppers) for part in parts))
-        for part in parts:
-            found[part.droppers] = part.begin + dropper_positions(part.line, part.spans)
-        return found
-    return hung_at(data, spans)
+    parts = tension_lengths(data, spans)
+    found = np.zeros(sum(len(part.droppers) for part in parts))
+    for part in parts:
+        found[part.droppers] = part.begin + hung_at(part.line, part.spans)
+    return found
 
 
 def springs_of(part: TensionLength, places: Array, step: float, spots: Array) -> Springs:
