@@ -172,16 +172,6 @@ def test_uniform_and_written_out_lines_move_alike(settings):
     assert one.contact_force.std() > 10
 
 
-def test_default_grid_is_fine_enough():
-    settings = {"catenary": line_of(), "pantograph": "dsa380", "speed_kmh": 300, "record_droppers": False}
-    ours, fine = (
-        simulate(**settings, distance=780, **own).summary((4, 10)) for own in ({}, {"spacing": 0.1})
-    )
-    assert ours.std == pytest.approx(fine.std, rel=0.01)
-    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
-    assert ours.max_uplift == pytest.approx(fine.max_uplift, abs=5e-4)
-
-
 def test_a_slight_stitch_wire_without_droppers_changes_little():
     """With hardly any tension and mass it takes nothing from the line."""
     outside = {"positions": [5.0, 12.0, 20.0, 28.0, 37.0, 45.0, 53.0, 60.0], "sag": [0.0] * 8}

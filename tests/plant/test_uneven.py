@@ -153,15 +153,6 @@ def test_restarted_lane_forgets_the_run_before(line):
     np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)
 
 
-def test_default_grid_is_fine_enough_where_spans_differ():
-    line = line_of(MIXED)
-    settings = {"catenary": line, "pantograph": NAME, "speed_kmh": 250, "record_droppers": False}
-    ours = simulate(**settings).summary((4, 13))
-    fine = simulate(**settings, spacing=0.1).summary((4, 13))
-    assert ours.std == pytest.approx(fine.std, rel=0.01)
-    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
-
-
 def energy(line, wire, data, step):
     """Energy (J) of the discrete line at mid-step, of all pairs of wires; each node has a mass of its own."""
     old, move = along(wire.displacement[0]), along(wire.increment[0])
