@@ -30,7 +30,7 @@ from ..metrics.figures import SpanChoice, in_words, losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
-from ..plant.catenary.flexible.attached import dropper_positions
+from ..plant.catenary.flexible.on_grid import dropper_positions
 from ..plant.catenary.flexible.overlaps import profiles
 from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.flexible.static import hang

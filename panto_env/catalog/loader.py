@@ -20,8 +20,7 @@ from ..base.files import read_toml
 from ..base.settings import Settings, explain
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.pantograph.build import check_at_rest
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, check_at_rest
 from .drawn_lines import DRAWN, DrawnLines
 from .family import LineFamily
 from .section import LineSection

@@ -11,8 +11,7 @@ import numpy as np
 from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..plant.line_condition import DrawnLine, draw
-from ..plant.pantograph.build import with_scatter
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, with_scatter
 from ..plant.state import SAMPLE_ROWS, Ending, Row
 from ..plant.train import draw_drift
 from ..plant.wind import draw_side_wind, draw_wind

@@ -21,7 +21,7 @@ from ..metrics.figures import FIRST_SETTLED
 from ..metrics.trajectory import Trajectory
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition
-from ..plant.pantograph.build import with_scatter
+from ..plant.pantograph.schema import with_scatter
 from .features import (
     BROKEN,
     KINDS,

@@ -9,8 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
-from ..plant.pantograph.build import exponential, matrices
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, exponential, matrices
 from .force import ForceModel, ForceProcess, RandomWalk, as_force_model
 from .motion import DISPLACEMENT_NOISE, VELOCITY_NOISE
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..backend import NOT_NEGATIVE, aligned_zeros, implements, inlined
 from ..base.arrays import Array, Index, Lanes
-from ..plant.pantograph.build import matrices
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, matrices
 from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
 from ..plant.sensors.base import AHEAD
 from ..plant.state import ROW, Row

@@ -20,12 +20,11 @@ from ..base.arrays import Array, Index
 from ..base.errors import InputError
 from ..base.machine import cores
 from ..metrics.low_pass import zero_phase_low_pass
-from ..plant.branch import Kept, go_on, keep
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
-from ..plant.plant import Plant
+from ..plant.plant import Kept, Plant, go_on, keep
 from ..plant.state import SAMPLE_ROWS, Row, Samples
 from ..plant.train import Train
 from ..records.record import Piece, local_speed

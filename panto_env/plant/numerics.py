@@ -14,8 +14,7 @@ from ..base.settings import Between, Settings
 from .line_condition import LineCondition
 from .wind import SHORTEST_GUST
 
-SAMPLES_PER_WAVE = 8
-"""Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
+SAMPLES_PER_WAVE = 8  # time steps in which a train passes the shortest wave of the wire, for full accuracy
 
 
 class Numerics(Settings):
@@ -78,7 +77,6 @@ class Runs(NamedTuple):
 
     @property
     def _shortest_gust(self) -> float:
-        """Time (s) in which the fastest train passes the shortest gust, infinite where there are none."""
         winds = [condition.wind for condition in self.conditions if condition.weather.gusts]
         return SHORTEST_GUST / (self.speeds[1] + max(winds)) if winds else math.inf
 
@@ -101,5 +99,4 @@ class Runs(NamedTuple):
             )
 
 
-RUNS = Runs()
-"""Runs at 250 to 300 km/h under an even wire."""
+RUNS = Runs()  # runs at 250 to 300 km/h under an even wire

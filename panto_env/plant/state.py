@@ -1,4 +1,4 @@
-"""Where a run ends early: the bounds within which the plant is valid, and the reason given beyond them."""
+"""What kernels know of all lanes, and where a run ends early: the bounds within which the plant is valid."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ HEAD_RANGE = 0.3
 run ends: outside the wire's clearance."""
 LARGEST_HEIGHT = 3.0
 """Height of head or wire (m), up or down, ten times any real one: beyond it the computation has diverged."""
-LOSS_TIME = 0.5
-"""Time without contact (s) after which a run ends."""
+LOSS_TIME = 0.5  # time without contact (s) after which a run ends
 FREE_UPLIFT = 0.24
 """Default room for the contact wire's uplift at a support (m): twice the 120 mm
 for which high-speed lines are designed (recalled)."""
@@ -103,8 +102,7 @@ class Row(IntEnum):
 
 
 ROW, PLACE = constants(Row), constants(Place)
-SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1
-"""Rows of a sample: the first ones."""
+SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1  # rows of a sample: the first ones
 
 
 PerCollector: TypeAlias = tuple[float] | tuple[int] | Array | Index

@@ -99,8 +99,7 @@ def drifting_stride(drift, stride, steps):
     return stride
 
 
-MOST_COLLECTORS = 4
-"""Maximum number of pantographs of a train."""
+MOST_COLLECTORS = 4  # maximum number of pantographs of a train
 
 
 @dataclass(frozen=True)

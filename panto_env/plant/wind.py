@@ -30,17 +30,15 @@ from .pantograph.schema import PantographData
 LONGEST_GUST, SHORTEST_GUST = 5000.0, 5.0
 """Wavelengths of gusts (m), own choice: 95 % of the spectrum's variance. Longer ones are a steady wind to a
 run of some km. A train at 300 km/h passes the shortest at 17 to 20 Hz, where EN 50317's low-pass ends."""
-BANDS = 30
-"""Cosines, ten to a tenfold of wavelength (own choice)."""
-DAVENPORT = 1200.0
-"""Length scale of Davenport's spectrum of the wind along its mean (m) (recalled)."""
+BANDS = 30  # cosines, ten to a tenfold of wavelength (own choice)
+DAVENPORT = 1200.0  # length scale of Davenport's spectrum of the wind along its mean (m) (recalled)
 GUST_ROWS = 1 + 3 * BANDS
 """Entries of a lane's wind: its mean (m per step); then for each cosine amplitude (m per step), turns per
 metre (1/m), phase (turns)."""
 
 
 class Wind(NamedTuple):
-    """Wind of a condition; head wind is positive."""
+    """Wind of a condition, along the track with a head wind positive, or across it."""
 
     mean: float  # m/s
     turbulence: float  # standard deviation of the gusts over the mean (-)
@@ -112,15 +110,12 @@ def wind_at(rows, x, steps):
     return total
 
 
-HEIGHT = 6.0
-"""Of the wires over the ground (m), own choice: on an embankment or a bridge gusts are slower."""
+HEIGHT = 6.0  # of the wires over the ground (m), own choice: on an embankment or a bridge gusts are slower
 SLOWEST_GUST, QUICKEST_GUST = 0.005, 3.0
 """Reduced frequencies n z / U of gusts (-), own choice: 90 % of the spectrum's variance. Slower ones are a
 steady wind to a run of some km."""
-SIDE_BANDS = 60
-"""Cosines, twenty to a tenfold of frequency (own choice)."""
-DECAY = 8.0
-"""C of the coherence of vertical gusts side by side (-) (recalled, low confidence: 6 to 10)."""
+SIDE_BANDS = 60  # cosines, twenty to a tenfold of frequency (own choice)
+DECAY = 8.0  # c of the coherence of vertical gusts side by side (-) (recalled, low confidence: 6 to 10)
 SHORTEST_WAVE = 8.0
 """Wavelength along the track (m) below which gusts are left out: they act on a wire in both directions at
 once (own choice)."""
@@ -132,18 +127,6 @@ SIDE_ROWS = 1 + 4 * SIDE_BANDS
 step, turns per metre (1/m), phase (turns)."""
 
 
-class SideWind(NamedTuple):
-    """Wind of a condition across the track."""
-
-    mean: float  # m/s
-    turbulence: float  # standard deviation of the gusts along the wind over the mean (-)
-
-    @property
-    def gusts(self) -> bool:
-        """Whether it is gusty, and so another one for every seed."""
-        return self.mean > 0 and self.turbulence > 0
-
-
 def side_resolved(slowest: float = SLOWEST_GUST, quickest: float = QUICKEST_GUST) -> float:
     """Share of the variance of Panofsky's spectrum in a band of reduced frequencies f = n z / U.
 
@@ -152,7 +135,7 @@ def side_resolved(slowest: float = SLOWEST_GUST, quickest: float = QUICKEST_GUST
     return 1 / (1 + 4 * slowest) - 1 / (1 + 4 * quickest)
 
 
-def draw_side_wind(wind: SideWind, time_step: float, random: np.random.Generator | None = None) -> Array:
+def draw_side_wind(wind: Wind, time_step: float, random: np.random.Generator | None = None) -> Array:
     """A lane's wind, (SIDE_ROWS,), with gusts where there is a generator to draw them from; time_step: s."""
     rows = np.zeros(SIDE_ROWS)
     rows[0] = wind.mean * time_step
@@ -167,11 +150,3 @@ def draw_side_wind(wind: SideWind, time_step: float, random: np.random.Generator
     amplitude = deviation * np.sqrt(2 * np.array(shares)) * (abs(wavenumber) * SHORTEST_WAVE <= 1)
     rows[1:] = np.stack([amplitude * time_step, frequency * time_step, wavenumber, phase], axis=1).ravel()
     return rows
-
-
-def side_winds_at(rows: Array, x: float | Array, steps: float | Array) -> Array:
-    """Vertical gusts (m per step), upward, at places x (m) after numbers of steps, (n,); rows: a lane's."""
-    amplitude, frequency, wavenumber, phase = rows[1:].reshape(-1, 4).T
-    place, step = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(steps))
-    turns = frequency * step[:, None] + wavenumber * place[:, None] + phase
-    return np.asarray(np.cos(2 * np.pi * turns) @ amplitude)

@@ -22,8 +22,7 @@ from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
 from ..plant.catenary.rig import RigData
 from ..plant.numerics import Numerics
-from ..plant.pantograph.build import STRIP_STIFFNESS, matrices
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import STRIP_STIFFNESS, PantographData, matrices
 from .computer import RigComputer
 
 Response = NDArray[np.complex128]

@@ -32,7 +32,7 @@ from panto_env.control.settings import run_settings
 from panto_env.envs import BARE, IDS
 from panto_env.plant.catenary.flexible.model import FlexibleCatenary
 from panto_env.plant.catenary.flexible.static import hang
-from panto_env.plant.pantograph import build
+from panto_env.plant.pantograph import schema as build
 from panto_env.policies import find_policy
 from panto_env.studies import Outcome
 from panto_env.studies import write as write_study

@@ -12,9 +12,9 @@ from panto_env import InputError
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import parse_catenary, text_of
 from panto_env.catalog.masts import line_from_masts
+from panto_env.plant.catenary.flexible.overlaps import stitches_of
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import droppers_at_rest, hang
-from panto_env.plant.catenary.flexible.stitches import stitches_of
 
 from ..command import panto
 

@@ -13,7 +13,7 @@ from panto_env.catalog.loader import text_of
 from panto_env.catalog.values import FACTOR, values_of
 from panto_env.envs import PantographEnv
 from panto_env.plant.catenary import check_line
-from panto_env.plant.pantograph.build import check_at_rest
+from panto_env.plant.pantograph.schema import check_at_rest
 from tests.command import panto
 
 ENTRIES = {

@@ -19,12 +19,10 @@ from .side_wind import blown_upon
 from .simulation import ride
 from .system import build
 
-ALIKE = load_catenary("en50318-2002").model_copy(update={"spans": 9})
-"""Nine spans, all alike."""
+ALIKE = load_catenary("en50318-2002").model_copy(update={"spans": 9})  # nine spans, all alike
 MIXED = line_of("en50318-2002", SPANS_THAT_DIFFER)
 SPEED, WIND, ELEMENT = 250.0, 30.0, 0.35  # km/h, m/s, m
-STRONG = 5
-"""Seed of gusts that raise sigma by half on equal spans."""
+STRONG = 5  # seed of gusts that raise sigma by half on equal spans
 
 
 def compared(line: FlexibleCatenaryData) -> tuple[int, int]:

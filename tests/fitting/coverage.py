@@ -27,7 +27,7 @@ from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.diagnosis import diagnose_records
 from panto_env.fitting.fit import INTERVAL, WHITE, Fit, fit
 from panto_env.fitting.stored import knowledge
-from panto_env.plant.catenary.flexible.attached import dropper_positions
+from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from panto_env.records.measured import measured

@@ -29,7 +29,7 @@ from panto_env.identification import (
 )
 from panto_env.identification.model import matrices
 from panto_env.identification.response import polynomials, respond
-from panto_env.plant.pantograph import build as pantograph
+from panto_env.plant.pantograph import schema as pantograph
 
 TRUTH = parameters_of(load_pantograph("identified-2dof"))
 KNOWN = {name: TRUTH[name] for name in MEASURED}

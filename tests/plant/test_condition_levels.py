@@ -8,8 +8,7 @@ from panto_env.plant.line_condition import LINE_CONDITIONS, draw
 from panto_env.studies.en50318 import conditions
 
 LEVELS = ("smooth", "fair", "worn")
-TOLERANCE = 10e-3
-"""By which heights at neighbouring droppers may differ (m): EN 50119, recalled."""
+TOLERANCE = 10e-3  # by which heights at neighbouring droppers may differ (m): EN 50119, recalled
 
 
 def heights(level, seed, x):

@@ -131,15 +131,6 @@ def test_lanes_drift_each_on_its_own_as_single_environments_do(name):
     assert check_lanes_are_singles(name, settings, steps=90).ends >= 5
 
 
-def test_the_same_seed_gives_the_same_drift():
-    given = SIMPLE | DRIFT | {"distance": 300.0}
-    runs = [simulate(**given, seed=seed) for seed in (1, 1, 2)]
-    np.testing.assert_array_equal(runs[0].position, runs[1].position)
-    assert np.abs(runs[0].position - runs[2].position[: len(runs[0].position)]).max() > 0.1 or len(
-        runs[0].position
-    ) != len(runs[2].position)
-
-
 def test_speeds_that_drift_out_of_what_is_possible_are_refused():
     with pytest.raises(InputError, match="speed must lie above 0"):
         Task(run_settings({"speed_kmh": 10.0, "speed_drift": 10.0}))

@@ -148,13 +148,13 @@ def test_what_hangs_in_the_same_rows_goes_abreast():
 
 
 @pytest.mark.skipif(not JIT, reason="slow in plain Python")
-@pytest.mark.parametrize("window", [3, 4, 5, 7, 9, 12, 16, 0])
-def test_any_window_that_has_not_travelled_gives_the_same_run(window):
+def test_any_window_that_has_not_travelled_gives_the_same_run():
     """However its segments lie to spans and droppers."""
     given = {"spans": 20, "distance": 55.0, "precision": "double"}
     reference = simulate(window=8, **given)
-    run = simulate(window=window, **given)
-    assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3
+    for window in (3, 4, 5, 7, 9, 12, 16, 0):
+        run = simulate(window=window, **given)
+        assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3, window
 
 
 @pytest.mark.parametrize("loaded", [False, True])

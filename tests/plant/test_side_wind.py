@@ -13,10 +13,9 @@ from panto_env.plant.wind import (
     QUICKEST_GUST,
     SHORTEST_WAVE,
     SLOWEST_GUST,
-    SideWind,
+    Wind,
     draw_side_wind,
     side_resolved,
-    side_winds_at,
 )
 
 from ..finite_element.figures import figures
@@ -31,7 +30,7 @@ def panofsky(frequency, wind, deviation):
 
 
 def table(seed, wind=20.0, turbulence=0.17, step=1.0):
-    return draw_side_wind(SideWind(wind, turbulence), step, np.random.default_rng(seed))
+    return draw_side_wind(Wind(wind, turbulence), step, np.random.default_rng(seed))
 
 
 def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
@@ -170,3 +169,11 @@ def test_a_wind_where_none_blows_is_refused():
     }.items():  # fmt: skip
         with pytest.raises(InputError, match=message):
             simulate(line_condition={"side_wind": 10.0}, distance=100.0, **settings)
+
+
+def side_winds_at(rows, x, steps):
+    """Vertical gusts (m per step), upward, at places x (m) after numbers of steps, (n,); rows: a lane's."""
+    amplitude, frequency, wavenumber, phase = rows[1:].reshape(-1, 4).T
+    place, step = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(steps))
+    turns = frequency * step[:, None] + wavenumber * place[:, None] + phase
+    return np.cos(2 * np.pi * turns) @ amplitude

@@ -50,13 +50,6 @@ def between(x, first, last):
     return (x >= SUPPORTS[first - 1]) & (x < SUPPORTS[last])
 
 
-def test_the_wire_is_stiffest_at_each_support():
-    run, line = simulate(**WHOLE), run_settings(LINE).catenary
-    stiffness = line.mean_stiffness * (1 + line.stiffness_variation * np.cos(2 * np.pi * share(run.position)))
-    touching = run.contact_force > 0
-    np.testing.assert_allclose(run.contact_force[touching], (stiffness * run.wire)[touching], rtol=1e-8)
-
-
 def test_figures_and_their_spans_file_and_sweep(tmp_path):
     run = simulate(**WHOLE)
     assert run.spans() == (10, 13)

@@ -16,6 +16,7 @@ from panto_env.plant.catenary.flexible.static import GRAVITY, dropper_table, dro
 from panto_env.plant.catenary.flexible.whole_line import settle_line
 
 from ..finite_element import whole_line as judge
+from ..finite_element.sections import line_of
 from ..uniform_lines import UNIFORM
 
 SHORT = {
@@ -47,11 +48,6 @@ BRIDGE = {
     ],
 }
 """A bridge: lower supports, the contact wire comes down on a gradient and goes up again."""
-
-
-def line_of(name, changes):
-    usual = load_catenary(name).model_dump(exclude_none=True)
-    return FlexibleCatenaryData.model_validate({k: v for k, v in usual.items() if k != "spans"} | changes)
 
 
 def judged(line, element=0.1):

@@ -1,4 +1,4 @@
-"""Arrays of a line of periodic stiffness: only its constants, since nothing moves."""
+"""A line of periodic stiffness (paper 3): a massless spring, so only constants, since nothing moves."""
 
 from __future__ import annotations
 

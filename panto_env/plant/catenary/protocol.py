@@ -1,15 +1,13 @@
-"""Shape of a line at one moment, for pictures.
-
-What a kind of catenary provides: a class for Python, and its operations for kernels.
+"""What a kind of catenary provides: a class for Python, and its operations for kernels.
 
 A step of a lane calls ``place_contact`` for each contact point; ``advance_wire`` once; then, for each contact
 point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. ``ending_by_wire`` is called once per
 control step. A class of line constants has its own sources of ``place_contact`` and ``look_at_contact``, and
 of the other operations that it needs; the default of an operation is written here: nothing moves.
 
-A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
-the step is read there with the weights with which the force acts there, so the work of the force on the wire
-is exactly force times change of that height, and no contact is too stiff to be stable.
+A contact point stays where it is at mid-step. The wire's height at both ends of the step is read there with
+the weights with which the force acts there, so the work of the force on the wire is exactly force times
+change of that height, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations
@@ -49,10 +47,8 @@ NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, NONE, NONE, (), slack=np.zeros(
 """View of a line that has neither wires nor supports."""
 
 
-SLOWEST = 1e-9
-"""Minimum speed of a train (m/s); below it the train counts as at rest."""
-FASTEST = from_kmh(1000)
-"""Speed that no train reaches (m/s), for lines on which no wave runs."""
+SLOWEST = 1e-9  # minimum speed of a train (m/s); below it the train counts as at rest
+FASTEST = from_kmh(1000)  # speed that no train reaches (m/s), for lines on which no wave runs
 
 
 class StartPoint(NamedTuple):
@@ -112,30 +108,19 @@ class CatenaryModel(Protocol):
         """Present shape of one lane's line from begin to end (m), as far as it is computed there."""
 
 
-def accept(data: Any) -> None:
-    """Accept every line that the schema accepts."""
-
-
-def usual_clear_spans(data: Any, numerics: Numerics, runs: Runs, last: int) -> int:
-    """As ``CatenaryKind.clear_spans``, on lines along which no wave comes back from far away."""
-    return CLEAR
-
-
-def say_nothing(data: Any, numerics: Numerics, runs: Runs) -> None:
-    """As ``CatenaryKind.warn_if_short``, of lines without a window."""
-
-
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
-    check: Callable[[Any], Any] = accept  # raises InputError where a line with these values cannot exist
+    check: Callable[[Any], Any] = lambda data: (
+        None
+    )  # raises InputError where a line with these values cannot exist
     # Spans of a line beyond the last one of a pass that keep its far end from the train; raises InputError
     # where that takes too many.
-    clear_spans: Callable[[Any, Numerics, Runs, int], int] = usual_clear_spans
+    clear_spans: Callable[[Any, Numerics, Runs, int], int] = lambda data, numerics, runs, last: CLEAR
     # Warns where a given window costs more than 1 % of the figures.
-    warn_if_short: Callable[[Any, Numerics, Runs], None] = say_nothing
+    warn_if_short: Callable[[Any, Numerics, Runs], None] = lambda data, numerics, runs: None
     several_collectors: bool = False  # whether its wire carries waves from one collector to another
 
 

@@ -1,6 +1,4 @@
-"""Arrays of a three-span catenary: its constants and the state of all lanes.
-
-Three-span catenary (paper 2, section 2.1, Eqs 1-6): one equivalent wire, in modal form.
+"""Three-span catenary (paper 2, section 2.1, Eqs 1-6): one equivalent wire, in modal form.
 
 The wire is anchored at both ends of the three spans and stands on springs K_S at the two supports
 between them. The pantograph is always in the central span: when it leaves it, the deflection of the
@@ -188,10 +186,8 @@ def _record(line, wire, lane, uplift, tension):
 
 
 SHAPE_SPACING = 0.025  # m, of the table of mode shapes, interpolated linearly
-VIEW_POINTS = 361
-"""Number of points of the three spans in a picture."""
-TIME_STEP = 2.5e-3
-"""Default time step (s): tests/plant/test_three_span.py shows how figures converge."""
+VIEW_POINTS = 361  # number of points of the three spans in a picture
+TIME_STEP = 2.5e-3  # default time step (s): tests/plant/test_three_span.py shows how figures converge
 
 
 class ThreeSpan:
@@ -226,7 +222,12 @@ class ThreeSpan:
         with one_thread():
             frequency, self._vectors = modes(data)
             self.line: Any = _constants(data, frequency, self._vectors, self.time_step)
-        self.wire: Any = _at_rest(lanes, collectors, data.modes)
+        self.wire: Any = ThreeSpanWire(
+            modal=np.zeros((lanes, 2, data.modes)),
+            contact_shape=np.zeros((lanes, collectors, data.modes)),
+            scratch=np.zeros((lanes, 2, data.modes)),
+            central_span=np.zeros(lanes, dtype=np.int64),
+        )
         self.contact_gain = contact_gain(self.line)
         alignment = data.alignment(spans)
         self.usual_end = alignment.length
@@ -247,7 +248,6 @@ class ThreeSpan:
 
     @cached_property
     def _view_shapes(self) -> Array:
-        """Mode shapes at the points of a picture, (points, modes)."""
         places = np.linspace(0.0, 3 * self._data.span_length, VIEW_POINTS)
         with one_thread():
             return mode_shapes(self._data, self._vectors, places)
@@ -339,15 +339,6 @@ def contact_gain(line: ThreeSpanLine) -> float:
     moved = np.linalg.solve(-np.eye(2) - steps, line.impulse.T[:, :, None])[:, :, 0]
     alternating = np.sum(line.half_step[:2].T * moved, axis=1) + line.half_step[2]
     return max(0.0, float(np.max(line.shape**2 @ -alternating)))
-
-
-def _at_rest(lanes: int, collectors: int, size: int) -> ThreeSpanWire:
-    return ThreeSpanWire(
-        modal=np.zeros((lanes, 2, size)),
-        contact_shape=np.zeros((lanes, collectors, size)),
-        scratch=np.zeros((lanes, 2, size)),
-        central_span=np.zeros(lanes, dtype=np.int64),
-    )
 
 
 __all__ = ["KIND", "ThreeSpan", "ThreeSpanData"]

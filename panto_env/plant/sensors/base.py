@@ -1,10 +1,8 @@
-"""Noise of the sensors, from a random generator for each lane.
+"""The interface of sensors, their noise, and a train's odometer, which reads position and speed.
 
-A train's odometer: its estimate of the position in the span and of the speed.
-
-It counts a wheel's turns. An error of the wheel's diameter gives distance and speed the same relative error,
-which is drawn per run; slip adds a random walk of the distance. At each mast, which is detected with an error
-of its own, the count is reset, so that the error is a saw-tooth. The readings have no delay.
+An odometer counts a wheel's turns. An error of the wheel's diameter gives distance and speed the same
+relative error, which is drawn per run; slip adds a random walk of the distance. At each mast, which is
+detected with an error of its own, the count is reset. The readings have no delay.
 """
 
 from __future__ import annotations
@@ -21,8 +19,7 @@ from ...base.arrays import Array, Index, Lanes
 from ...base.settings import Settings
 from ..alignment import Alignment, mean_over_own_length
 
-AHEAD = 64
-"""Readings drawn at a time: a call of a generator takes about as long as fifty numbers."""
+AHEAD = 64  # readings drawn at a time: a call of a generator takes about as long as fifty numbers
 
 
 class Noise:
@@ -56,8 +53,7 @@ class Noise:
         sensors.noise_used[lane] = 0
 
 
-WALK = 100.0
-"""Distance (m) after which the random walk reaches its given rms."""
+WALK = 100.0  # distance (m) after which the random walk reaches its given rms
 
 
 class OdometerErrors(NamedTuple):

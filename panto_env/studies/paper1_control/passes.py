@@ -23,8 +23,7 @@ from ...metrics.figures import Figures
 from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
-from ...plant.pantograph.build import matrices
-from ...plant.pantograph.schema import PantographData
+from ...plant.pantograph.schema import PantographData, matrices
 from ...policies import find_policy
 
 LINE = "shinkansen-simple"

@@ -35,8 +35,7 @@ from ...estimation.parameters import (
 )
 from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
-from ...plant.pantograph.build import with_scatter
-from ...plant.pantograph.schema import PantographData
+from ...plant.pantograph.schema import PantographData, with_scatter
 from ...terminal import number
 from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
 

@@ -199,7 +199,6 @@ class MotorActuator(ActuatorSettings):
 
 
 def _halvings(value: float, largest: float) -> int:
-    """How often a value is halved until it is at most ``largest``."""
     return max(0, math.ceil(math.log2(value / largest)))
 
 

@@ -1,6 +1,4 @@
-"""Arrays of the motors: their constants and the state of all lanes.
-
-The armature and its current loop over one step, in closed form.
+"""The motors in a kernel: armature and current loop over one step in closed form, friction, backlash.
 
 L di/dt = u - R i - k_t (speed of the shaft). The drive controls the current by a PI law whose zero cancels
 the armature's pole, with the back-EMF fed forward: u = R i + EMF + L a (i* - i), so that di/dt = a (i* - i)
@@ -82,8 +80,7 @@ class MotorArrays(NamedTuple):
         return np.array(rows[..., [MotorRow.SUPPLIED, MotorRow.COPPER]])
 
 
-SMALL = 1e-9
-"""Difference from the bound (N) that counts as zero."""
+SMALL = 1e-9  # difference from the bound (N) that counts as zero
 
 
 @inlined

@@ -1,21 +1,14 @@
-"""Arrays of what contact points and droppers near them lack of each other on the grid.
+"""Arrays of the flexible catenary: the constants of a line on its grid, and the state of its wires.
 
-Arrays of what is attached to the wires of a line whose spans differ, each thing in rows of its own.
+Wires lie in segments abreast: the window is cut into ``WIDTH`` equal segments, and row r of a wire holds node
+r of each. So one vector computes a node of all segments at once. Rows beyond a segment's ends hold nodes of
+its neighbours. Where spans are alike, droppers of different segments are in the same rows: they form sets
+that are the same for each position of the window. Where spans differ, each dropper and support has rows of
+its own (``Scattered``), and the window's nodes have masses of their own.
 
 Tables along the whole line never change. The window holds a part of them: a thing with number n is always in
 slot n modulo the number of slots, which lie in sets of ``WIDTH``; neighbours are in different sets, because
 things of a set are computed side by side and must not share nodes.
-
-Arrays of the flexible catenary: the constants of a line on its grid, and the state of its wires.
-
-Wires lie in segments abreast: the window is cut into ``WIDTH`` equal segments, and row r of a wire holds node
-r of each. So one vector computes a node of all segments at once, along the wires as at the droppers. Rows
-beyond a segment's ends hold nodes of its neighbours.
-
-What is attached to the wires is computed eight at a time too. Where spans are alike, droppers of different
-segments are in the same rows: they form sets whose nodes are read row by row, and which are the same for each
-position of the window (``FlexibleLine``). Where spans differ, each dropper and support has rows of its own
-(``scattered``), and the window's nodes have masses of their own.
 """
 
 from __future__ import annotations
@@ -27,10 +20,8 @@ from ....backend import constants
 from ....base.arrays import Array, Index
 from ...alignment import AlignmentArrays
 
-REACH = 3
-"""Cells between two nodes within which a contact point and a dropper are near each other."""
-NONE = -(2**31)
-"""Number of a dropper where there is none."""
+REACH = 3  # cells between two nodes within which a contact point and a dropper are near each other
+NONE = -(2**31)  # number of a dropper where there is none
 
 
 class Near(NamedTuple):
@@ -169,10 +160,8 @@ class ScatteredWindow(NamedTuple):
 
 
 PAD = 3  # rows beyond each end of the segments, for the seven-point stencil
-CONTACT, MESSENGER = 0, 1
-"""Indices of the wires; the pantograph touches the first."""
-LOWER, UPPER = 0, 1
-"""The two ends of a link."""
+CONTACT, MESSENGER = 0, 1  # indices of the wires; the pantograph touches the first
+LOWER, UPPER = 0, 1  # the two ends of a link
 
 
 class StencilRow(IntEnum):

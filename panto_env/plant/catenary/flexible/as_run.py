@@ -1,12 +1,9 @@
-"""Elasticity of a line along a span (EN 50119): static uplift of the contact wire per newton.
+"""A line at rest as it is run, beside the line as designed, and its elasticity (EN 50119): uplift per newton.
 
-A line of a few spans is solved at rest for a force at many places of its middle span; a line whose spans
-differ is solved as a whole, for each of them. Droppers that the force would compress go slack.
-
-A line at rest as it is run: with the tensions that its condition leaves, beside the line as designed.
-
-What lies along the whole line counts: lost tension, temperature and ice. Errors that are drawn, those of
-single droppers and supports, and wear are left out.
+What lies along the whole line counts: lost tension, temperature and ice; errors that are drawn, those of
+single droppers and supports, and wear are left out. For the elasticity a line of a few spans is solved at
+rest for a force at many places of its middle span, and a line whose spans differ as a whole, for each of
+them. Droppers that the force would compress go slack.
 """
 
 from __future__ import annotations
@@ -20,9 +17,9 @@ import numpy as np
 from ....base.arrays import Array, to_kmh
 from ....base.table import Table
 from ...line_condition import NEW, LineCondition
-from .attached import dropper_positions
 from .defects import DefectiveLine, shape_left, with_tension_left
 from .fixed_wires import SPANS, tensions_of_fixed
+from .on_grid import dropper_positions
 from .overlaps import tension_lengths
 from .parts import Conductor, Span, places_of
 from .schema import FlexibleCatenaryData

@@ -1,15 +1,13 @@
-"""A line whose wires have another tension, or another mass, than those that it was designed for.
+"""Static state of a whole line at rest, with defects of its droppers, supports and wires.
 
 Its droppers and steady arms were cut and set for the design's wires. A line designed for the tension that is
 left, and for wires with ice, would have other droppers: the real ones are too long or too short by the
 difference.
 
-Static state of a whole line at rest, with defects of its droppers, supports and wires.
-
 Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
-and taut droppers. Nodes of their exact elements (``beams``) stand at supports, droppers and defects of the
-contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
+and taut droppers. Nodes of their exact elements (``shape.Beams``) stand at supports, droppers and defects of
+the contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
 """
 
 from __future__ import annotations
@@ -26,14 +24,13 @@ from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
-from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
-from .overlaps import joined, tension_lengths
+from .arrays import CONTACT, MESSENGER
+from .overlaps import as_wire, joined, moving, stitches_of, tension_lengths
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
+from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
 from .spans import spans_of
 from .static import StaticShape, solve
-from .stitches import as_wire, moving, stitches_of
 from .wire_defects import WireDefects, locate
 
 
@@ -150,7 +147,7 @@ class DefectiveLine:
         each = spans_of(data, spans).each
         self._data, self._spans, self._condition = data, spans, condition
         alignment = data.alignment(spans)
-        self._broken, self._miscut, height = _locate(
+        self._broken, self._miscut, height = located_defects(
             data, [len(span.droppers.sag) for span in each], condition
         )
         self._own = own = locate(data, spans, condition)
@@ -179,7 +176,7 @@ class DefectiveLine:
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
-        self._repeats = not data.sequence
+        self._repeats, self.pieces = not data.sequence, len(self._lengths)
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
         self._size = per_node * len(number)
         self._in_band = places_in_band(self._unknowns, self._size)
@@ -223,7 +220,6 @@ class DefectiveLine:
         self._carry(left)
 
     def _stitch(self, messenger: Wire) -> None:
-        """Add the messenger and the stitch wires."""
         places, stitches, lengths, size = self._places, self._stitches, self._lengths, self._size
         above = self._unknowns + 2 * (MESSENGER - CONTACT)
         tensions = messenger.tension - stitches.deficit(places, places + lengths)
@@ -258,28 +254,6 @@ class DefectiveLine:
             self._error = self._miscut + np.tile(fit.too_long, self._times)
             self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
             self._load[self._masts] += fit.lift
-
-    def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
-        """The line with tables for ``rows`` defective ones, which ``write`` fills."""
-        droppers, real = len(self._static), line.link_static.dtype
-        return line._replace(
-            link_static=np.zeros((rows, droppers), dtype=real),
-            link_gap=np.zeros((rows, droppers), dtype=real),
-            rise=np.zeros((rows, len(self._unknowns), 5)),
-            rise_breaks=self.breaks,
-            rise_decay=np.full(rows, self.decay),
-        )
-
-    def write(
-        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
-    ) -> StaticState:
-        """Write the state under these errors, as ``solve`` takes them, into the line's tables."""
-        state = self.solve(scatter, heights)
-        line.link_static[row] = state.tension
-        line.link_gap[row] = state.gap
-        line.rise[row] = state.rise
-        line.rise_decay[row] = self.decay
-        return state
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
@@ -356,31 +330,23 @@ def _divided(
     return breaks, np.diff(breaks), index_at(breaks, span.droppers.positions)
 
 
-def _own(counts: Sequence[int], span: int) -> str:
-    last = min(span, len(counts))
-    return f"and span {last} has {counts[last - 1]} droppers"
-
-
-def check_places(data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition) -> None:
-    """Raise InputError for a dropper or support that a line has not; counts: of the droppers of each span."""
-    _locate(data, counts, condition)
-
-
-def _locate(
+def located_defects(
     data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
 ) -> tuple[Any, Array, Array]:
     """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m).
 
-    counts: of the droppers of each span.
+    counts: of the droppers of each span. Raises InputError for a dropper or support that the line has not.
     """
     spans, firsts = len(counts), np.cumsum([0, *counts])
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
         for span, number in places:
             if span > spans or number > counts[span - 1]:
+                last = min(span, spans)
+                each = f", and span {last} has {counts[last - 1]} droppers."
                 raise InputError(
                     f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans"
-                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else f", {_own(counts, span)}.")
+                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else each)
                 )
         return [int(firsts[span - 1]) + number - 1 for span, number in places]
 

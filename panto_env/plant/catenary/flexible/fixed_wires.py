@@ -17,22 +17,17 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError, beside
 from ...line_condition import LineCondition
-from ...numerics import Numerics, Runs
 from ..schema import LOWEST_TENSION
-from . import window
-from .beams import Profile
 from .defects import DefectiveLine, shape_left, with_tension_left
-from .parts import Conductor
+from .overlaps import stitched
 from .schema import FlexibleCatenaryData
+from .shape import Profile
 from .spans import spans_of
-from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, STEEPEST, StaticShape
-from .stitches import stitched
+from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, StaticShape, check_level
 
 UNCHANGED = (1.0, 1.0)
-SPANS = 9
-"""Spans of a uniform line, of which the middle one is looked at: anchors are felt within two."""
-POINT_DISTANCE = 0.05
-"""Distance (m) of points between which a wire counts as straight."""
+SPANS = 9  # spans of a uniform line, of which the middle one is looked at: anchors are felt within two
+POINT_DISTANCE = 0.05  # distance (m) of points between which a wire counts as straight
 
 
 def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
@@ -114,27 +109,6 @@ def _slack(data: FlexibleCatenaryData, condition: LineCondition, tensions: tuple
     return np.array([float(np.mean(np.diff(each) ** 2)) / (2 * step**2) for each in heights])
 
 
-def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last: int) -> int:
-    """As ``CatenaryKind.clear_spans``; a whole line needs more of them for a slower train."""
-    return window.clear_spans(_wires_in(data, runs), numerics, runs, last, stitched(data))
-
-
-def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
-    """As ``CatenaryKind.warn_if_short``."""
-    wires = _wires_in(data, runs)
-    window.warn_if_short(wires, numerics, runs)
-    if stitched(data) and numerics.accuracy == "full" and numerics.window is None:
-        window.warn_if_slow(wires, runs)
-
-
-def _wires_in(data: FlexibleCatenaryData, runs: Runs) -> tuple[Conductor, Conductor]:
-    """The wires with their tension and ice in these runs."""
-    condition = runs.conditions[0]
-    if not (condition.temperature or condition.ice):
-        return data.wires
-    return with_tension_left(data, condition, tensions_of_fixed(data, condition)).wires
-
-
 ADVICE = (
     "in this line_condition; take less ice, less lost tension, or a temperature nearer to that of its design."
 )
@@ -158,19 +132,7 @@ def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, ris
     share = np.linspace(0.0, 1.0, POINTS, endpoint=False)
     for k, (begin, length) in enumerate(zip(supports, np.diff(supports), strict=False)):
         x = begin + length * share
-        contact = shape.contact.height(x) + rise.height(x)
-        uneven = float(np.ptp(contact - (heights[k + 1] - heights[k]) * share))
-        where = f"span {k + 1} of line '{left.name}'"
-        if uneven > HEIGHT_RANGE:
-            most = beside(uneven, HEIGHT_RANGE, ".2g")
-            raise InputError(
-                f"At rest the contact wire of {where} would differ by {most} m in height, more than "
-                f"{HEIGHT_RANGE} m, {ADVICE}"
-            )
-        for name, height in (("contact", contact), ("messenger", shape.messenger.height(x))):
-            slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
-            if slope > STEEPEST:
-                raise InputError(
-                    f"At rest the {name} wire of {where} would have a slope of "
-                    f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, {ADVICE}"
-                )
+        both = shape.contact.height(x) + rise.height(x), shape.messenger.height(x)
+        straight = (heights[k + 1] - heights[k]) * share
+        too_high = f", more than {HEIGHT_RANGE} m, {ADVICE}"
+        check_level(f"span {k + 1} of line '{left.name}'", x, both, straight, too_high, f", {ADVICE}")

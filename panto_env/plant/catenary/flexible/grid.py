@@ -1,12 +1,9 @@
-"""Finite differences of a flexible catenary: their weights, stability, and error at a point force.
-
-Waves of the contact wire that run ahead of a train, and the grid that carries them.
+"""Finite differences of a flexible catenary: weights, stability, error at a point force, waves carried.
 
 A force that changes at f Hz and travels at v sends waves ahead whose length shrinks with the train's distance
-from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. Two errors of a grid
-grow with k: it carries no wave of less than two nodes, and a clamp, which hangs on two nodes, reflects too
-little. Both limits were set where figures of the catalogue's lines and of drawn ones leave their bounds,
-those of ``fine_enough`` in ``resolution``.
+from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. A grid carries no wave
+of less than two nodes, and a clamp, which hangs on two nodes, reflects too little. Both limits were set where
+figures of the catalogue's lines and of drawn ones leave the bounds of ``fine_enough`` in ``resolution``.
 """
 
 from __future__ import annotations
@@ -26,10 +23,8 @@ from .schema import FlexibleCatenaryData
 BEARABLE = 0.5
 """Share of the stiffness at which one spring is unstable that springs have at most; others are near."""
 
-FITTED = 1.6
-"""Angle from node to node up to which waves are fitted: four nodes per wave."""
-TURNED = 1.3
-"""Maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor."""
+FITTED = 1.6  # angle from node to node up to which waves are fitted: four nodes per wave
+TURNED = 1.3  # maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
@@ -58,13 +53,9 @@ def _stable(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1
     return bool(squared.min() >= -1e-9 and squared.max() * (1 + 2 * beta / step) <= 4 + 1e-9)
 
 
-def finest_stable(data: FlexibleCatenaryData, step: float) -> float:
-    """Spacing (m) of the finest grid on which a step (s) is stable."""
-    return _finest_stable(data.wires, data.damping.beta, data.stride, step)
-
-
 @remembered
-def _finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+def finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+    """Spacing (m) of the finest grid on which a step (s) is stable; beta: s; stride: of a window (m)."""
     count = WIDTH * round(stride / (step * max(wire.wave_speed for wire in wires)) / WIDTH)
     while count > WIDTH and not all(_stable(wire, stride / count, step, beta) for wire in wires):
         count -= WIDTH
@@ -203,7 +194,6 @@ def _fitted(share: float) -> tuple[Array, Array]:
 
 
 def _frequency(wire: Wire, number: Any) -> Any:
-    """Frequency (rad/s) of a wire's free waves of a wavenumber (rad/m)."""
     return np.sqrt((wire.tension * number**2 + wire.bending_stiffness * number**4) / wire.mass)
 
 
@@ -258,7 +248,6 @@ def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:
 
 
 def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
-    """Spacing (m) on which a contact wire's clamp reflects waves well enough."""
     wire, mass = data.contact_wire, max(own.contact_clamp_mass for own in data.dropper_tables)
     number = wave_ahead(wire, speed, CLAMP_HZ)
     share = (2 * math.pi * CLAMP_HZ + speed * number) * mass / (2 * wire.impedance)

@@ -2,7 +2,7 @@
 
 The kink of a wire under a force is narrower than the grid. A dropper has the compliance that is missing at
 its own place in its stiffness, and a contact point in the contact's. Near each other, the force of each moves
-the other too, by more or less than it does on the grid: by the table of ``near_build``.
+the other too, by more or less than it does on the grid: by the table of ``near_droppers``.
 """
 
 from __future__ import annotations
@@ -108,8 +108,7 @@ def _of_line(line, wire, lane, pair, cell):
     return number, apart, s + held.links.node.shape[1] if s >= 0 else s, j
 
 
-PLACES = 9
-"""Places in a cell in the tables."""
+PLACES = 9  # places in a cell in the tables
 
 
 def near_droppers(

@@ -44,8 +44,7 @@ __all__ = [
     "Support",
 ]
 
-SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}
-"""Values of a line whose spans differ."""
+SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}  # values of a line whose spans differ
 
 
 class Rayleigh(Settings):

@@ -1,7 +1,7 @@
 """Static shape of the two-wire catenary as it is designed: one span that repeats, or a whole line of spans.
 
 The contact wire is held at the catalogue's sags by droppers, which are cut so; the messenger wire hangs
-between its supports under the droppers' pull. Both are solved by exact beam elements (``beams``).
+between its supports under the droppers' pull. Both are solved by exact beam elements (``shape``).
 """
 
 from __future__ import annotations
@@ -15,13 +15,11 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError, beside
 from ....base.table import Table
-from .beams import GRAVITY, PeriodicWire
-from .overlaps import joined, tension_lengths
+from .overlaps import joined, stitches_of, tension_lengths
 from .parts import Span
 from .schema import FlexibleCatenaryData
-from .shape import StaticShape, settled, stiffness_of, unloaded
+from .shape import GRAVITY, PeriodicWire, StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
-from .stitches import stitches_of
 from .whole_line import StitchedMessenger, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
@@ -29,14 +27,11 @@ __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
 HEIGHT_RANGE = 0.5
 """Maximum difference of the contact wire's heights along a span (m), beside the span's gradient; pantographs
 follow 0.3 m."""
-STEEPEST = 0.2
-"""Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+STEEPEST = 0.2  # slope up to which a wire is nearly level (-): tension is then off by 2 % at most
 MOST_STRETCH = 0.1
 """Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
-MOST_YIELD = 0.3
-"""Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
-POINTS = 401
-"""Number of points of a span at which heights are checked."""
+MOST_YIELD = 0.3  # yield of the messenger's support at rest (m): cantilevers yield by millimetres
+POINTS = 401  # number of points of a span at which heights are checked
 
 
 @remembered
@@ -98,7 +93,6 @@ def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
 
 
 def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
-    """Raise InputError for a support of the messenger that gives way, the one that yields most."""
     places, tops = np.zeros(1), np.full(1, line.encumbrance)
     if line.sequence:
         _, heights, encumbrances = spans_of(line)
@@ -124,20 +118,31 @@ def _check_wires(each: _Placed, shape: StaticShape) -> None:
             f"At rest the messenger wire of {each.where} would hang {below.max():.2g} m below "
             f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
         )
-    heights = float(np.ptp(contact - each.rise / each.span.span_length * x))
-    if heights > HEIGHT_RANGE:
-        raise InputError(
-            f"At rest the contact wire of {each.where} would differ by "
-            f"{beside(heights, HEIGHT_RANGE, '.2g')} m in height along a span, more than "
-            f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
-        )
-    for name, height in (("contact", contact), ("messenger", messenger)):
+    straight = each.rise / each.span.span_length * x
+    too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+    too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
+    check_level(each.where, x, (contact, messenger), straight, too_high, too_steep)
+
+
+def check_level(
+    where: str, x: Array, heights: tuple[Array, Array], straight: Array, too_high: str, too_steep: str
+) -> None:
+    """Raise InputError for a wire that is too steep, or a contact wire of too many heights.
+
+    heights: of contact wire and messenger (m) at even places x (m) of a span, (n,); straight: of the line
+    between the supports (m). too_high, too_steep: ends of the sentences.
+    """
+    uneven = float(np.ptp(heights[0] - straight))
+    if uneven > HEIGHT_RANGE:
+        most = beside(uneven, HEIGHT_RANGE, ".2g")
+        raise InputError(f"At rest the contact wire of {where} would differ by {most} m in height{too_high}")
+    for name, height in zip(("contact", "messenger"), heights, strict=True):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
+            most = beside(slope, STEEPEST, ".2g")
             raise InputError(
-                f"At rest the {name} wire of {each.where} would have a slope of "
-                f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
-                "level wires; give it more tension, or shorter spans."
+                f"At rest the {name} wire of {where} would have a slope of {most}, more than {STEEPEST}"
+                f"{too_steep}"
             )
 
 
@@ -169,7 +174,6 @@ def _check_droppers(each: _Placed, shape: StaticShape) -> None:
 
 
 def _settle(line: FlexibleCatenaryData) -> StaticShape:
-    """The static shape of a span that repeats."""
     droppers, messenger = line.droppers, line.messenger_wire
     x, sag = np.array(droppers.positions), np.array(droppers.sag)
     breaks = np.concatenate([[0.0], x, [line.span_length]])
@@ -209,7 +213,6 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
-    """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
     if line.stitch_wire is None:
         return None
     found = stitches_of(line, 1)

@@ -1,13 +1,9 @@
-"""Messenger with stitch wires at rest, on its supports: about a support that repeats, or from end to end.
-
-Between the clamps of a stitch wire the messenger carries its tension less the stitch wire's. Nodes stand at
-supports, clamps and droppers; the height of a stitch wire's end is that of the messenger there.
-
-Static shape of a line whose spans differ, from end to end.
+"""Static shape of a line whose spans differ, from end to end, and of a messenger with stitch wires.
 
 Both wires are solved along the whole line. Its ends are as if the line went on there, mirrored: at the
 gradient of the outermost span, with half of a support's stiffness and load. A line of equal spans that are
-symmetric has the shape of one span that repeats, up to its ends.
+symmetric has the shape of one span that repeats, up to its ends. Between the clamps of a stitch wire the
+messenger carries its tension less the stitch wire's.
 """
 
 from __future__ import annotations
@@ -19,12 +15,11 @@ import numpy as np
 
 from ....base.arrays import Array
 from ..schema import Wire
-from .beams import GRAVITY, HELD, Beams, LongWire, Profile
+from .overlaps import Stitches, as_wire, stitches_of
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import Rope, StaticShape, settled, stiffness_of, unloaded
-from .spans import spans_of
-from .stitches import Stitches, as_wire, stitches_of
+from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, settled, stiffness_of, unloaded
+from .spans import hung_at, spans_of
 
 
 class StitchedMessenger:
@@ -83,8 +78,7 @@ class StitchedMessenger:
         places = np.append(stitches.begin, stitches.end)
         inside = (places > first) & (places < last)
         self._loads.append((self._at(places[inside]), weights[inside]))
-        self.masts: Any = self._at(supports)
-        """Unknown that is the messenger's height at each support."""
+        self.masts: Any = self._at(supports)  # unknown that is the messenger's height at each support
         self._springs = springs
         if slopes is not None:
             self._held += [(1, slopes[0]), (self._height[-1] + 1, slopes[1])]
@@ -95,7 +89,6 @@ class StitchedMessenger:
         self._solve = splu(self._matrix()).solve
 
     def _at(self, places: Array) -> Any:
-        """Unknowns that are the messenger's height at places where it has nodes (m)."""
         return self._height[index_at(self.breaks, places)]
 
     def _add(self, wire: Wire, lengths: Array, unknowns: Any) -> tuple[Beams, Array]:
@@ -177,9 +170,7 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     tops = heights + np.array(encumbrances)  # of the messenger's supports without load
     counts = [len(span.droppers.positions) for span in spans]
     own = [slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True)]
-    x = np.concatenate(
-        [begin + span.droppers.positions for begin, span in zip(supports, spans, strict=False)]
-    )
+    x = hung_at(line)
     sag = np.concatenate([span.droppers.sag for span in spans])
     masts = np.arange(len(supports)) + np.append(0, np.cumsum(counts))  # nodes
     hung = np.delete(np.arange(len(supports) + len(x)), masts)
@@ -249,6 +240,5 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _end_slopes(supports: Array, heights: Array) -> tuple[float, float]:
-    """Slopes of the straight lines between the first two and the last two supports."""
     slopes = np.diff(heights) / np.diff(supports)
     return float(slopes[0]), float(slopes[-1])

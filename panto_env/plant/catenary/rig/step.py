@@ -1,6 +1,4 @@
-"""Arrays of a rig: its constants and the state of all lanes.
-
-The step of a rig: the cylinder follows commands, the load cell reads, and at each sample the line moves.
+"""The step of a rig: the cylinder follows commands, the load cell reads, and at each sample the line moves.
 
 The cylinder yields to the force only through the oil, so the contact sees a height that is known beforehand
 and a massless spring. Up is positive; the load cell reads the collectors' upward force minus the inertial
@@ -55,8 +53,7 @@ class FitRow(IntEnum):
 
 
 RIG_ROW, FIT_ROW = constants(RigRow), constants(FitRow)
-TERMS = 3
-"""Terms of a command: height, velocity and acceleration of the contact point."""
+TERMS = 3  # terms of a command: height, velocity and acceleration of the contact point
 
 
 class RigLine(NamedTuple):
