@@ -206,7 +206,7 @@ def finer(line, pantograph, case, run, **numbers):
     None where there is none to compare with: the damping of a stiff wire wants a shorter step than a run may
     have, or a contact damped by 1000 N s/m diverges on wires that are nearly limp, as the run then says.
     """
-    for part in (2, 4, 8, 16, 32):
+    for part in (2, 4, 8, 16, 32, 64, 128):
         if run.time_step / part < SHORTEST:
             return None
         numerics = {"spacing": run.settings["spacing"] / 2, "time_step": run.time_step / part}

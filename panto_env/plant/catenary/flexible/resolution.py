@@ -69,6 +69,9 @@ HARD_CONTACT_ERROR = 20
 HARD_CONTACT_MEAN_ERROR = 5
 """Error of the mean (%) there, over a few spans: where contact is lost for half of the time, the bounces come
 in a different order on a different grid."""
+HARD_CONTACT_ON_CLAMPS = 1.25e-4
+"""Time step (s) for a hard contact on clamps heavier than ``HEAVY_CLAMP``: with twice the step sigma was 24 %
+wrong where contact is lost most of the time."""
 HARD_SPOT_GRID = 0.3
 """Grid (m) for a lumped mass on the wire, which throws the head off: on 0.4 m it lands at another place, and
 the force over the spot was wrong by a tenth of what the spot does to it, here by a fiftieth."""
@@ -88,7 +91,9 @@ CLAMPS = (
 )
 """Up to a mass of a clamp (kg), which hangs on two nodes: a grid (m) that is fine enough, a time step (s)
 that is short enough."""
-HEAVY_CLAMP = 1.0  # mass of a clamp on the contact wire (kg) above which deep wear waves need the finest grid
+HEAVY_CLAMP = 1.0
+"""Mass of a clamp on the contact wire (kg) above which deep wear waves need the finest grid, and a hard
+contact a shorter step."""
 STITCHED_GRIDS = ((0.12, 0.12), (0.65, 0.25), (np.inf, 0.17))
 """Up to a share of the wave speed: a grid (m) that is fine enough for stitch wires. The messenger's tension
 jumps at their clamps, between nodes; on 0.33 m sigma was wrong by 1.2 %, above 65 % on 0.25 m the maximum by
@@ -176,10 +181,11 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     if deep:
         ahead = min(deep) * (wave_speed - quick) / quick
         spacing = min(spacing, max(ahead / NODES_PER_WAVE, DEEP_GRID))
-        if any(own.contact_clamp_mass > HEAVY_CLAMP for own in data.dropper_tables):
+        if _heavy(data):
             spacing = min(spacing, FINEST_GRID)
     if runs.hard_contact:
         spacing = min(spacing, HARD_CONTACT_GRID)
+        longest = min(longest, HARD_CONTACT_ON_CLAMPS) if _heavy(data) else longest
     if any(each.hard_spots for each in runs.conditions):
         spacing = min(spacing, HARD_SPOT_GRID)
     kink = math.sqrt(data.contact_wire.bending_stiffness / data.contact_wire.tension)
@@ -215,6 +221,11 @@ def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
         margin = max(margin, MARGINS[1][1])
     damped = min(1 + PER_DAMPING * data.damping.beta / step, MOST_DAMPED)
     return max(margin, damped)
+
+
+def _heavy(data: FlexibleCatenaryData) -> bool:
+    """Whether a clamp on the contact wire is a heavy one."""
+    return any(own.contact_clamp_mass > HEAVY_CLAMP for own in data.dropper_tables)
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
