@@ -146,7 +146,8 @@ def test_what_is_no_result_is_refused(tmp_path, text):
     path.write_text(text, encoding="latin-1")
     with pytest.raises(
         InputError,
-        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|.* its checksum does not fit)",
+        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|could not be read|"
+        r".* its checksum does not fit)",
     ):
         speed.speed([path])
 

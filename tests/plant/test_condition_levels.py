@@ -73,7 +73,7 @@ def test_at_low_speed_the_same_short_waves_reach_sigma():
 
 
 def test_the_table_of_conditions_has_every_preset_and_is_of_simulated_passes(monkeypatch):
-    monkeypatch.setattr(conditions, "SEEDS", 2)
+    monkeypatch.setattr(conditions, "LEVEL_SEEDS", 2)
     checks = conditions.check_conditions("en50318-2002", "en50318-2002", 250.0)
     assert [check.condition for check in checks] == list(LINE_CONDITIONS)
     assert [check.seeds for check in checks] == [1, 2, 2, 2, 2]

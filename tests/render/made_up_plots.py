@@ -123,11 +123,15 @@ def benchmark():
     settings = SimpleNamespace(
         lines=(line,), drawn_seeds=(3, 4), policies_on=lambda line: ("passive", "p", "q")
     )
-    outcome = SimpleNamespace(settings=settings, spans=((1, 3),), cells=tuple(cells()))
-    with (
-        mock.patch.object(benchmark_plot, "_played", return_value=None),
-        mock.patch.object(benchmark_plot, "drive", side_effect=[(run, None) for run in (RUN, OTHER, QUIET)]),
-    ):
+    rows = [
+        SimpleNamespace(policy=policy, catenary="a", pantograph="b", speed_kmh=300.0, seed=3)
+        for policy in ("passive", "p", "q")
+    ]
+    outcome = SimpleNamespace(
+        settings=settings, spans=((1, 3),), cells=tuple(cells()), rows=rows, played=[None] * 3
+    )
+    runs = [(run, None) for run in (RUN, OTHER, QUIET)]
+    with mock.patch.object(benchmark_plot, "drive", side_effect=runs):
         return benchmark_plot.plot(outcome)
 
 
