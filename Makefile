@@ -130,11 +130,9 @@ bounds: $(READY)
 
 # Bad command lines, random environments, damaged files, and minutes of everything: each end is judged and counted.
 FILES := 10000
+COMMANDS := 2000
 fuzz: $(READY)
-	$(BIN)/python -m tests.fuzz.command_lines
-	$(BIN)/python -m tests.fuzz.environments --count $(CASES)
-	$(BIN)/python -m tests.fuzz.mutations --count $(FILES)
-	$(BIN)/python -m tests.fuzz.soak
+	COMMANDS=$(COMMANDS) CASES=$(CASES) FILES=$(FILES) MINUTES=5 $(BIN)/pytest -s -m 'slow or study' tests/fuzz
 
 # The lower bounds of pyproject.toml, all at once, without the extra 'agents'; what they need themselves is the
 # newest that there is. The versions tested are in constraints.txt.

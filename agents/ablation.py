@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.statistics import Clusters, interquartile_mean, interval_of_mean
 from panto_configs import find
 from panto_env.analysis.pool import Progress
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
+from panto_env.base.table import Table
 
-from .ranges import Count
-from .run_folder import RunFolder
-from .settings import Training, parse_training
-from .trainings import train_all
+from .algorithm import Count
+from .settings import Seed, Training, parse_training
+from .trainings import RunFolder, train_all
 
 REFERENCE = "as it is"
 """Name of the variant without any change."""
@@ -31,9 +35,7 @@ class Ablation(Settings):
 
     training: str = Field(description="name or path of the training that is varied")
     total_steps: Count = Field(description="environment steps of each run")
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        min_length=2, description="seeds of the runs of each variant"
-    )
+    seeds: tuple[Seed, ...] = Field(min_length=2, description="seeds of the runs of each variant")
     judged_by: str = Field(description="name or path of the benchmark that compares the runs' best models")
     judged_on: Count = Field(description="number of the benchmark's seeds")
     variants: dict[str, dict[str, Any]] = Field(
@@ -45,13 +47,12 @@ class Ablation(Settings):
     def trainings(self) -> dict[tuple[str, int], Training]:
         """Trainings by variant and seed. Raises InputError, naming the variant, if one is not valid."""
         base = read_toml(find(self.training, "training"))
-        made = {}
-        as_it_is: dict[str, dict[str, Any]] = {REFERENCE: {}}
-        for name, changes in (as_it_is | self.variants).items():
-            varied = _changed(base, changes)
-            for seed in self.seeds:
-                table = varied | {"seed": seed, "total_steps": self.total_steps}
-                made[name, seed] = parse_training(table, f"The variant '{name}'")
+        changes: dict[str, dict[str, Any]] = {REFERENCE: {}} | self.variants
+        made: dict[tuple[str, int], Training] = {}
+        for name, changed in changes.items():
+            table = _changed(base, changed) | {"total_steps": self.total_steps, "seed": self.seeds[0]}
+            training = parse_training(table, f"The variant '{name}'")
+            made |= {(name, seed): training.model_copy(update={"seed": seed}) for seed in self.seeds}
         return made
 
     def benchmark(self, models: Mapping[tuple[str, int], Path]) -> BenchmarkSettings:
@@ -87,15 +88,11 @@ def run(
     finish. workers, ray, command: see ``train_all``. Returns each run's best model, and the benchmark of all.
     """
     trainings = ablation.trainings()
-    folders = {(name, seed): _folder(output, name, seed) for name, seed in trainings}
+    folders = {(name, seed): output / name.replace(" ", "-") / f"seed{seed}" for name, seed in trainings}
     runs = {folders[key]: training for key, training in trainings.items()}
     train_all(runs, resume=True, workers=workers, ray=ray, progress=progress, command=command)
     models = {key: RunFolder(folder).best for key, folder in folders.items()}
     return models, run_benchmark(ablation.benchmark(models), workers, ray=ray)
-
-
-def _folder(output: Path, name: str, seed: int) -> Path:
-    return output / name.replace(" ", "-") / f"seed{seed}"
 
 
 def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -110,3 +107,81 @@ def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             made[key] = value
     return made
+
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One variant over its runs, each a training under another seed."""
+
+    name: str
+    changes: tuple[float, ...]  # of sigma from the passive pantograph at the same mean force, by run (%)
+    change: float  # interquartile mean of the changes (%)
+    interval: Interval | None  # 95 % interval of ``change``, for what runs draw
+    lost: Interval | None  # 95 % interval of the gain lost against the unchanged training (points)
+    worse: float | None  # share of pairs of runs in which the unchanged training gains more; None: it is that
+    qualified: float  # share of runs whose mean force stays within its range in every cell
+
+
+def variants(models: Mapping[tuple[str, int], Path], outcome: Benchmark) -> tuple[Variant, ...]:
+    """Variants, the unchanged training first."""
+    by_policy: dict[str, list[float]] = {}
+    disqualified = {cell.policy for cell in outcome.cells if cell.disqualified}
+    for cell in outcome.cells:
+        by_policy.setdefault(cell.policy, []).append(cell.change)
+    paths: dict[str, list[str]] = {}
+    for (name, _), path in models.items():
+        paths.setdefault(name, []).append(str(path))
+    changes = {name: np.array([np.mean(by_policy[path]) for path in own]) for name, own in paths.items()}
+    return tuple(
+        _variant(name, changes[name], changes[REFERENCE], [path in disqualified for path in own])
+        for name, own in paths.items()
+    )
+
+
+def _variant(name: str, changes: Array, base: Array, disqualified: Sequence[bool]) -> Variant:
+    is_base = name == REFERENCE
+    return Variant(
+        name=name,
+        changes=tuple(changes.tolist()),
+        change=interquartile_mean(changes),
+        interval=interval_of_mean(changes, Clusters.of_one_line(len(changes))),
+        lost=None if is_base else _difference(changes, base),
+        worse=None if is_base else float(np.mean(changes[:, None] > base)),
+        qualified=1.0 - float(np.mean(disqualified)),
+    )
+
+
+def _difference(changes: Array, base: Array) -> Interval:
+    """95 % bootstrap interval of the difference of two means, with the runs of each resampled."""
+    from scipy.stats import bootstrap
+
+    given: Any = {"vectorized": True, "method": "percentile", "rng": np.random.default_rng(0)}
+    found = bootstrap((changes, base), lambda a, b, axis: a.mean(axis=axis) - b.mean(axis=axis), **given)
+    low, high = found.confidence_interval
+    return float(low), float(high)
+
+
+def table(found: Sequence[Variant], title: str) -> Table:
+    """The variants as a table."""
+
+    def between(interval: Interval | None) -> str:
+        return "–" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
+
+    headings = ("variant", "runs", "Δσ (%)", "95 %", "loses", "worse in", "mean held")
+    rows = [
+        (
+            each.name,
+            str(len(each.changes)),
+            f"{each.change:.1f}",
+            between(each.interval),
+            between(each.lost),
+            "–" if each.worse is None else f"{100 * each.worse:.0f} %",
+            f"{100 * each.qualified:.0f} %",
+        )
+        for each in found
+    ]
+    return Table(title, headings, rows)

@@ -1,51 +1,56 @@
-"""``panto train``, ``panto export`` and ``panto evaluate``. Torch is imported only when they run."""
+"""The commands that train, evaluate and export. Torch is imported only when they run."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
+from rich import table as rich_table
 
-from panto_env.analysis.options import with_settings
-from panto_env.analysis.requirements import print_criteria
+from panto_env.analysis.options import print_criteria, with_settings
+from panto_env.base.errors import InputError, listed
 from panto_env.base.files import make_folder
-from panto_env.metrics.criterion import worst
-from panto_env.metrics.labels import LABELS
-from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.base.table import Table
+from panto_env.cluster import RayAddress
+from panto_env.metrics.compliance import worst
+from panto_env.metrics.figures import FIRST_SETTLED, LABELS
 from panto_env.terminal import (
     Json,
     Plot,
     console,
+    counting,
     number,
     print_json,
+    print_table,
     progress_console,
     this_command,
     writable,
     written_last,
 )
 
-from .packages import check_packages
-
 if TYPE_CHECKING:
     from .evaluation import Pair
 
-ROWS = (
-    "mean",
-    "std",
-    "max",
-    "min",
-    "cost_function",
-    "contact_loss",
-    "max_uplift",
-    "effort",
-    "effort_rate",
-)
+
+Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.")]
+
+
+def check_packages() -> None:
+    """Raise InputError, naming them, if packages that a training needs are not installed."""
+    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"Training needs {listed(missing)} not installed; install panto-env with its "
+            "extra: pip install 'panto-env[agents]'."
+        )
+
+
+ROWS = ["mean", "std", "max", "min", "cost_function", "contact_loss", "max_uplift", "effort", "effort_rate"]
 """Figures that `panto evaluate` prints."""
-SHOWN = (FIRST_SETTLED, FIRST_SETTLED + 1)
-"""Spans in the plot of `panto evaluate`."""
 REPORTED_FACTS = ("steps", "ratio", "qualified")
 """Facts of a model file that `panto train` prints."""
 
@@ -67,9 +72,8 @@ def train(
 ) -> None:
     """Train a model; the benchmark takes its file as a policy."""
     check_packages()
-    from .run_folder import RunFolder
     from .settings import load_training
-    from .trainings import run_name
+    from .trainings import RunFolder, run_name
 
     training = load_training(config, seed=seed, total_steps=steps, device=device)
     folder = output or Path("runs") / run_name(config, training)
@@ -87,18 +91,20 @@ def train(
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({folder}).")
         raise typer.Exit(130) from error
     report: dict[str, Any] = {"output": str(paths.path), "tensorboard": str(paths.tensorboard)}
-    for name, path in (("model", paths.model), ("best", paths.best)):
+    lines = []
+    for name, label in (("model", "final model"), ("best", "best at an evaluation")):
+        path = getattr(paths, name)
         facts, _ = read_model(path)
         report |= {name: str(path)} | {f"{name}_{key}": getattr(facts, key) for key in REPORTED_FACTS}
+        ratio = facts.ratio
+        change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
+        note = "" if facts.qualified else ", F_m out of range: disqualified"
+        lines.append(f"{label} (step {facts.steps}): {path}: {change}{note}")
     if json:
         print_json(report)
         return
-    for name, label in (("model", "final model"), ("best", "best at an evaluation")):
-        ratio, steps_learnt = report[f"{name}_ratio"], report[f"{name}_steps"]
-        change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
-        note = "" if report[f"{name}_qualified"] else ", F_m out of range: disqualified"
-        console.print(f"{label} (step {steps_learnt}): {report[name]}: {change}{note}", soft_wrap=True)
-    console.print(f"panto evaluate {report['best']}", soft_wrap=True)
+    for line in (*lines, f"panto evaluate {paths.best}"):
+        console.print(line, soft_wrap=True)
 
 
 def export(
@@ -133,13 +139,12 @@ def evaluate(
 
     Options that are left out are as in the model's training.
     """
-    from panto_baselines.benchmark.seeds import TEST, check_seeds
+    from panto_baselines.benchmark.settings import TEST, check_seeds
     from panto_env.analysis.pool import check_passes
     from panto_env.policies import find_policy, wishes
 
-    from .ensemble import Ensemble
     from .evaluation import Comparison, in_words, verdict
-    from .policy import TrainedPolicy
+    from .policy import Ensemble, TrainedPolicy
     from .settings import arguments, speeds
 
     driver = find_policy(policy)
@@ -159,7 +164,7 @@ def evaluate(
 
             runs = comparison.passes(driver, comparison.speeds_kmh[0], 0)
             title = f"{runs[0].pantograph} on {runs[0].catenary} at {runs[0].speed_kmh:g} km/h"
-            picture = plots.plot_forces(runs, (policy, "passive"), SHOWN, title)
+            picture = plots.plot_forces(runs, (policy, "passive"), (FIRST_SETTLED, FIRST_SETTLED + 1), title)
             later(plots.save, picture, plot)
         if json:
             ratio, qualified = verdict(pairs)
@@ -182,7 +187,7 @@ def evaluate(
 def _print_pairs(pairs: list[Pair]) -> None:
     """Print a table with a section for each speed: means over the seeds."""
     spans = " or ".join(sorted({pair.spans for pair in pairs} - {""})) or "none"
-    table = Table(title=f"spans {spans}")
+    table = rich_table.Table(title=f"spans {spans}")
     for heading in ("km/h", "figure", "policy", "passive", "change"):
         table.add_column(heading, justify="left" if heading == "figure" else "right")
     for speed in sorted({pair.speed_kmh for pair in pairs}):
@@ -191,20 +196,91 @@ def _print_pairs(pairs: list[Pair]) -> None:
         for key in ROWS:
             label = LABELS[key]
             policy, passive = (
-                label.scale * sum(getattr(figures, key) for figures in column) / len(pairs_here)
-                for column in ([pair.policy for pair in pairs_here], [pair.passive for pair in pairs_here])
+                label.scale * sum(getattr(getattr(pair, of), key) for pair in pairs_here) / len(pairs_here)
+                for of in ("policy", "passive")
             )
             change = f"{100 * (policy / passive - 1):+.1f} %" if passive > 0 and math.isfinite(policy) else ""
             first = f"{speed:g}" if key == ROWS[0] else ""
             table.add_row(first, label.heading, number(policy), number(passive), change)
-        ended_early = sum(pair.terminated for pair in pairs_here)
-        passive_too = sum(pair.passive_ending != "" for pair in pairs_here)
-        out_of_range = len(pairs_here) - sum(
-            pair.qualified or pair.terminated or pair.passive_ending != "" for pair in pairs_here
-        )
-        notes = [f"{ended_early} ended early"] * (ended_early > 0)
-        notes += [f"{passive_too} without a policy did"] * (passive_too > 0)
-        notes += [f"{out_of_range} with F_m out of range"] * (out_of_range > 0)
-        if notes:
+        whole = [pair for pair in pairs_here if not (pair.terminated or pair.passive_ending)]
+        counts = {
+            "ended early": sum(pair.terminated for pair in pairs_here),
+            "without a policy did": sum(pair.passive_ending != "" for pair in pairs_here),
+            "with F_m out of range": sum(not pair.qualified for pair in whole),
+        }
+        if notes := [f"{count} {words}" for words, count in counts.items() if count]:
             table.add_row("", f"of {len(pairs_here)} passes, " + ", ".join(notes), "", "", "")
     console.print(table)
+
+
+def trainings(
+    configs: Annotated[
+        list[Path], typer.Argument(help="Trainings: TOML files, or names such as ppo and sac.")
+    ],
+    seed: Annotated[
+        list[int] | None, typer.Option(help="Seed, instead of the files'; repeatable.", min=0)
+    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Environment steps, instead of the files'.")] = None,
+    output: Annotated[
+        Path, typer.Option(help="Folder in which each run has one, NAME-ALGORITHM-seedK.")
+    ] = Path("runs"),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue runs that have begun, and begin the others.")
+    ] = False,
+    workers: Workers = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Train several configurations under several seeds in parallel, each run as by `panto train`.
+
+    On a Ray cluster all machines must see the folder of the runs, and a run whose worker dies continues from
+    its newest checkpoint. On one machine, repeat the command with --resume.
+    """
+    check_packages()
+    from .trainings import plan, train_all
+
+    planned = plan(configs, seed or None, steps, output)
+    make_folder(output)  # now, and not in each worker
+    try:
+        with counting("trainings") as progress:
+            given: Any = {"resume": resume, "workers": workers, "ray": ray, "command": this_command()}
+            outcomes = train_all(planned, progress=progress, **given)
+    except KeyboardInterrupt as error:
+        progress_console.print(f"Stopped. To continue, repeat the command with --resume ({output}).")
+        raise typer.Exit(130) from error
+    if json:
+        print_json([asdict(each) for each in outcomes])
+        return
+    rows = []
+    for each in outcomes:
+        change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"
+        rows.append((each.best, str(each.best_steps), change, "" if each.qualified else "F_m out of range"))
+    headings = ("model file", "step", "σ to passive", "disqualified")
+    print_table(Table("best models", headings, tuple(rows)))
+
+
+def ablation(
+    config: Annotated[Path, typer.Argument(help="Ablation: a TOML file, or a name such as ablation.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the runs; runs/NAME by default. What is there is kept."),
+    ] = None,
+    workers: Workers = None,
+    ray: RayAddress = None,
+    json: Json = False,
+) -> None:
+    """Train an agent with and without each of its parts, under several seeds, and compare the models."""
+    check_packages()
+    from .ablation import load_ablation, run, table, variants
+
+    settings = load_ablation(config)
+    folder, command = output or Path("runs") / config.stem, this_command()
+    make_folder(folder)  # now, and not in each worker
+    with counting("trainings") as progress:
+        models, outcome = run(settings, folder, workers, ray, progress, command)
+    found = variants(models, outcome)
+    if json:
+        rows = [asdict(each) for each in found]
+        print_json({"settings": settings.model_dump(mode="json"), "variants": rows})
+        return
+    print_table(table(found, f"{settings.training}, {settings.total_steps:,} steps, {settings.judged_by}"))

@@ -11,8 +11,8 @@ import numpy as np
 
 from panto_baselines.benchmark.statistics import mean_range
 from panto_env import Trajectory, simulate
-from panto_env.metrics import spans
-from panto_env.metrics.criterion import Criterion
+from panto_env.metrics import figures as spans
+from panto_env.metrics.compliance import Criterion
 from panto_env.metrics.figures import Figures
 
 NOT_OF_A_PASS = ("speed_kmh", "reward", "cost", "distance", "spans", "run_in", "settle")
@@ -63,21 +63,14 @@ class Pair:
 
     def as_dict(self) -> dict[str, Any]:
         """The whole pair as plain data for JSON."""
-        return {
-            "speed_kmh": self.speed_kmh,
-            "seed": self.seed,
-            "spans": self.spans,
-            "std_change_percent": 100 * (self.ratio - 1),
-            "qualified": self.qualified,
-            "mean_range": self.mean_range,
-            "terminated": self.terminated,
-            "ending": self.ending,
-            "passive_ending": self.passive_ending,
-            "policy": self.policy.as_dict(),
-            "passive": self.passive.as_dict(),
-            "policy_compliance": [criterion.as_dict() for criterion in self.policy_compliance],
-            "passive_compliance": [criterion.as_dict() for criterion in self.passive_compliance],
-        }
+        table = {name: getattr(self, name) for name in ("speed_kmh", "seed", "spans")}
+        table |= {"std_change_percent": 100 * (self.ratio - 1)}
+        others = ("qualified", "mean_range", "terminated", "ending", "passive_ending")
+        table |= {name: getattr(self, name) for name in others}
+        table |= {name: getattr(self, name).as_dict() for name in ("policy", "passive")}
+        for name in ("policy_compliance", "passive_compliance"):
+            table[name] = [criterion.as_dict() for criterion in getattr(self, name)]
+        return table
 
 
 @dataclass
@@ -115,21 +108,17 @@ class Comparison:
 
 def pair(active: Trajectory, passive: Trajectory) -> Pair:
     """Pair of two passes, with their figures over the spans after the start."""
-
-    def figures(run: Trajectory) -> Figures:
-        return Figures.none() if run.terminated else run.summary()
-
-    def compliance(run: Trajectory) -> tuple[Criterion, ...]:
-        return () if run.terminated else tuple(run.compliance())
-
+    runs = active, passive
+    figures = [Figures.none() if run.terminated else run.summary() for run in runs]
+    compliance: list[Any] = [() if run.terminated else tuple(run.compliance()) for run in runs]
     return Pair(
         speed_kmh=round(active.speed_kmh, 6),  # converted to m/s and back
         seed=active.seed,
-        spans=next((spans.in_words(run.spans()) for run in (active, passive) if not run.terminated), ""),
-        policy=figures(active),
-        passive=figures(passive),
-        policy_compliance=compliance(active),
-        passive_compliance=compliance(passive),
+        spans=next((spans.in_words(run.spans()) for run in runs if not run.terminated), ""),
+        policy=figures[0],
+        passive=figures[1],
+        policy_compliance=compliance[0],
+        passive_compliance=compliance[1],
         nominal_force=active.nominal_force,
         ending=active.ending,
         passive_ending=passive.ending,

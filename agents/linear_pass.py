@@ -70,28 +70,21 @@ def columns_of(layout: Layout) -> Columns:
         )
     ending = DEVIATION if layout.kind == DEVIATIONS else ""
     readings = [name + ending for name, *_ in READING_ENTRIES]
-    place = actions[0].split()[1]
-
-    def at(name: str, ago: int) -> int:
-        return layout.index(earlier(name, ago) if ago else name)
-
     spans = range(1, layout.memory_spans + 1) if layout.memory else ()
 
     def remembered(kind: str) -> NDArray[np.int64]:
-        each = [
-            [
-                layout.index(f"remembered {kind}, {span} span{'s' if span > 1 else ''} ago, {time:g} s ahead")
-                for time in layout.memory
-            ]
-            for span in spans
-        ]
+        begin = [f"remembered {kind}, {span} span{'s' if span > 1 else ''} ago" for span in spans]
+        each = [[layout.index(f"{words}, {time:g} s ahead") for time in layout.memory] for words in begin]
         return np.array(each, dtype=np.int64).reshape(len(spans), len(layout.memory))
 
-    depth = range(layout.history + 1)
+    now = [
+        [layout.index(earlier(name, ago) if ago else name) for name in (*readings, *actions)]
+        for ago in range(layout.history + 1)
+    ]
     return Columns(
-        np.array([[at(name, ago) for name in (*readings, *actions)] for ago in depth]),
+        np.array(now),
         remembered("force" + ending),
-        remembered(f"{place} action"),
+        remembered(f"{actions[0].split()[1]} action"),
         readings.index("contact force" + ending),
         layout.kind == DEVIATIONS,
     )

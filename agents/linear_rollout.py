@@ -1,26 +1,65 @@
-"""A policy's network in many linear passes at once, with derivatives through whole passes for torch."""
+"""The network of the analytic policy gradient, in torch."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 
-from panto_baselines.policies.washout import WashoutSettings
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.backend import WIDTH
 from panto_env.base.machine import cores
 from panto_env.control.entries import AVERAGED
 
 from .linear_pass import Columns, LinearPass
-from .network import Network
-from .rollout_arrays import Entries, Given, Slopes, Trace, Washout, Weights
-from .rollout_backward import backward
-from .rollout_forward import forward
+from .model_file import Cell
+from .rollout import Entries, Given, Slopes, Trace, Washout, Weights, backward, forward
+
+FIRST = 0.01
+"""Factor on the last layer's initial weights: the first passes are nearly passive."""
+
+
+class Network(nn.Module):  # type: ignore[misc]
+    """Layers, with a gated recurrent unit after the first one if it has any units: as ``RecurrentActor``."""
+
+    def __init__(self, entries: int, widths: tuple[int, ...], activation: Any, units: int) -> None:
+        """entries: of an observation; widths: of the hidden layers; units: of the cell, 0 for none."""
+        super().__init__()
+        self.activation = activation()
+        self.first = nn.Linear(entries, widths[0])
+        self.cell = nn.GRUCell(widths[0], units) if units else None
+        sizes = (widths[0] + units, *widths[1:], 1)
+        self.rest = nn.ModuleList(nn.Linear(wide, narrow) for wide, narrow in pairwise(sizes))
+        with torch.no_grad():
+            self.rest[-1].weight *= FIRST
+            self.rest[-1].bias.zero_()
+
+    def weights(self) -> Weights:
+        """Its parameters, in their order, for the kernels of a rollout."""
+        first, first_bias, *others = (each.detach().numpy() for each in self.parameters())
+        cell = [np.zeros((0, len(first)), np.float32), np.zeros((0, 0), np.float32)]
+        biases = [np.zeros(0, np.float32)] * 2
+        if self.cell is not None:
+            *cell, biases[0], biases[1] = others[:4]
+            others = others[4:]
+        relu = isinstance(self.activation, nn.ReLU)
+        rest = tuple(others[::2]), tuple(others[1::2])
+        return Weights(first, first_bias, cell[0], biases[0], cell[1], biases[1], *rest, relu)
+
+    def arrays(self) -> Cell | None:
+        """The cell's arrays, if it has one."""
+        if self.cell is None:
+            return None
+        own = self.cell.weight_ih, self.cell.weight_hh, self.cell.bias_ih, self.cell.bias_hh
+        return Cell(*(each.detach().numpy().copy() for each in own))
+
 
 Numbers = NDArray[np.float32]
 
@@ -58,24 +97,15 @@ class Group(NamedTuple):
 
 def grouped(passes: Sequence[LinearPass]) -> list[Group]:
     """Passes in groups of similar lengths; one with fewer than ``WIDTH`` is filled with its first pass."""
-    ordered = sorted(passes, key=lambda each: len(each.actions))
-    return [_group(ordered[first : first + WIDTH]) for first in range(0, len(ordered), WIDTH)]
-
-
-def _group(passes: Sequence[LinearPass]) -> Group:
-    judged = [
-        Judged(each.force, each.counted_from, len(each.actions), each.passive_mean, each.passive_variance)
-        for each in passes
-    ]
-    return Group(_given([*passes, *[passes[0]] * (WIDTH - len(passes))]), judged)
-
-
-class Driven(NamedTuple):
-    """Passes as a network drives them, with derivatives by its parameters."""
-
-    ratios: torch.Tensor  # (passes,): variance of the force, where it counts, over the passive one
-    shifts: torch.Tensor  # (passes,): of the mean force, relative to the passive one
-    actions: list[torch.Tensor]  # of each pass, (times,)
+    ordered, groups = sorted(passes, key=lambda each: len(each.actions)), []
+    for first in range(0, len(ordered), WIDTH):
+        some = ordered[first : first + WIDTH]
+        judged = [
+            Judged(each.force, each.counted_from, len(each.actions), each.passive_mean, each.passive_variance)
+            for each in some
+        ]
+        groups.append(Group(_given([*some, *[some[0]] * (WIDTH - len(some))]), judged))
+    return groups
 
 
 class Rollout:
@@ -83,11 +113,26 @@ class Rollout:
 
     def __init__(self, groups: Sequence[Group], terms: Terms) -> None:
         """terms: of all passes."""
-        self._groups, self._entries, self._washout = groups, _entries(terms), _washout(terms)
-        self._given = [each.given for each in groups]
+        columns, settings = terms.columns, terms.washout
+        average = np.zeros(columns.now.shape[1], dtype=np.float32)
+        if columns.deviate:
+            average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
+        self._groups, self._given = groups, [each.given for each in groups]
+        self._entries = Entries(
+            columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average
+        )
+        self._washout = Washout(0.0, 1.0, 0.0, terms.interval)
+        if settings is not None:
+            share = 1.0 - math.exp(-terms.interval / settings.time_constant)
+            rate = settings.rate / terms.limit
+            self._washout = Washout(share, rate, float(settings.lag), terms.interval)
 
-    def __call__(self, network: Network) -> Driven:
-        """What the network makes of the passes."""
+    def __call__(self, network: Network) -> tuple[torch.Tensor, torch.Tensor, list[torch.Tensor]]:
+        """What the network makes of the passes, with derivatives by its parameters.
+
+        Variance of the force, where it counts, over the passive one, (passes,); shift of the mean force,
+        relative to the passive one, (passes,); actions of each pass, (times,).
+        """
         driven = _Driving.apply(self, network, *network.parameters())  # force and actions of each group
         ratios, shifts, taken = [], [], []
         for number, group in enumerate(self._groups):
@@ -98,16 +143,20 @@ class Rollout:
                 ratios.append(force.var(correction=0) / own.passive_variance)
                 shifts.append(force.mean() / own.passive_mean - 1.0)
                 taken.append(actions[: own.end, p])
-        return Driven(torch.stack(ratios), torch.stack(shifts), taken)
+        return torch.stack(ratios), torch.stack(shifts), taken
 
     def forward(self, weights: Weights) -> list[Trace]:
         """Drive all groups."""
 
         def drive(given: Given) -> Trace:
-            trace = _trace(given, self._entries, weights)
+            times, seen, _ = given.observations.shape
             units, values = weights.state.shape[1], len(self._entries.average)
-            sums, averages, actuator = _zeros((2, 3 * units), (values,), (2,))
-            forward(given, self._entries, weights, self._washout, trace, sums, averages, actuator)
+            widths = (values + 1,), (values,), (seen,), (units + len(weights.first),), (4 * units,)
+            rest = _zeros(*((times, len(each)) for each in weights.rest))
+            scalars = _zeros((times,), (times,), (times,))
+            trace = Trace(*[*_zeros(*((times, *each) for each in widths)), rest, *scalars])
+            work = _zeros((2, 3 * units), (values,), (2,))
+            forward(given, self._entries, weights, self._washout, trace, *work)
             return trace
 
         return _side_by_side(drive, self._given)
@@ -118,11 +167,8 @@ class Rollout:
         """Derivatives by each array of the weights, from those by force and action, (times, WIDTH)."""
 
         def differentiate(given: Given, trace: Trace, force: Numbers, action: Numbers) -> list[Numbers]:
-            first, cell, state = (
-                np.zeros((len(action), len(each), WIDTH), np.float32)
-                for each in (weights.first, weights.cell, weights.state)
-            )
-            layers = Slopes(first, cell, state, tuple(np.zeros_like(each) for each in trace.rest))
+            shapes = ((len(action), len(each)) for each in (weights.first, weights.cell, weights.state))
+            layers = Slopes(*[*_zeros(*shapes), tuple(np.zeros_like(each) for each in trace.rest)])
             units, values = weights.state.shape[1], len(self._entries.average)
             work = _zeros((weights.first.shape[1],), (trace.joined.shape[1],), (units,), (values,), (2,))
             rest = self._entries, weights, self._washout, trace, force, action, layers
@@ -156,7 +202,7 @@ def _side_by_side(work: Any, *groups: Any) -> list[Any]:
         return list(pool.map(work, *groups))
 
 
-def _zeros(*shapes: tuple[int, ...]) -> tuple[Numbers, ...]:
+def _zeros(*shapes: tuple[int, ...]) -> Any:
     return tuple(np.zeros((*shape, WIDTH), dtype=np.float32) for shape in shapes)
 
 
@@ -183,59 +229,15 @@ def _given(group: list[LinearPass]) -> Given:
     )
 
 
-def _entries(terms: Terms) -> Entries:
-    columns = terms.columns
-    average = np.zeros(columns.now.shape[1], dtype=np.float32)
-    if columns.deviate:
-        average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
-    return Entries(columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average)
-
-
-def _washout(terms: Terms) -> Washout:
-    settings = terms.washout
-    if settings is None:
-        return Washout(0.0, 1.0, 0.0, terms.interval)
-    share = 1.0 - math.exp(-terms.interval / settings.time_constant)
-    return Washout(share, settings.rate / terms.limit, float(settings.lag), terms.interval)
-
-
-def _trace(given: Given, entries: Entries, weights: Weights) -> Trace:
-    """Room for a forward pass."""
-    times, seen, _ = given.observations.shape
-    units, values = weights.state.shape[1], len(entries.average)
-
-    def room(*rows: int) -> Numbers:
-        return np.zeros((times, *rows, WIDTH), dtype=np.float32)
-
-    return Trace(
-        room(values + 1),
-        room(values),
-        room(seen),
-        room(units + len(weights.first)),
-        room(4 * units),
-        tuple(room(len(each)) for each in weights.rest),
-        room(),
-        room(),
-        room(),
-    )
-
-
 def _by_weights(trace: Trace, slopes: Slopes, units: int) -> list[Numbers]:
     """Derivatives by weights and biases, in the order of a network's parameters."""
     state = np.concatenate([np.zeros_like(trace.joined[:1, :units]), trace.joined[:-1, :units]])
-    first = trace.joined[:, units:]
-    layers = [(slopes.first, trace.entries)]
-    inputs = [trace.joined, *trace.rest[:-1]]
-    found: list[Numbers] = []
-
-    def add(pairs: Any) -> None:
-        for slope, values in pairs:
-            found.append(np.tensordot(slope, values, axes=((0, 2), (0, 2))))
-        found.extend(slope.sum(axis=(0, 2)) for slope, _ in pairs)
-
-    add(layers)
+    layers = [[(slopes.first, trace.entries)]]
     if units:
-        add([(slopes.cell, first), (slopes.state, state)])
-    for pair in zip(slopes.rest, inputs, strict=True):
-        add([pair])
+        layers.append([(slopes.cell, trace.joined[:, units:]), (slopes.state, state)])
+    layers += [[pair] for pair in zip(slopes.rest, [trace.joined, *trace.rest[:-1]], strict=True)]
+    found: list[Numbers] = []
+    for pairs in layers:
+        found += [np.tensordot(slope, values, axes=((0, 2), (0, 2))) for slope, values in pairs]
+        found += [slope.sum(axis=(0, 2)) for slope, _ in pairs]
     return found

@@ -1,33 +1,117 @@
 """The model file: arrays and a table of facts, as safetensors, so that no code runs from it.
 
-The table holds the facts below. The arrays under ``actor/`` are the deterministic policy, which runs without
-torch. The arrays under ``learner/`` and ``replay/`` let a training resume (``learner.py``).
+The arrays under ``actor/`` are the deterministic policy, which runs without torch. Those under ``learner/``
+and ``replay/`` let a training resume.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError, field_validator
 
-from panto_baselines.policies.washout import WashoutSettings
-from panto_env.base.array_file import read_arrays, write_arrays
+from panto_baselines.policies.repetitive import WashoutSettings
+from panto_env.base.checksums import __version__, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.settings import Positive, Settings
-from panto_env.base.version import __version__
-from panto_env.control.context import Context
 from panto_env.control.entries import READING_ENTRIES, present
+from panto_env.control.observation import Context
 
-from .actor import Actor
-from .learner import Arrays, learn_again, learnt
-from .recurrent_actor import Cell, RecurrentActor
-
+Weights = NDArray[np.float32]
+Arrays = dict[str, NDArray[Any]]
 CELL = "actor/cell_"
 """How the names of a recurrent cell's arrays begin."""
-DRIVEN = ((0,), (1,), (0, 1))
-"""Actuators that the actions of a policy can drive: frame, head, or both."""
+REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+"""Arrays of a replay buffer."""
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Deterministic policy: a multilayer perceptron from an observation to an action.
+
+    It is a policy (``panto_env.policies.Policy``) for every context of the right shape.
+    """
+
+    weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)
+    biases: tuple[Weights, ...]  # of each layer, (outputs,)
+    activation: Literal["tanh", "relu"]  # of the hidden layers
+    squashed: bool = False  # whether the last layer goes through tanh; otherwise it is clipped
+
+    def squash(self) -> Actor:
+        """A copy of this actor with tanh after its last layer."""
+        return replace(self, squashed=True)
+
+    def reset(self, context: Context) -> None:
+        """Do nothing: the actor has no memory."""
+
+    def after_first(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the second layer sees of the values of the first."""
+        return values
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        values = observation
+        last = len(self.weights) - 1
+        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            values = weight @ values + bias
+            if k < last:
+                values = np.tanh(values) if self.activation == "tanh" else np.maximum(values, 0)
+            if k == 0:
+                values = self.after_first(values)
+        if self.squashed:
+            values = np.tanh(values)
+        return np.clip(values, -1.0, 1.0).astype(np.float64)
+
+
+class Cell(NamedTuple):
+    """A gated recurrent unit, with its gates in torch's order: reset, update, new."""
+
+    weight_input: Weights  # (3 units, inputs)
+    weight_state: Weights  # (3 units, units)
+    bias_input: Weights  # (3 units,)
+    bias_state: Weights  # (3 units,)
+
+    def check(self, inputs: int) -> None:
+        """Raise ValueError unless its arrays hold finite numbers and fit each other and the inputs."""
+        gates = 3 * self.weight_state.shape[1] if self.weight_state.ndim == 2 else -1
+        shapes = ((gates, inputs), (gates, gates // 3), (gates,), (gates,))
+        if tuple(each.shape for each in self) != shapes:
+            raise ValueError("the cell of its network does not fit the layer before it")
+        if not all(map(_finite, self)):
+            raise ValueError("the cell of its network holds values that are not finite numbers")
+
+    def following(self, values: NDArray[np.float32], state: NDArray[np.float32]) -> NDArray[np.float32]:
+        """State after the present one (Cho et al., EMNLP 2014, as torch has it)."""
+        given = np.split(self.weight_input @ values + self.bias_input, 3)
+        kept = np.split(self.weight_state @ state + self.bias_state, 3)
+        reset, update = (1 / (1 + np.exp(-(given[k] + kept[k]))) for k in (0, 1))
+        new = np.tanh(given[2] + reset * kept[2])
+        following: NDArray[np.float32] = (1 - update) * new + update * state
+        return following
+
+
+@dataclass(frozen=True)
+class RecurrentActor(Actor):
+    """An ``Actor`` with a recurrent cell after its first layer; the next layer sees both.
+
+    Its state is that of one episode: every policy has an actor of its own.
+    """
+
+    cell: Cell = field(kw_only=True)
+    _state: list[NDArray[np.float32]] = field(default_factory=list, compare=False, repr=False)
+
+    def reset(self, context: Context) -> None:
+        """Forget the episode before."""
+        self._state[:] = [np.zeros(self.cell.weight_state.shape[1], dtype=np.float32)]
+
+    def after_first(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The cell's state, then the values of the first layer."""
+        self._state[0] = self.cell.following(values, self._state[0])
+        return np.concatenate([self._state[0], values])
 
 
 class Needs(Settings):
@@ -45,14 +129,12 @@ class Needs(Settings):
     channels: tuple[int, ...]  # actuator that each action drives: 0 frame, 1 head
     force_limit: float  # N
     control_interval: float  # s
-    washout: float = (
-        0.0  # time constant (s) of what the environment subtracts from the actions, 0 for nothing
-    )
+    washout: float = 0.0  # time constant (s) of what the environment subtracts from the actions; 0: nothing
 
     @field_validator("channels")
     @classmethod
     def _driven(cls, channels: tuple[int, ...]) -> tuple[int, ...]:
-        if channels not in DRIVEN:
+        if channels not in ((0,), (1,), (0, 1)):
             raise ValueError("no actuator drives that")
         return channels
 
@@ -61,28 +143,18 @@ class Needs(Settings):
         """Observation and actuator of an episode."""
         layout = context.layout
         # Normalised readings use each line's own centre and slope, which the policy is meant to see.
-        names = (
-            (*(name for name, _, _ in READING_ENTRIES), "remembered force", "speed")
-            if layout.normalise
-            else ()
-        )
+        names = (*(name for name, _, _ in READING_ENTRIES), "remembered force", "speed")
+        hidden = names if layout.normalise else ()
+        fields = ("harmonics", "history", "front", "memory", "memory_spans", "line_values", "normalise")
+        of_context = ("channels", "force_limit", "control_interval", "washout")
         return cls(
             observation=layout.kind,
-            harmonics=layout.harmonics,
-            history=layout.history,
-            front=layout.front,
-            memory=layout.memory,
-            memory_spans=layout.memory_spans,
-            line_values=layout.line_values,
-            normalise=layout.normalise,
             entries=tuple(
-                (entry.name, 0.0, 1.0) if present(entry) in names else (entry.name, entry.centre, entry.scale)
-                for entry in layout.entries
+                (each.name, 0.0, 1.0) if present(each) in hidden else (each.name, each.centre, each.scale)
+                for each in layout.entries
             ),
-            channels=context.channels,
-            force_limit=context.force_limit,
-            control_interval=context.control_interval,
-            washout=context.washout,
+            **{name: getattr(layout, name) for name in fields},
+            **{name: getattr(context, name) for name in of_context},
         )
 
 
@@ -94,13 +166,6 @@ class Step(Settings):
     bound: Positive | None = None  # maximum magnitude, to which that is clipped
     frames: Annotated[int, Field(ge=1)] = 1  # that are stacked
     padding: tuple[float, ...] | None = None  # frame before the first one; None: that one, repeated
-
-    def width(self, entries: int) -> int:
-        """Number of values after it. Raises ValueError where it takes another number."""
-        own = (self.centre, self.scale) if self.centre else (self.padding,)
-        if any(each is not None and len(each) != entries for each in own):
-            raise ValueError("the steps from its observation to its network do not fit each other")
-        return entries * self.frames
 
 
 class Facts(Settings):
@@ -131,16 +196,33 @@ class Facts(Settings):
         """Number of the network's inputs. Raises ValueError where the steps do not fit each other."""
         width = len(self.needs.entries)
         for step in self.steps_before:
-            width = step.width(width)
+            given = (step.centre, step.scale) if step.centre else (step.padding,)
+            if any(each is not None and len(each) != width for each in given):
+                raise ValueError("the steps from its observation to its network do not fit each other")
+            width *= step.frames
         return width
 
 
 def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool = False) -> None:
     """Write a model file, whole or not at all. replay: include the replay buffer.
 
-    Raises InputError if it can't be written.
+    Settings of optimisers are not included: a new learner gets them from the training. Raises InputError if
+    it can't be written.
     """
-    _write(path, facts, layers(actor) | learnt(model, replay))
+    tensors = {name: getattr(model, name) for name in model._get_torch_save_params()[1]}
+    for name, state in model.get_parameters().items():
+        if "param_groups" in state:  # of an optimiser
+            for k, moments in state["state"].items():
+                tensors |= {f"{name}/{k}/{key}": value for key, value in moments.items()}
+        else:
+            tensors |= {f"{name}/{key}": value for key, value in state.items()}
+    arrays = {f"learner/{name}": tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
+    if replay:
+        buffer = model.replay_buffer
+        filled = buffer.buffer_size if buffer.full else buffer.pos
+        arrays |= {f"replay/{name}": getattr(buffer, name)[:filled] for name in REPLAY}
+        arrays["replay/position"] = np.array([buffer.pos, buffer.full])
+    write_arrays(path, facts.model_dump(mode="json"), _layers(actor) | arrays)
 
 
 def export_model(source: Path, target: Path) -> None:
@@ -153,7 +235,7 @@ def export_model(source: Path, target: Path) -> None:
 
 def write_policy(path: Path, facts: Facts, actor: Actor) -> None:
     """Write a model file without the state for further training. Raises InputError if it can't be written."""
-    _write(path, facts, layers(actor))
+    write_arrays(path, facts.model_dump(mode="json"), _layers(actor))
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:
@@ -172,7 +254,7 @@ def restore(path: Path, model: Any) -> Facts:
     """
     facts, _, arrays = _read(path)
     try:
-        learn_again(model, arrays)
+        _learn_again(model, arrays)
     except (LookupError, RuntimeError, TypeError, ValueError) as error:
         reason = str(error).partition("\n")[0].rstrip(".")
         raise InputError(f"{path} does not fit the training's settings: {reason}.") from error
@@ -180,8 +262,31 @@ def restore(path: Path, model: Any) -> Facts:
     return facts
 
 
-def _write(path: Path, facts: Facts, arrays: Arrays) -> None:
-    write_arrays(path, facts.model_dump(mode="json"), arrays)
+def _learn_again(model: Any, arrays: Arrays) -> None:
+    import torch
+
+    begin = "learner/"
+    learner = {name: array for name, array in arrays.items() if name.startswith(begin)}
+    tensors = {name.removeprefix(begin): torch.from_numpy(array) for name, array in learner.items()}
+    parameters = model.get_parameters()
+    for name, state in parameters.items():
+        if "param_groups" in state:  # of an optimiser
+            moments: dict[int, dict[str, Any]] = {}
+            state["state"] = moments
+            for path in (each for each in tensors if each.startswith(f"{name}/")):
+                _, k, key = path.split("/")
+                moments.setdefault(int(k), {})[key] = tensors[path]
+        else:
+            state.update({key: tensors[f"{name}/{key}"] for key in state})
+    model.set_parameters(parameters)
+    for name in model._get_torch_save_params()[1]:  # outside networks, such as SAC's coefficient of entropy
+        getattr(model, name).data = tensors[name]
+    if "replay/position" in arrays:
+        buffer = model.replay_buffer
+        for name in REPLAY:
+            getattr(buffer, name)[: len(arrays[f"replay/{name}"])] = arrays[f"replay/{name}"]
+        position, full = arrays["replay/position"]
+        buffer.pos, buffer.full = int(position), bool(full)
 
 
 def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
@@ -199,37 +304,42 @@ def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
         ) from error
 
 
-def layers(actor: Actor) -> Arrays:
+def _layers(actor: Actor) -> Arrays:
     """Weights and biases of a policy's network, with their names in a model file."""
-    weights = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
-    own = weights | {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
+    layers: Arrays = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
+    layers |= {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
     if isinstance(actor, RecurrentActor):
-        own |= {f"{CELL}{name}": array for name, array in actor.cell._asdict().items()}
-    return own
+        layers |= {f"{CELL}{name}": array for name, array in actor.cell._asdict().items()}
+    return layers
 
 
 def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     """The policy's network. Raises ValueError unless its layers fit each other and what the facts say."""
-    own = {name: array for name, array in arrays.items() if name.startswith("actor/")}
-    parts = {name.removeprefix(CELL): own.pop(name) for name in list(own) if name.startswith(CELL)}
+    layers = {name: array for name, array in arrays.items() if name.startswith("actor/")}
+    parts = {name.removeprefix(CELL): layers.pop(name) for name in list(layers) if name.startswith(CELL)}
     if parts and set(parts) != set(Cell._fields):
         raise ValueError("its network has only a part of a cell")
     cell = Cell(**parts) if parts else None
-    count, width = len(own) // 2, facts.inputs
-    if not count or set(own) != {f"actor/{kind}_{k}" for k in range(count) for kind in ("weight", "bias")}:
+    count, width = len(layers) // 2, facts.inputs
+    names = [[f"actor/{kind}_{k}" for k in range(count)] for kind in ("weight", "bias")]
+    if not count or set(layers) != {*names[0], *names[1]}:
         raise ValueError("its network has no layers, or not a weight and a bias in each")
-    weights, biases = (tuple(own[f"actor/{kind}_{k}"] for k in range(count)) for kind in ("weight", "bias"))
+    weights, biases = (tuple(layers[name] for name in each) for each in names)
     for k, (weight, bias) in enumerate(zip(weights, biases, strict=True), start=1):
-        if not all(each.dtype.kind == "f" and np.isfinite(each).all() for each in (weight, bias)):
+        if not (_finite(weight) and _finite(bias)):
             raise ValueError(f"layer {k} of its network holds values that are not finite numbers")
         if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
             raise ValueError(f"layer {k} of its network does not fit the one before, or what it observes")
         width = len(bias)
         if k == 1 and cell is not None:
             cell.check(width)
-            width += cell.units
+            width += cell.weight_state.shape[1]
     if width != len(facts.needs.channels):
         raise ValueError("its network differs in shape from its facts")
     if cell is not None:
         return RecurrentActor(weights, biases, facts.activation, facts.squashed, cell=cell)
     return Actor(weights, biases, facts.activation, facts.squashed)
+
+
+def _finite(array: NDArray[Any]) -> bool:
+    return array.dtype.kind == "f" and bool(np.isfinite(array).all())

@@ -1,28 +1,65 @@
-"""A trained model as a policy of the benchmark."""
+"""A base policy and an agent that adds to its action, as one policy."""
 
 from __future__ import annotations
 
-from contextvars import ContextVar
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.control.context import Context
-from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
+from panto_env.base.errors import InputError, shown
+from panto_env.control.observation import OBSERVATION_SETTINGS, Context
 from panto_env.policies import Policy, check_named, find_policy
 
-from .actor import Actor
-from .model_file import Facts, Needs, Step, read_model
-from .residual_policy import Residual
-from .washout_policy import WashedOut
+from .model_file import Actor, Facts, Needs, Step, read_model
 
+SETTINGS = (*OBSERVATION_SETTINGS, "washout")
+"""Settings of a task that a policy asks for."""
 PLACES = {(0,): "frame", (1,): "head", (0, 1): "both"}
 """Place of the actuator, by the actuators that the actions drive."""
-_loading: ContextVar[tuple[Path, ...]] = ContextVar("_loading", default=())
-"""Model files that are being loaded, each as the base of the one before."""
+
+
+def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float) -> NDArray[np.float64]:
+    """Base policy's action plus a share of an agent's; all of them, the sum too, in -1..1."""
+    return np.clip(base + share * action.astype(np.float64), -1.0, 1.0)
+
+
+class Residual:
+    """A policy whose action is a base policy's plus a share of an agent's."""
+
+    def __init__(self, base: Policy, agent: Policy, share: float) -> None:
+        """share: part of the actuator's force limit that the agent may add."""
+        self._base, self._agent, self._share = base, agent, share
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._base.reset(context)
+        self._agent.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        base = np.clip(np.asarray(self._base.act(observation.copy()), dtype=np.float64), -1.0, 1.0)
+        return added(base, self._agent.act(observation), self._share)
+
+
+class WashedOut:
+    """A network as a policy; the slow average is subtracted from its action."""
+
+    def __init__(self, actor: Actor, settings: WashoutSettings) -> None:
+        self._actor, self._settings = actor, settings
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._actor.reset(context)
+        self._limit = context.force_limit
+        self._washout = Washout(self._settings, context.control_interval, self._limit, (context.actions,))
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        action: NDArray[np.float64] = self._washout(self._actor.act(observation) * self._limit) / self._limit
+        return action
 
 
 class TrainedPolicy:
@@ -34,9 +71,8 @@ class TrainedPolicy:
             check_named(facts.residual_of, path)
         self.path, self.facts = path, facts
         self._policy = policy_of(actor, facts)
-        needs = facts.needs
-        for name in (*OBSERVATION_SETTINGS, "washout"):
-            setattr(self, name, getattr(needs, name))
+        for name in SETTINGS:
+            setattr(self, name, getattr(facts.needs, name))
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""
@@ -92,22 +128,12 @@ def policy_of(actor: Actor, facts: Facts) -> Policy:
 
 def load(path: str | Path) -> TrainedPolicy:
     """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
-    file = Path(path)
-    outer, own = _loading.get(), file.resolve()
-    if own in outer:
-        raise InputError(
-            f"The model file {path} is, through its base policies, added to itself; take another model file."
-        )
-    token = _loading.set((*outer, own))
-    try:
-        return TrainedPolicy(file, *read_model(file))
-    finally:
-        _loading.reset(token)
+    return TrainedPolicy(Path(path), *read_model(Path(path)))
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
     """First property that differs, and what to do about it; "" if none differs."""
-    for name in (*OBSERVATION_SETTINGS, "washout"):
+    for name in SETTINGS:
         needed, here = getattr(needs, name), getattr(offered, name)
         if needed != here:
             return f"it was trained with {name}={shown(needed)}, this task has {shown(here)}; set it to match"
@@ -127,12 +153,34 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
             f"it was trained with a control_interval of {needs.control_interval:g} s, this task has "
             f"{offered.control_interval:g} s; set control_interval to {needs.control_interval:g}"
         )
+    counted = [
+        f"{len(each.entries)}: " + ", ".join(f"{name} / {scale:g}" for name, _, scale in each.entries)
+        for each in (needs, offered)
+    ]
     return (
-        f"it was trained with other observations ({len(needs.entries)}: {_entries(needs)}) than this "
-        f"task has ({len(offered.entries)}: {_entries(offered)}); use the pantograph of its training "
-        "or train another model"
+        f"it was trained with other observations ({counted[0]}) than this task has ({counted[1]}); use the "
+        "pantograph of its training or train another model"
     )
 
 
-def _entries(needs: Needs) -> str:
-    return ", ".join(f"{name} / {scale:g}" for name, _, scale in needs.entries)
+class Ensemble:
+    """Mean action of trained policies that need the same task, so that their errors cancel in part."""
+
+    def __init__(self, members: Sequence[TrainedPolicy]) -> None:
+        """Raises ValueError unless all of them have the same needs."""
+        self.facts = members[0].facts  # of the first: needs are those of all
+        if any(member.facts.needs != self.facts.needs for member in members):
+            raise ValueError("the members of an ensemble must need the same task")
+        self._members = members
+        for name in SETTINGS:
+            setattr(self, name, getattr(self.facts.needs, name))
+
+    def reset(self, context: Context) -> None:
+        """Begin an episode. Raises InputError as each of them does."""
+        for member in self._members:
+            member.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Mean of their actions, (actions,), each in -1..1, for an observation, (entries,)."""
+        mean: NDArray[np.float64] = np.mean([member.act(observation) for member in self._members], axis=0)
+        return mean

@@ -8,36 +8,28 @@ from typing import Annotated, Any
 
 from pydantic import Field, SerializeAsAny
 
-from panto_baselines.policies.washout import WashoutSettings
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_configs import find
-from panto_env.base.errors import InputError
+from panto_env.base.arrays import to_kmh
+from panto_env.base.errors import InputError, shown, suggest
 from panto_env.base.files import read_toml
-from panto_env.base.names import suggest
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.base.shown import shown
-from panto_env.base.units import to_kmh
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
 from panto_env.policies import check_named, find_fitting_policy
 
-from .algorithm import Algorithm
-from .apg import APG
-from .cloning_settings import Cloning
-from .ppo import PPO
-from .ranges import Count, Share
-from .sac import SAC
+from .algorithm import APG, PPO, SAC, Algorithm, Cloning, Count, Share
 
 ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC, "apg": APG}
 
 
 MOST_LANES = 65_536
 """Maximum number of lanes; each has its own line in memory."""
-
-
 LARGEST_SEED = 1_000_000_000
 """Maximum seed that the libraries' random generators accept, rounded down."""
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)]
 
 
 class Evaluation(Settings):
@@ -54,9 +46,7 @@ class Training(Settings):
     """Everything that defines a training."""
 
     algorithm: str = Field(description="one of ALGORITHMS")
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = Field(
-        0, description="seed of all random numbers"
-    )
+    seed: Seed = Field(0, description="seed of all random numbers")
     total_steps: Count = Field(description="environment steps, summed over all lanes")
     lanes: Annotated[int, Field(gt=0, le=MOST_LANES, strict=True)] = Field(
         8, description="number of environments stepped together"
@@ -151,7 +141,7 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
                 f"unknown algorithm {shown(algorithm)}: {suggest(shown(algorithm), list(ALGORITHMS))}"
             )
         algorithm_type = ALGORITHMS[algorithm]
-        known: dict[str, type[Settings]] = {
+        known: dict[str, Any] = {
             "hyperparameters": algorithm_type,
             "evaluation": Evaluation,
             "cloning": Cloning,
@@ -162,46 +152,34 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training)
-        _check_device(training)
-        _check_environment(training)
-        _check_policies(training)
+        _check(training)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removesuffix('.')}.") from error
     return training
 
 
-def _check_device(training: Training) -> None:
-    """Raise InputError for what a training on a device cannot do."""
-    if training.device is None:
-        return
-    if training.algorithm != "ppo":
-        raise InputError(f"on a device only ppo learns, not {training.algorithm}; leave out device")
-    unused = "start_from", "residual_of", "washout", "variants", "lines"
-    given = [name for name in unused if getattr(training, name)]
-    if given:
-        raise InputError(
-            f"on a device an agent acts alone, on one line; leave out {', '.join(given)}, or device. The "
-            "environment has a washout of its own"
-        )
-
-
-def _check_environment(training: Training) -> None:
+def _check(training: Training) -> None:
+    """Raise InputError for settings that do not fit each other, or the environment."""
+    if training.device is not None:
+        if training.algorithm != "ppo":
+            raise InputError(f"on a device only ppo learns, not {training.algorithm}; leave out device")
+        unused = "start_from", "residual_of", "washout", "variants", "lines"
+        if given := [name for name in unused if getattr(training, name)]:
+            raise InputError(
+                f"on a device an agent acts alone, on one line; leave out {', '.join(given)}, or device. The "
+                "environment has a washout of its own"
+            )
     if training.lanes % max(1, len(training.variants)):
         raise InputError(
             f"{training.lanes} lanes cannot be shared equally by {len(training.variants)} variants"
         )
     try:
-        for given in training.environments:
-            for speed in (
-                given.get("speed_kmh", default("speed_kmh")),
-                *(training.evaluation.speeds_kmh or ()),
-            ):
-                Task(on_example(run_settings(given | {"speed_kmh": speed})))
+        for arguments in training.environments:
+            own = arguments.get("speed_kmh", default("speed_kmh"))
+            for speed in (own, *(training.evaluation.speeds_kmh or ())):
+                Task(on_example(run_settings(arguments | {"speed_kmh": speed})))
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
-
-
-def _check_policies(training: Training) -> None:
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
     if training.start_from is not None and training.variants:

@@ -11,20 +11,17 @@ import numpy as np
 from gymnasium.vector import VectorRewardWrapper, VectorWrapper
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.files import check_output
-from panto_env.base.shown import shown
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import fields, run_settings
 
-from .actor import Actor
-from .model_file import Facts, Needs, Step, write_policy
+from .model_file import Actor, Facts, Needs, Step, write_policy
 from .settings import ALGORITHMS, arguments
 
 ACTIVATIONS = {"Tanh": "tanh", "ReLU": "relu"}
 """Activations of Stable-Baselines3's networks that a model file knows."""
-SUFFIXES = (".safetensors",)
 PASSING = (
     "TimeLimit Autoreset PassiveEnvChecker OrderEnforcing RecordEpisodeStatistics Monitor VecMonitor "
     "RecordVideo RenderCollection HumanRendering AddWhiteNoise ObstructView NormalizeReward DictInfoToList "
@@ -42,7 +39,7 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
     present statistics, and rescaled actions are stored. Raises InputError for another model or wrapper, and
     where the file can't be written.
     """
-    check_output(path, SUFFIXES)
+    check_output(path, (".safetensors",))
     name = type(model).__name__.lower()
     if name not in ("ppo", "sac"):
         raise InputError(f"A model of ppo or sac is needed, not of {type(model).__name__}; {ELSE[3:]}.")
@@ -56,7 +53,9 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
             "The model has no environment, or env has other actions; give as env that of its training."
         )
     spec, steps = _walk(env)
-    environment = _environment(spec, env)
+    if spec is None or spec.namespace is not None:
+        raise InputError(f"An environment from gymnasium.make or make_vec is needed, not {shown(env)}.")
+    environment = {"id": spec.id} | {key: value for key, value in spec.kwargs.items() if key in fields()}
     actor = _on_actuator(ALGORITHMS[name](activation=activation).actor(model), model)
     facts = Facts(
         algorithm=name,
@@ -71,14 +70,6 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
     )
     _check(model, actor, facts)
     write_policy(Path(path), facts, actor)
-
-
-def _environment(spec: Any, env: Any) -> dict[str, Any]:
-    """Id and arguments of the environment that a model was trained in."""
-    if spec is None or spec.namespace is not None:
-        raise InputError(f"An environment from gymnasium.make or make_vec is needed, not {shown(env)}.")
-    known = fields()
-    return {"id": spec.id} | {name: value for name, value in spec.kwargs.items() if name in known}
 
 
 def _walk(env: Any) -> tuple[Any, tuple[Step, ...]]:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 
-from .ensemble import Ensemble
-from .policy import TrainedPolicy, load
+from .policy import Ensemble, TrainedPolicy, load
 
 FOLDER = Path(__file__).parent / "models"
 """Folder of their model files; further trainings of an agent lie in a folder of its name."""

@@ -3,32 +3,126 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
-from stable_baselines3.common.callbacks import CallbackList
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 
-from panto_baselines.benchmark.seeds import SELECTION, check_seeds
-from panto_env.base.version import commit
+from panto_baselines.benchmark.settings import SELECTION, check_seeds
+from panto_env.base.checksums import commit, write_checked
+from panto_env.base.files import alone_in
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
+from panto_env.terminal import progress_console
 
-from .base_policy import PolicyLanes
-from .callbacks import EpisodeLog, EveryNSteps, ProgressBar
-from .demonstrations import demonstrate
-from .evaluation import Comparison, Pair, verdict
-from .lanes import lane_seeds, make_lanes
+from .cloning import demonstrate
+from .evaluation import Comparison, Pair, in_words, verdict
+from .lanes import PolicyLanes, lane_seeds, make_lanes
 from .model_file import Facts, Needs, read_model, restore, write_model
 from .policy import policy_of
-from .run_folder import RunFolder
 from .settings import Training
+from .trainings import RunFolder
 
+REFRESH = 0.2  # s between two updates of the progress bar
 LOGGED_FIGURES = ("mean", "std", "contact_loss", "cost_function")
+
+
+class EveryNSteps(BaseCallback):  # type: ignore[misc]
+    """Calls ``function`` every ``interval`` training steps, and at the end.
+
+    It waits until a rollout ends, since the learner's state is complete between two rollouts.
+    """
+
+    def __init__(self, interval: int, function: Callable[[], None]) -> None:
+        super().__init__()
+        self._interval, self._function, self._last_step = interval, function, 0
+
+    def _on_training_start(self) -> None:
+        self._last_step = self.num_timesteps
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps // self._interval > self._last_step // self._interval:
+            self._call()
+
+    def _on_training_end(self) -> None:
+        if self.num_timesteps > self._last_step:
+            self._call()
+
+    def _call(self) -> None:
+        self._last_step = self.num_timesteps
+        self._function()
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class EpisodeLog(BaseCallback):  # type: ignore[misc]
+    """Logs figures of each episode when it ends."""
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            for name in LOGGED_FIGURES:
+                if name in info.get("figures", {}):  # of an episode that ended early some may be missing
+                    self.logger.record_mean(f"episode/{name}", info["figures"][name])
+        return True
+
+
+class ProgressBar(BaseCallback):  # type: ignore[misc]
+    """A progress bar on stderr, and a line for each evaluation."""
+
+    def __init__(self, total_steps: int, latest_evaluation: Callable[[], list[Pair]]) -> None:
+        """latest_evaluation: returns the pairs of the last evaluation so far."""
+        super().__init__()
+        self._latest_evaluation = latest_evaluation
+        self.progress = Progress(
+            TextColumn("{task.completed:.0f}/{task.total:.0f} steps"),
+            BarColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[note]}"),
+            console=progress_console,
+        )
+        self._task = self.progress.add_task("", total=total_steps, note="")
+        self._start_time, self._start_step, self._time_shown = 0.0, 0, 0.0
+        self._pairs_shown: list[Pair] = []
+
+    def _on_training_start(self) -> None:
+        self._start_time, self._start_step = time.monotonic(), self.num_timesteps
+
+    def _on_step(self) -> bool:
+        if time.monotonic() - self._time_shown > REFRESH:
+            self._show()
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self._latest_evaluation() != self._pairs_shown:
+            self._show()
+
+    def _on_training_end(self) -> None:
+        self._show()
+
+    def _show(self) -> None:
+        self._time_shown = time.monotonic()
+        if self._latest_evaluation() != self._pairs_shown:
+            self._pairs_shown = self._latest_evaluation()
+            self.progress.console.print(f"step {self.num_timesteps}: {in_words(self._pairs_shown)}")
+        elapsed = max(self._time_shown - self._start_time, 1e-9)
+        steps_per_second = (self.num_timesteps - self._start_step) / elapsed
+        share_in_environment = self.model.get_env().unwrapped.seconds / elapsed
+        notes = [f"{steps_per_second:.0f} steps/s, {100 * share_in_environment:.0f} % in the environment"]
+        if self.model.ep_info_buffer:
+            rewards = [episode["r"] for episode in self.model.ep_info_buffer]
+            notes.append(f"reward {np.mean(rewards):.1f}")
+        if self._pairs_shown:
+            notes.append(in_words(self._pairs_shown))
+        self.progress.update(self._task, completed=self.num_timesteps, note=", ".join(notes))
 
 
 def train(
@@ -48,7 +142,10 @@ def train(
     already (or, with ``resume``, does not exist), has other settings, or is being trained by another
     process.
     """
-    with _torch_on_one_thread(), ExitStack() as stack:
+    with ExitStack() as stack:
+        # More threads do not speed up such small networks, and slow everything down on shared cores.
+        stack.callback(torch.set_num_threads, torch.get_num_threads())
+        torch.set_num_threads(1)
         lanes = make_lanes(training)
         stack.callback(lanes.close)
         run = Run(training, RunFolder(output), lanes, command)
@@ -56,7 +153,7 @@ def train(
             run.folder.check_resumable(training)
         else:
             run.folder.check_new()
-        stack.enter_context(run.folder.alone())
+        stack.enter_context(alone_in(run.folder.path, "trains into"))
         run.folder.write_settings(training)
         if resume:
             run.restore()
@@ -112,7 +209,7 @@ class Run:
         policy = PolicyLanes(name, native)
         examples = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
         error = training.hyperparameters.begin_with(self.model, examples, training.cloning)
-        self.folder.note_cloning(name, error)
+        write_checked(self.folder.cloning, {"policy": name} | error.model_dump(mode="json"))
         self._seed_lanes()
 
     def learn(self, stack: ExitStack, progress: bool) -> None:
@@ -126,26 +223,24 @@ class Run:
             self.evaluate()  # the initial policy may be hard to beat
         # Evaluations come first, so that no checkpoint is newer than the table of evaluations.
         callbacks: list[Any] = [
-            EpisodeLog(LOGGED_FIGURES),
+            EpisodeLog(),
             EveryNSteps(self.training.evaluation.interval_steps, self.evaluate),
             EveryNSteps(self.training.checkpoint_steps, self.checkpoint),
         ]
         if progress:
             bar = ProgressBar(self.training.total_steps, lambda: self.pairs)
-            callbacks.append(stack.enter_context(bar))
+            callbacks.append(bar)
+            stack.enter_context(bar.progress)
         if remaining_steps > 0:
-            self.model.learn(
-                remaining_steps,
-                callback=CallbackList(callbacks),
-                log_interval=1,
-                reset_num_timesteps=False,
-            )
+            together = CallbackList(callbacks)
+            self.model.learn(remaining_steps, together, log_interval=1, reset_num_timesteps=False)
         self._save(self.folder.model)
 
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        policy = self._policy()
+        actor = self.training.hyperparameters.actor(self.model)
+        policy = policy_of(actor, self._facts(actor))  # in the form of its model file
         self.pairs = [pair for each in self._comparisons for pair in each.run(policy)]
         self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
@@ -159,15 +254,10 @@ class Run:
             self._best_score = (qualified, -ratio)
             self._save(self.folder.best)
 
-    def _policy(self) -> Any:
-        """The present policy, in the form of its model file."""
-        actor = self.training.hyperparameters.actor(self.model)
-        return policy_of(actor, self._facts(actor))
-
     def checkpoint(self) -> None:
         """Write a checkpoint and remove the oldest one."""
-        has_replay_buffer = hasattr(self.model, "replay_buffer")
-        self._save(self.folder.checkpoint(self.model.num_timesteps), replay=has_replay_buffer)
+        path = self.folder.checkpoint(self.model.num_timesteps)
+        self._save(path, replay=hasattr(self.model, "replay_buffer"))
         self.folder.drop_old_checkpoints()
 
     def _save(self, path: Path, replay: bool = False) -> None:
@@ -176,32 +266,16 @@ class Run:
 
     def _facts(self, actor: Any) -> Facts:
         ratio, qualified = self._verdict
+        shared = "algorithm", "seed", "environment", "variants", "residual_of", "residual_share", "washout"
         return Facts(
             commit=commit(),
             command=self._command,
-            algorithm=self.training.algorithm,
-            seed=self.training.seed,
             steps=self.model.num_timesteps,
             updates=self.model._n_updates,
-            environment=self.training.environment,
-            variants=self.training.variants,
             needs=self._needs,
-            residual_of=self.training.residual_of,
-            residual_share=self.training.residual_share,
-            washout=self.training.washout,
             ratio=ratio if math.isfinite(ratio) else None,
             qualified=qualified,
             activation=actor.activation,
             squashed=actor.squashed,
+            **{name: getattr(self.training, name) for name in shared},
         )
-
-
-@contextmanager
-def _torch_on_one_thread() -> Iterator[None]:
-    """More threads do not speed up such small networks, and slow everything down on shared cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -1,17 +1,20 @@
-"""Settings that a benchmark and a search for oracles share: which train runs on which line, and how fast."""
+"""What benchmark, oracle, tuner and data sets share: settings of a train on a line, and TOML."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
-from panto_env.base.errors import InputError
-from panto_env.base.settings import Positive, Settings
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
+from panto_env.base.settings import Between, Positive, Settings, parse
 from panto_env.control.settings import controlled_numbers, default, description
+from panto_env.plant.actuators import ActuatorSettings, actuator_settings
+from panto_env.plant.catenary.schema import MOST_SPANS
+from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
 T = TypeVar("T")
 OPTIONS = ("catenary", "pantograph", "distances", "controlled")
@@ -36,6 +39,15 @@ def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     if twice is not None:
         raise ValueError(f"{shown(twice)} is given twice")
     return values
+
+
+def _condition(value: Any) -> LineCondition:
+    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
+
+
+Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
+Condition = Annotated[LineCondition, BeforeValidator(as_clause(_condition))]
+Span = Annotated[int, Between(1, MOST_SPANS)]
 
 
 class LineAndTrain(Settings):
@@ -71,3 +83,35 @@ class LineAndTrain(Settings):
             return {"pantograph": self.pantograph}
         several = self.pantographs or (self.pantograph,)
         return {"pantographs": several, "distances": self.distances, "controlled": self.controlled}
+
+
+def as_toml(table: Mapping[str, Any]) -> str:
+    """TOML of plain data; values that are null are left out, lists of lists have a row on each line."""
+    plain = {key: value for key, value in table.items() if not _is_tables(value)}
+    tables = {key: value for key, value in table.items() if key not in plain}
+    parts = ["\n".join(_lines(plain))]
+    parts += ["\n".join([f"[[{_key(key)}]]", *_lines(row)]) for key, rows in tables.items() for row in rows]
+    return "\n\n".join(parts) + "\n"
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(_lines(value))} }}" if value else "{}"
+    if isinstance(value, list):
+        values = [_value(each) for each in value]
+        if value and isinstance(value[0], list):
+            return "[\n" + "".join(f"    {each},\n" for each in values) + "]"
+        return f"[{', '.join(values)}]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML alone escapes it
+
+
+def _key(key: str) -> str:
+    return key if key.isidentifier() and key.isascii() else _value(key)

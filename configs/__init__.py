@@ -6,9 +6,8 @@ import os
 from pathlib import Path
 from typing import Literal
 
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, suggest
 from panto_env.base.files import read_toml
-from panto_env.base.names import suggest
 
 FOLDER = Path(__file__).parent
 Kind = Literal["training", "benchmark", "oracle", "ablation", "dataset", "designs"]

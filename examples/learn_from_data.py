@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_env.base.units import from_kmh
+from panto_env.base.arrays import from_kmh
 from panto_env.control import Context
 from panto_env.envs import IDS
 

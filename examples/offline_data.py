@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from panto_baselines.dataset.make_episodes import make_episodes
+from panto_baselines.dataset.make import make_episodes
 from panto_baselines.dataset.settings import chosen, load_episodes
 
 

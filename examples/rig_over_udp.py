@@ -18,7 +18,7 @@ import time
 
 import numpy as np
 
-from panto_env.base.units import from_kmh
+from panto_env.base.arrays import from_kmh
 from panto_env.catalog import load_pantograph
 from panto_env.rig import RigComputer
 from panto_env.rig.computer import load_rig

@@ -27,8 +27,8 @@ import gymnasium
 import torch
 from stable_baselines3 import SAC
 
+from panto_agents.lanes import PantographVecEnv
 from panto_agents.stable_baselines import save_policy
-from panto_agents.vec_env import PantographVecEnv
 from panto_baselines.benchmark.overall import Standing
 from panto_baselines.benchmark.run import Benchmark, run
 from panto_baselines.benchmark.settings import load_benchmark

@@ -3,8 +3,8 @@
 from typing import Any
 
 from .analysis.simulation import simulate
+from .base.checksums import __version__
 from .base.errors import InputError
-from .base.version import __version__
 from .envs import register
 from .metrics.trajectory import Trajectory
 

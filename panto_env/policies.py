@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 
 from .base import plugins
 from .base.arrays import Array
-from .base.errors import InputError
-from .base.inline import parse_inline
-from .base.names import suggest
-from .base.shown import shortly, shown
-from .control.action import numbers
-from .control.context import Context
-from .control.observation import OBSERVATION_SETTINGS
+from .base.errors import InputError, shortly, shown, suggest
+from .base.settings import parse_inline
+from .control.arguments import numbers
+from .control.observation import OBSERVATION_SETTINGS, Context
 from .control.settings import RunSettings
 
 MODELS = ".safetensors"

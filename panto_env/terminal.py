@@ -1,8 +1,7 @@
-"""Output of commands: tables, progress, JSON."""
+"""What commands share: options for outputs, and what they print on standard output and standard error."""
 
 from __future__ import annotations
 
-import copy
 import json
 import math
 import os
@@ -10,8 +9,7 @@ import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,10 +23,14 @@ from rich.text import Text
 
 from .base.errors import InputError
 from .base.files import PICTURES, check_output, finite
-from .base.plain_characters import shows_all
-from .base.shown import harmless
-from .base.standard_streams import say
 from .base.table import Alarm, Table
+
+
+def say(sentence: str) -> None:
+    """Print a line on standard error, if that is open."""
+    if sys.stderr is not None:  # print would use standard output instead, which is for results
+        print(f"panto: {sentence}", file=sys.stderr)
+
 
 OUTPUTS = "panto_env.outputs"
 """Where a command keeps the output files that it was given."""
@@ -46,20 +48,17 @@ def writable(
     def check(context: typer.Context, path: str | None) -> str | None:
         if path is not None:
             check_output(path, suffixes)
-            _refuse_twice(context, path)
+            known = context.meta.setdefault(OUTPUTS, set())
+            if Path(path).resolve() in known:
+                raise InputError(
+                    f"{path} is named for two outputs, of which only one would be left; name two files."
+                )
+            known.add(Path(path).resolve())
             if announced:
                 announce_overwriting(path)
         return path
 
     return check
-
-
-def _refuse_twice(context: typer.Context, path: str) -> None:
-    """Raise InputError where another output of the same command has this file."""
-    known = context.meta.setdefault(OUTPUTS, set())
-    if Path(path).resolve() in known:
-        raise InputError(f"{path} is named for two outputs, of which only one would be left; name two files.")
-    known.add(Path(path).resolve())
 
 
 def announce_overwriting(path: str | Path) -> None:
@@ -76,35 +75,28 @@ def refuse_overwriting(path: str | Path, force: bool) -> None:
         raise InputError(f"{path} exists already; give another --output, or --force to overwrite it.")
 
 
+def into_file(words: str, suffixes: Sequence[str]) -> Any:
+    """Option for an output file: its help ends with its suffixes."""
+    return typer.Option(help=f"{words} ({', '.join(suffixes)}).", callback=writable(suffixes))
+
+
 Force = Annotated[bool, typer.Option("--force", help="Overwrite earlier results in the output.")]
-Plot = Annotated[
-    str | None,
-    typer.Option(help=f"Write a picture to this file ({', '.join(PICTURES)}).", callback=writable(PICTURES)),
-]
+Plot = Annotated[str | None, into_file("Write a picture to this file", PICTURES)]
 
 
 WIDE = 200
 """Columns of output where there is no terminal."""
 NARROW = 80
 """Columns from which help is printed as tables."""
-UNLIMITED = 100_000
-"""Columns in which every table has its natural width."""
 LONGEST_WORD = 24
 """Letters up to which a word of a table is never broken; only paths and names that users chose are longer."""
 
 
 class PlainConsole(Console):
-    """A console for names and descriptions from users' files.
-
-    Brackets in them are not markup, and characters that control the terminal are escaped.
-    """
+    """A console in which brackets of names and descriptions from users' files are not markup."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(markup=False, **settings)
-
-    def render_str(self, text: str, **settings: Any) -> Text:
-        """Escape strings and cells before they are measured, so that none is cut."""
-        return super().render_str(harmless(text), **settings)
 
     @property  # type: ignore[misc]  # nobody sets it
     def size(self) -> ConsoleDimensions:
@@ -115,68 +107,45 @@ class PlainConsole(Console):
         return ConsoleDimensions(max(WIDE, size.width), size.height)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Escape everything that is printed, and print tables that are too wide for their words as lists."""
+        """Render anything; a table whose words do not fit in columns becomes a list, so that none is cut."""
         if isinstance(renderable, rich.table.Table) and renderable.box is not None:
             renderable = _fitting(renderable, self, options or self.options)
-        for segment in super().render(renderable, options):
-            text, style, control = segment
-            yield segment if control else Segment(harmless(text), style)
+        return super().render(renderable, options)
 
 
 def _fitting(table: rich.table.Table, to: Console, options: ConsoleOptions) -> RenderableType:
     """A table in which no number is cut, in columns where they fit, otherwise as a list."""
-    unlimited = options.update(width=UNLIMITED)
-    if (natural := Measurement.get(to, unlimited, table).maximum) <= options.max_width:
-        return table
     cells = [[column.header, *column.cells] for column in table.columns]
-    sizes = [[Measurement.get(to, unlimited, each) for each in column] for column in cells]
-    minimum = [min(LONGEST_WORD, max(size.minimum for size in column)) for column in sizes]
+    sizes = [[Measurement.get(to, options.update(width=1000), each) for each in column] for column in cells]
     wishes = [max(size.maximum for size in column) for column in sizes]
-    room = options.max_width - (natural - sum(wishes))
+    room = options.max_width - 3 * len(sizes) - 1
+    if sum(wishes) <= room:
+        return table
+    minimum = [min(LONGEST_WORD, max(size.minimum for size in column)) for column in sizes]
     pairs = zip(minimum, sizes, strict=True)
     rows = [max([least, *(size.maximum for size in column[1:])]) for least, column in pairs]
     minimum = rows if sum(rows) <= room else minimum  # a heading breaks before a row does
-    spare = room - sum(minimum)
+    spare, more = room - sum(minimum), max(1, sum(wishes) - sum(minimum))
     if spare < 0:
-        return _as_list(table, options.max_width)
-    more = [wish - least for wish, least in zip(wishes, minimum, strict=True)]
-    shown, shown_columns = copy.copy(table), []
-    for column, least, wish in zip(table.columns, minimum, more, strict=True):
-        width = least + spare * wish // max(1, sum(more))
-        broken: list[RenderableType] = [_text(cell, width) for cell in column.cells]
-        shown_columns.append(replace(column, width=width, no_wrap=False, overflow="fold", _cells=broken))
-    shown.columns = shown_columns
-    return shown
+        return _as_list(table)
+    for column, least, wish in zip(table.columns, minimum, wishes, strict=True):
+        column.width, column.overflow = least + spare * (wish - least) // more, "fold"
+    return table
 
 
-def _as_list(table: rich.table.Table, width: int) -> RenderableType:
+def _as_list(table: rich.table.Table) -> RenderableType:
     """The rows of a table below each other, each with one value per line after its heading."""
-    lines: list[Text] = [] if table.title is None else [_text(table.title, width), Text()]
-    for row, *cells in zip(table.rows, *(column.cells for column in table.columns), strict=True):
+    lines: list[RenderableType] = [] if table.title is None else [table.title, ""]
+    for cells in zip(*(column.cells for column in table.columns), strict=True):
         for column, content in zip(table.columns, cells, strict=True):
-            cell, name = _text(content, width - 2), _one_line(column.header)
-            if not cell.plain.strip():
-                continue
-            cell.stylize(row.style or "")
+            cell = content if isinstance(content, Text) else Text(str(content))
+            name = re.sub(r"([._])\n", r"\1", str(column.header)).replace("\n", " ")
             if column is table.columns[0] and column.justify == "left":
                 lines.append(cell)  # the row's name
-            else:
-                lines.append(Text.assemble("  ", (f"{name}: " if name else "", "dim"), cell, overflow="fold"))
-        lines.append(Text())
+            elif cell.plain.strip():
+                lines.append(Text.assemble("  ", (f"{name}: " if name else "", "dim"), cell))
+        lines.append("")
     return Group(*lines)
-
-
-def _text(cell: RenderableType, width: int) -> Text:
-    """A cell whose words that are wider than a width break after "=", and otherwise anywhere."""
-    text = cell.copy() if isinstance(cell, Text) else Text(harmless(str(cell)))
-    text.plain = re.sub(rf"\S{{{width + 1},}}", lambda word: word[0].replace("=", "= "), text.plain)
-    text.overflow = "fold"
-    return text
-
-
-def _one_line(heading: RenderableType) -> str:
-    """A heading without the line ends that make its column narrow."""
-    return re.sub(r"([._])\n", r"\1", str(heading)).replace("\n", " ")
 
 
 console = PlainConsole()
@@ -193,7 +162,7 @@ def alert(words: str, rest: str = "", to: Console | None = None) -> None:
 
 def print_json(value: Any) -> None:
     """Print JSON to standard output; numbers that are not finite become null."""
-    print(json.dumps(finite(value), indent=2, ensure_ascii=not shows_all(sys.stdout)))
+    print(json.dumps(finite(value), indent=2, ensure_ascii=False))
 
 
 def this_command() -> str:
@@ -218,28 +187,14 @@ def number(value: float, digits: int = 1) -> str:
 
 
 @contextmanager
-def written_last() -> Iterator[Callable[..., None]]:
+def written_last() -> Iterator[Callable[..., Any]]:
     """Within the body, ``later(save, path)`` schedules a file that is written when the body has ended.
 
     So results are printed even if they cannot be written, and written even if they cannot be printed. Where
     several files cannot be written, the first one's InputError is raised.
     """
-    errors: list[InputError] = []
-
-    def attempt(write: Callable[..., Any], *arguments: Any) -> None:
-        try:
-            write(*arguments)
-        except InputError as error:
-            errors.append(error)
-
-    jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
-    try:
-        yield lambda write, *arguments: jobs.append((write, arguments))
-    finally:
-        for write, arguments in jobs:
-            attempt(write, *arguments)
-        if errors:
-            raise errors[0]
+    with ExitStack() as files:
+        yield files.callback
 
 
 def bars(*columns: str | rich.progress.ProgressColumn) -> rich.progress.Progress:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
+from functools import cache
 
 from huggingface_hub import EvalResult, ModelCardData
 
@@ -80,14 +81,13 @@ Licence: MIT.
 def _results(policy):
     """The agent's results in all stored tracks, for the front matter."""
     found = []
-    for path in sorted(RESULTS.glob("*.json")):
-        result = read_result(path)
+    for track, result in _tracks().items():
         for standing in result.standings:
             if standing.policy == policy and not standing.disqualified:
                 found.append(
                     EvalResult(
                         task_type="reinforcement-learning",
-                        dataset_type=f"panto-benchmark-{path.stem}",
+                        dataset_type=f"panto-benchmark-{track}",
                         dataset_name=f"panto benchmark: {result.title}",
                         metric_type="sigma-change",
                         metric_name=CHANGE,
@@ -95,6 +95,11 @@ def _results(policy):
                     )
                 )
     return found
+
+
+@cache
+def _tracks():
+    return {path.stem: read_result(path) for path in sorted(RESULTS.glob("*.json"))}
 
 
 def _section(policy):

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from panto_agents.ablation import load_ablation
 from panto_agents.settings import load_training
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.oracle.settings import oracle_settings
+from panto_baselines.oracle.stored import oracle_settings
 from panto_env.base.errors import InputError
 from panto_env.control.settings import run_settings
 from panto_env.policies import find_policy

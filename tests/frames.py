@@ -14,7 +14,7 @@ import gymnasium
 
 from panto_env.base.table import Table
 from panto_env.envs import IDS
-from panto_env.studies.throughput.processor import describe
+from panto_env.studies.throughput.roofline import describe
 from panto_env.terminal import print_table
 
 FRAMES = 200

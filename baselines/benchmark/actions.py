@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.array_file import read_arrays, write_arrays
-from panto_env.base.checksums import checksum
+from panto_env import Trajectory
+from panto_env.base.arrays import Array
+from panto_env.base.checksums import checksum, read_arrays, write_arrays
 from panto_env.base.errors import InputError
+from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
+from panto_env.plant.alignment import Spans
 
-Array = NDArray[np.float64]
+from .settings import Line, LineAtSpeed
 
 SUFFIX = ".actions.safetensors"
 """End of the file's name, in the place of the result's ".json"."""
@@ -24,7 +28,7 @@ class Played(NamedTuple):
 
     # (control steps, actions): as it gave them, clipped to -1..1. Of several pantographs side by side, each
     # from where it comes onto the line, with zeros after the last.
-    actions: Array
+    actions: NDArray[np.float64]
     washout: float  # time constant (s) of what the environment subtracted from them, 0 for nothing
 
 
@@ -47,13 +51,14 @@ def read(path: str | Path, expected: str) -> list[Played]:
     """Actions of all passes. Raises InputError unless they are whole and have the expected checksum."""
     try:
         _, arrays = read_arrays(path)
-        passes = _passes(**arrays)
+        each = np.split(arrays["actions"], np.cumsum(arrays["steps"])[:-1])
+        passes = [Played(one, float(time)) for one, time in zip(each, arrays["washout"], strict=True)]
     except FileNotFoundError as error:
         raise InputError(
             f"{path}, the actions of the result, could not be read: there is no such file; put it beside "
             "the result."
         ) from error
-    except (OSError, TypeError, ValueError) as error:
+    except (OSError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path} holds no actions, or is damaged; make the result again.") from error
     if digest(passes) != expected:
         raise InputError(f"{path} holds the actions of another result; put its own beside the result.")
@@ -69,7 +74,56 @@ def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
     }
 
 
-def _passes(actions: Array, steps: NDArray[np.int64], washout: Array) -> list[Played]:
-    """The inverse of ``_arrays``."""
-    each = np.split(actions, np.cumsum(steps)[:-1])
-    return [Played(one, float(time)) for one, time in zip(each, washout, strict=True)]
+STRIDE = 0.5
+"""Distance (m) between points of a trace, unless the train is so slow that a peak would be missed."""
+PER_PERIOD = 4
+"""Points of a trace per period of the low-pass's cut-off frequency."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One policy's pass under the first seed; n points, m frequencies; rounded, for drawing only."""
+
+    policy: str
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+    seed: int
+    position: tuple[float, ...]  # (n,): equally spaced along the last two evaluated spans (m)
+    force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
+    frequency: tuple[float, ...]  # (m,): up to 20 Hz (Hz)
+    amplitude: tuple[float, ...]  # (m,): of the unfiltered contact force over all evaluated spans (N)
+
+    @property
+    def place(self) -> LineAtSpeed:
+        """Line, pantograph and speed."""
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
+
+
+def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
+    """Trace of a run that is evaluated over ``spans``, first and last, counted from 1.
+
+    policy, line: with the benchmark's names for them; a run holds the names of the catalogue entries.
+    """
+    first, last = spans
+    begin, end = run.alignment.limits((max(first, last - 1), last))
+    stride = min(STRIDE, run.speed / (PER_PERIOD * CUTOFF))
+    position = np.linspace(begin, end, round((end - begin) / stride) + 1)
+    force = zero_phase_low_pass(run.contact_force, run.time_step)
+    frequency, amplitude = amplitudes(run.contact_force[run.inside(spans)], run.time_step)
+    shown = frequency <= CUTOFF
+    return Trace(
+        policy=policy,
+        catenary=line.catenary,
+        pantograph=line.pantograph,
+        speed_kmh=run.speed_kmh,
+        seed=run.seed,
+        position=_rounded(position, 2),
+        force=_rounded(np.interp(position, run.position, force), 2),
+        frequency=_rounded(frequency[shown], 4),
+        amplitude=_rounded(amplitude[shown], 4),
+    )
+
+
+def _rounded(values: Array, decimals: int) -> tuple[float, ...]:
+    return tuple(values.round(decimals).tolist())

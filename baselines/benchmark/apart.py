@@ -1,9 +1,7 @@
-"""Policies apart from the plant, each in a process that sees observations and contexts, and nothing else.
+"""Policies apart from the plant, in a process that sees observations and contexts, and nothing else.
 
-A policy cannot reach the plant, the record or the seeds through Python: they are in another process, and no
-message, argument or variable of the environment holds them. Passes don't share its memory either. This is no
-sandbox: a policy's code has the rights of the user who runs it. It may read the disk, leave files for a later
-pass, and look at other processes as far as the system lets this user do that. Run what you don't trust as
+A policy of a file has a process of its own, installed ones share one; neither plant, record nor seed is in
+it. This is no sandbox: a policy's code has the rights of the user who runs it. Run what you don't trust as
 another user, or in a container without a network.
 """
 
@@ -12,42 +10,33 @@ from __future__ import annotations
 import atexit
 import json
 import os
-import pickle
 import re
-import select
-import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
-from dataclasses import replace
-from typing import Any, NoReturn
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from signal import Signals
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.analysis.pool import LINEAR_ALGEBRA_THREADS
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
-from panto_env.control.observation import OBSERVATION_SETTINGS
+from panto_env.base.files import finite
+from panto_env.control.observation import OBSERVATION_SETTINGS, Context
 from panto_env.control.settings import run_settings
-from panto_env.policies import PolicyError, find_policy, policy_names
-
-from .policy_process import (
-    BEGIN,
-    DONE,
-    DUMPABLE,
-    END,
-    ENDED,
-    FAILED,
-    HEADER,
-    LONGEST,
-    OBSERVATION,
-    core,
-    process_control,
+from panto_env.policies import (
+    Policy,
+    PolicyError,
+    checked_action,
+    errors_name,
+    find_policy,
+    policy_names,
+    wishes,
 )
-
-Array = NDArray[np.float64]
 
 ACT_LIMIT = 60.0
 """Time (s) within which a policy must answer an observation."""
@@ -59,7 +48,8 @@ ENVIRONMENT = re.compile("PATH|HOME|LANG|LC_.*|TZ|TMPDIR|LD_LIBRARY_PATH|.*_CACH
 """Variables of the environment that a policy's process gets; others may hold secrets."""
 END_LIMIT = 5.0
 """Time (s) within which its process ends by itself where another user's can't be killed."""
-MODULE = "panto_baselines.benchmark.policy_process"
+DONE, FAILED = b"+", b"!"
+"""First byte of an answer: followed by its content, or by a sentence about the policy's error."""
 
 
 def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:
@@ -75,173 +65,127 @@ def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:
 
 
 class PolicyApart:
-    """A policy in a process of its own. It has the attributes of the policy that say what it wishes."""
+    """A policy in another process. It has the attributes of the policy that say what it wishes."""
 
     def __init__(self, source: str, number: int = 0) -> None:
         """source: name, model file, or class in a Python file. number: of its process, see ``find_apart``.
 
         Raises InputError if it cannot be made.
         """
-        self._source, self._number = source, number
-        if number in _running and _running[number].ended:
-            close()
-        vars(self).update(_process(number).load(source))
+        self._source = source
+        self._process = "" if source.partition(":")[0] in policy_names() else source, number
+        wished = json.loads(self._ask("being loaded", PREPARATION_LIMIT))
+        with errors_name(source, "being loaded"):
+            run_settings(wished)
+        names = {*OBSERVATION_SETTINGS, "washout"}
+        vars(self).update({name: value for name, value in wished.items() if name in names})
 
     def reset(self, context: Context) -> None:
-        """Prepare for an episode, in a process that has seen no other. Raises InputError if that fails."""
-        _process(self._number).begin(self._source, context)
+        """Prepare for an episode. Raises InputError if that fails."""
+        self._ask("reset", PREPARATION_LIMIT, context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
         """Action, (actions,), for an observation, (entries,). Raises InputError if the policy fails."""
-        return _process(self._number).act(observation)
+        return np.frombuffer(self._ask("act", ACT_LIMIT, observation))
 
-
-def close() -> None:
-    """End this process's policies apart, with everything that they have started."""
-    while _running:
-        _running.popitem()[1].close()
-
-
-_running: dict[int, _PolicyProcess] = {}
-atexit.register(close)
-
-
-def _process(number: int) -> _PolicyProcess:
-    if number not in _running:
-        _running[number] = _PolicyProcess()
-    return _running[number]
-
-
-class _PolicyProcess:
-    """A ``policy_process`` as seen from the plant; it runs one policy at a time."""
-
-    def __init__(self) -> None:
-        """Start it. Raises InputError where that is not possible."""
-        if not hasattr(os, "fork"):
-            raise InputError(
-                "A policy apart from the plant needs a system that can fork, such as Linux or macOS; only "
-                "installed policies run without, with --trusted."
-            )
-        # Not even as the same user may a policy read this process's memory. Root still may.
-        process_control(DUMPABLE, 0)
-        variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # for the reason see ``in_processes``
-        python = os.environ.get(INTERPRETER)
-        if python is None:
-            python, variables["PYTHONPATH"] = sys.executable, os.pathsep.join(sys.path)
+    def _ask(self, when: str, limit: float, given: Any = None) -> bytes:
+        """Content of the process's answer. Raises PolicyError where it fails, is late or ends."""
+        process, connection = _running.get(self._process) or _start(self._process)
+        why = f"it took more than {limit:g} s"
         try:
-            self._process = subprocess.Popen(
-                [python, "-P", "-m", MODULE],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                env={name: os.environ[name] for name in filter(ENVIRONMENT.fullmatch, os.environ)}
-                | variables,
-                process_group=0,  # interrupts from the keyboard are left to this process
-                bufsize=0,
-            )
-        except OSError as error:
-            raise InputError(
-                f"The Python of policies, {python}, can't be started: {error.strerror}; "
-                f"correct {INTERPRETER}."
-            ) from error
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
-        self._arrival = select.poll()
-        self._arrival.register(self._answers, select.POLLIN)
-        self._open: list[bytes] = []  # what the processes that wait for one another were begun with
-        self._source = ""
-        self._wishes: dict[str, Any] = {}
-        self._size = 0  # of an action (bytes)
-
-    @property
-    def ended(self) -> bool:
-        """Whether the process has ended by itself."""
-        return self._process.poll() is not None
-
-    def load(self, source: str) -> dict[str, Any]:
-        """What a policy wishes. Raises PolicyError if it cannot be made."""
-        if self._open[:1] != [source.encode()]:
-            self._source = source
-            self._descend(source.encode())
-            answer = self._answer("being loaded", PREPARATION_LIMIT)
-            try:
-                self._wishes = json.loads(answer)
-                if not self._wishes.keys() <= {*OBSERVATION_SETTINGS, "washout"}:
-                    raise ValueError("unknown names")
-                run_settings(self._wishes)
-            except (InputError, ValueError, AttributeError, RecursionError) as error:
-                self._fail("being loaded", f"what it wishes is not valid: {error}".removesuffix("."))
-        return self._wishes
-
-    def begin(self, source: str, context: Context) -> None:
-        """Begin a pass. Raises PolicyError if the policy fails."""
-        self.load(source)
-        given = pickle.dumps(context)
-        alike = pickle.dumps(replace(context, nominal_force=0.0))  # scatters from pass to pass
-        if self._open[1:2] != [alike]:
-            self._descend(source.encode(), given)
-            self._open[1] = alike
-        self._descend(source.encode(), alike, given)
-        self._answer("reset", PREPARATION_LIMIT)
-        self._size = 8 * context.actions
-
-    def act(self, observation: NDArray[np.float32]) -> Array:
-        """Action for an observation. Raises PolicyError if the policy fails."""
-        self._send(OBSERVATION + core() + observation.tobytes())
-        answer = self._answer("act", ACT_LIMIT)
-        if len(answer) != self._size:
-            self._fail("act", "its process sent something else than an action")
-        return np.frombuffer(answer)
-
-    def close(self) -> None:
-        """End the process, and all that it has forked; another user's ends as its pipes are closed."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(END_LIMIT)
-
-    def _descend(self, *contents: bytes) -> None:
-        """End the processes that were begun with something else, or with the last of these, and begin it."""
-        keep = 0
-        while keep < len(contents) - 1 and self._open[keep : keep + 1] == [contents[keep]]:
-            keep += 1
-        while len(self._open) > keep:
-            self._send(END)
-            self._answer("its end", ACT_LIMIT, ENDED)
-            self._open.pop()
-        content = contents[-1]
-        self._send(BEGIN + len(content).to_bytes(8, "big") + content)
-        self._open.append(content)
-
-    def _send(self, request: bytes) -> None:
-        with suppress(BrokenPipeError):  # the answer then shows why
-            while request:
-                request = request[os.write(self._requests, request) :]
-
-    def _answer(self, when: str, limit: float, expected: bytes = DONE) -> bytes:
-        """Content of the next answer. Raises PolicyError where it is another one, or late."""
-        end, answer, length = time.monotonic() + limit, b"", HEADER
-        while len(answer) < length:
-            if not self._arrival.poll(1000 * max(0.0, end - time.monotonic())):
-                self._fail(when, f"it took more than {limit:g} s")
-            if not (more := os.read(self._answers, LONGEST)):
-                self._fail(when, "its process ended")
-            answer += more
-            length = HEADER + int.from_bytes(answer[1:HEADER].ljust(HEADER - 1, b"\xff"), "big")
-            if len(answer) >= HEADER and not len(answer) <= length <= LONGEST:
-                self._fail(when, "its process sent something else than an answer")
-        kind, content = answer[:1], answer[HEADER:]
-        if kind == expected:
-            return content
-        words = content.decode(errors="replace")
-        if kind == FAILED and self._source in words:  # otherwise it may blame another policy
-            close()
-            raise PolicyError(words)
-        self._fail(when, f"its process {words or 'ended'}" if kind == ENDED else words.removesuffix("."))
-
-    def _fail(self, when: str, why: str) -> NoReturn:
+            connection.send((self._source, when, given))
+            if connection.poll(limit):
+                answer = connection.recv_bytes()
+                if answer[:1] == DONE:
+                    return answer[1:]
+                why = ""
+        except (OSError, EOFError):
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(END_LIMIT)
+            status = process.returncode
+            why = "its process ended" if status is None else f"its process ended with status {status}"
+            if status is not None and status < 0:
+                why = f"its process was killed by {Signals(-status).name}"
         close()
-        raise PolicyError(f"The policy '{self._source}' failed in {when}: {why}.")
+        raise PolicyError(
+            f"The policy '{self._source}' failed in {when}: {why}." if why else answer[1:].decode()
+        )
+
+
+_running: dict[tuple[str, int], tuple[subprocess.Popen[bytes], Connection]] = {}
+
+
+@atexit.register
+def close() -> None:
+    """End this process's policies apart; another user's end as their connections are closed."""
+    while _running:
+        process, connection = _running.popitem()[1]
+        connection.close()
+        with suppress(PermissionError):
+            process.kill()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(END_LIMIT)
+
+
+def _start(key: tuple[str, int]) -> tuple[subprocess.Popen[bytes], Connection]:
+    """Start a process. Raises InputError where that is not possible."""
+    if os.name != "posix":
+        raise InputError(
+            "A policy apart from the plant needs Linux or macOS; only installed policies run without, with "
+            "--trusted."
+        )
+    variables = {name: os.environ[name] for name in filter(ENVIRONMENT.fullmatch, os.environ)}
+    variables |= dict.fromkeys((*LINEAR_ALGEBRA_THREADS, "PYTHONUNBUFFERED"), "1")  # see ``in_processes``
+    python = os.environ.get(INTERPRETER)
+    if python is None:
+        python, variables["PYTHONPATH"] = sys.executable, os.pathsep.join(sys.path)
+    ours, theirs = Pipe()
+    try:
+        process = subprocess.Popen(
+            [python, "-P", "-m", "panto_baselines.benchmark.apart", str(theirs.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=2,  # what a policy prints is no output of the benchmark
+            env=variables,
+            pass_fds=[theirs.fileno()],
+            process_group=0,  # interrupts from the keyboard are left to this process
+        )
+    except OSError as error:
+        raise InputError(
+            f"The Python of policies, {python}, can't be started: {error.strerror}; correct {INTERPRETER}."
+        ) from error
+    finally:
+        theirs.close()
+    _running[key] = process, ours
+    return process, ours
+
+
+def _answer(policy: Policy, context: Context | None, source: str, when: str, given: Any) -> bytes:
+    """The answer of a policy, under a context or while it is loaded, to what it is given."""
+    if when == "being loaded":
+        return json.dumps(finite(wishes(policy))).encode()
+    with errors_name(source, when):
+        if when == "reset":
+            policy.reset(given)
+            return b""
+        assert context is not None
+        return checked_action(policy.act(given), (context.actions,)).tobytes()
+
+
+def main() -> None:
+    """Answer the process that started this one, until it closes the connection."""
+    connection = Connection(int(sys.argv[1]))
+    loaded, policy, context = "", None, None
+    with suppress(EOFError, ConnectionError):
+        while True:
+            source, when, given = connection.recv()
+            try:
+                if policy is None or source != loaded or when == "being loaded":
+                    loaded, policy = source, find_policy(source)
+                context = given if when == "reset" else context
+                connection.send_bytes(DONE + _answer(policy, context, source, when, given))
+            except InputError as error:
+                connection.send_bytes(FAILED + str(error).encode())
+
+
+if __name__ == "__main__":
+    main()

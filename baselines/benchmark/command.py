@@ -1,4 +1,4 @@
-"""The command `panto benchmark`."""
+"""``panto benchmark``, ``replay``, ``returns`` and ``submission``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,18 @@ import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.base.files import PAGES
+from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
 from panto_env.terminal import (
     Force,
     Json,
+    PlainConsole,
     Plot,
+    alert,
     console,
     counting,
     print_json,
+    print_table,
     refuse_overwriting,
     writable,
     written_last,
@@ -28,6 +32,8 @@ from .run import SUFFIXES, run
 
 if TYPE_CHECKING:
     from .settings import BenchmarkSettings
+    from .submission import Checked
+
 
 PLACE = (*OPTIONS, "pantographs")
 """Options that say what runs on which line: they replace the lines of a file."""
@@ -91,7 +97,7 @@ def benchmark(
     from ..report.result import parse_result
     from .plot import plot as draw
     from .report import tables
-    from .seeds import salt_hash
+    from .settings import salt_hash
 
     line = {name: given.pop(name, None) for name in PLACE}
     settings = _settings(
@@ -145,3 +151,157 @@ def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> Benchm
 
 def _without_none(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
+
+
+def replay(
+    result: Annotated[
+        Path,
+        typer.Argument(help="JSON of `panto benchmark --output`, with its actions beside it."),
+    ],
+    policy: Annotated[list[str] | None, typer.Option(help="Policy of the result; repeatable.")] = None,
+    tolerance: Annotated[
+        float, typer.Option(min=0, help="Relative difference that is allowed; 0 means bit for bit.")
+    ] = 0.0,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    json: Json = False,
+) -> None:
+    """Play a result's passes again from the actions that it keeps, and compare all figures.
+
+    No policy runs. Ends with status 1 where a figure differs by more than the tolerance. On another kind of
+    processor figures differ in their last digits: give a tolerance there.
+    """
+    from .submission import replay as play
+
+    with counting("passes") as progress:
+        played = play(result, policy or (), workers, progress)
+    if json:
+        rows = [{**each.row, "difference": each.difference} for each in played.rows]
+        print_json({"follows": played.follows, "rows": rows})
+    else:
+        groups: dict[str, list[float]] = {}
+        for each in played.rows:
+            groups.setdefault(each.row["policy"], []).append(each.difference)
+        rows_of = [
+            (policy, str(len(found)), str(found.count(0.0)), f"{max(found):.2g}")
+            for policy, found in groups.items()
+        ]
+        headings = ("policy", "passes", "bit for bit", "maximum relative difference")
+        print_table(Table(f"{result.name}, played again", headings, rows_of))
+    apart = [each for each in played.rows if each.difference > tolerance]
+    if apart or played.follows is False:
+        what = f"{len(apart)} of {len(played.rows)} rows do" if apart else "its cells or standings do"
+        alert("No:", f"{what} not follow from the actions.")
+        raise typer.Exit(1)
+
+
+def returns(
+    result: Annotated[Path, typer.Argument(help="JSON of `panto benchmark`, of one line.")],
+    environment: Annotated[str, typer.Option("--id", help="Id of the environment.")] = "Pantograph-v0",
+    episodes: Annotated[
+        int, typer.Option(min=2, help="Episodes per policy, seeds 0, 1, ..., at the result's speeds in turn.")
+    ] = 20,
+    ingredients: Annotated[
+        bool,
+        typer.Option("--ingredients", help="Also with each ingredient of the reward left out or changed."),
+    ] = False,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    json: Json = False,
+) -> None:
+    """Compare the returns of an environment with a benchmark's ranks.
+
+    Every policy of the result runs episodes on its line, at its speeds in turn. Disqualified policies
+    share the last rank of the benchmark.
+    """
+    from ..report.result import read_result
+    from .returns import INGREDIENTS, as_dict, rank_correlation
+    from .returns import returns as measure
+
+    judged = read_result(result)
+    chosen = INGREDIENTS if ingredients else {"all": {}}
+    found = {}
+    for name, arguments in chosen.items():
+        with counting(f"episodes, {name}" if ingredients else "episodes") as progress:
+            found[name] = measure(
+                judged,
+                environment,
+                episodes=episodes,
+                arguments=arguments,
+                workers=workers,
+                progress=progress,
+            )
+    if json:
+        print_json({name: as_dict(each) for name, each in found.items()})
+        return
+    rows = [
+        (each.policy, f"{each.mean:.1f} ± {each.error:.1f}", f"{each.change:+.1f}", each.disqualified or "–")
+        for each in sorted(found["all"], key=lambda each: -each.mean)
+    ]
+    title = f"{environment}, {episodes} episodes beside {result.name}"
+    print_table(Table(title, ("policy", "return", "Δσ (%)", "disqualified"), rows))
+    correlations = [(name, f"{rank_correlation(each):.3f}") for name, each in found.items()]
+    print_table(Table("rank correlation of return and benchmark", ("reward", "Spearman's ρ"), correlations))
+
+
+submission = typer.Typer(no_args_is_help=True, help="Submissions to the leaderboard.")
+
+
+@submission.callback()
+def _group() -> None:
+    """Submissions to the leaderboard."""
+
+
+@submission.command()
+def check(
+    folder: Annotated[Path, typer.Argument(help="Folder with card.toml and the policy that it names.")],
+    config: Annotated[
+        str, typer.Option(help="Track: TOML file of a benchmark, or a name.")
+    ] = "benchmark/high-speed-as-built",
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds; a track has more.")] = 2,
+    salt: Annotated[str | None, typer.Option(help="Make new test seeds from this text.")] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="JSON of `panto benchmark` on the same track, to be ranked in.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    json: Json = False,
+) -> None:
+    """Run a submission as the benchmark would, with few seeds, and say whether it would be ranked, and where.
+
+    Its policy runs in a process of its own, by the Python that PANTO_POLICY_PYTHON names.
+    """
+    from panto_env.base.settings import parse
+
+    from ..report.result import read_result
+    from .settings import BenchmarkSettings, load_benchmark
+    from .submission import check as run_check
+
+    given: dict[str, Any] = {"seeds": seeds, "salt": salt}
+    settings = parse(BenchmarkSettings, load_benchmark(config).model_dump() | given, "the benchmark")
+    ranked = [] if against is None else [each for each in read_result(against).standings if each.rank]
+    with counting("passes") as progress:
+        checked = run_check(folder, settings, workers, progress)
+    if json:
+        print_json({"card": checked.card.model_dump(mode="json"), "result": checked.outcome.as_dict()})
+        return
+    console = PlainConsole()
+    for line in _report(checked, [each.change for each in ranked]):
+        console.print(line, soft_wrap=True)
+
+
+def _report(checked: Checked, others: list[float]) -> list[str]:
+    """What is said of a submission, line by line."""
+    card, standing, tape = checked.card, checked.standing, checked.tape
+    interval = standing.interval
+    within = f", 95 % interval {interval[0]:.1f} to {interval[1]:.1f}" if interval else ""
+    lines = [
+        f"{card.name} by {', '.join(card.authors)} ({card.licence})",
+        f"Learnt from: {card.learnt_from}",
+        f"Change of sigma: {standing.change:+.1f} %{within}; its tape: {tape.change:+.1f} %",
+        f"Worst: {standing.worst:+.1f} %, {standing.worst_at}; ahead of passive in {standing.improved:.0%} "
+        "of passes",
+    ]
+    if checked.requirements:
+        lines.append(f"It requires: {', '.join(checked.requirements)}")
+    if standing.disqualified:
+        return [*lines, f"It would not be ranked: {standing.disqualified}."]
+    place = 1 + sum(other < standing.change for other in others)
+    return [*lines, f"It would be ranked{f', at place {place} of {len(others) + 1}' if others else ''}."]

@@ -7,25 +7,28 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import isfinite
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
-from .controls import TAPE, control_of
-from .intervals import (
-    Array,
+from panto_env.base.arrays import Array
+
+from .settings import REFERENCE, TAPE, Number, control_of
+from .single_pass import Row
+from .statistics import (
+    ADVICE,
+    MOVED,
+    Cell,
     Clusters,
     Interval,
     Share,
     interquartile_mean,
     interval_for_lines,
     interval_of_mean,
+    relative_changes,
     share_of,
     worst_quarter,
 )
-from .settings import REFERENCE
-from .single_pass import Row
-from .statistics import ADVICE, MOVED, Cell, LineAtSpeed, relative_changes
 
 MOVED_PASSES = 1 / 3
 """Share of a track's passes from which on a policy is disqualified for moving the mean by over ``MOVED``.
@@ -44,26 +47,26 @@ class Standing:
     """Overall result of one policy on a track, or of one method over its trainings."""
 
     policy: str  # or the method's name
-    change: float  # of sigma from the passive one at the same mean force, interquartile mean of passes (%)
+    change: Number  # of sigma from the passive one at the same mean force, interquartile mean of passes (%)
     interval: Interval | None  # 95 % interval of ``change``; None: see interval_of_mean
     interval_for_lines: Interval | None  # 95 % interval for other lines; None with fewer than three
-    worst_quarter: float  # the same change, mean of the quarter of passes where it is largest (%)
-    worst: float  # maximum change of any cell (%)
+    worst_quarter: Number  # the same change, mean of the quarter of passes where it is largest (%)
+    worst: Number  # maximum change of any cell (%)
     worst_at: str  # line and speed of that cell
-    improved: float  # share of passes with a smaller sigma than the passive one at the same mean force
-    contact_loss: float  # CL, mean over cells (%)
-    cost_change: float  # of CF from the passive one at the same mean force, mean over cells (%)
-    effort: float  # rms actuator force, mean over cells (N)
-    power: float  # mechanical power, mean over cells (W)
-    saturation: float  # share of control steps at the actuator's limit, mean over cells
+    improved: Number  # share of passes with a smaller sigma than the passive one at the same mean force
+    contact_loss: Number  # CL, mean over cells (%)
+    cost_change: Number  # of CF from the passive one at the same mean force, mean over cells (%)
+    effort: Number  # rms actuator force, mean over cells (N)
+    power: Number  # mechanical power, mean over cells (W)
+    saturation: Number  # share of control steps at the actuator's limit, mean over cells
     oracle_share: float | None  # share of the stored oracles' gain, mean over cells; None if one is missing
     passes: int
     moved: int  # passes whose mean force the policy moves by more than 1.5 %
-    most_moved: float  # change of the mean force in the pass where it is largest (%)
+    most_moved: Number  # change of the mean force in the pass where it is largest (%)
     disqualified: str  # the reason, or "" if the policy qualifies in every cell
     rank: int | None = None  # by ``change``, from 1; a training has none, its method has
     better_than: Mapping[str, Share] = field(default_factory=dict)  # by other policy: see standings
-    trainings: Mapping[str, float] = field(default_factory=dict)  # of a method: ``change`` of each (%)
+    trainings: Mapping[str, Number] = field(default_factory=dict)  # of a method: ``change`` of each (%)
 
 
 def standings(
@@ -83,8 +86,8 @@ def standings(
     own_cells: dict[str, list[Cell]] = {}
     for cell in cells:
         own_cells.setdefault(cell.policy, []).append(cell)
-    places = [_place(cell) for cell in own_cells[REFERENCE]]
-    everywhere = [name for name, own in own_cells.items() if [_place(cell) for cell in own] == places]
+    places = [cell.place for cell in own_cells[REFERENCE]]
+    everywhere = [name for name, own in own_cells.items() if [cell.place for cell in own] == places]
     clusters = _clusters(own_rows[REFERENCE])
     changes = {name: relative_changes(own_rows[name])[None] for name in everywhere}
     found = {name: _standing(name, own_cells[name], changes[name][0], clusters) for name in everywhere}
@@ -106,23 +109,7 @@ def standings(
     return tuple(found.values())
 
 
-class Ranked(Protocol):
-    """What a standing has, also one that was read from a file."""
-
-    @property
-    def policy(self) -> str:
-        """The policy's name."""
-
-    @property
-    def change(self) -> float:
-        """Change of sigma over all passes (%)."""
-
-    @property
-    def rank(self) -> int | None:
-        """From 1; None if it is not ranked."""
-
-
-def without_feedback(found: Sequence[Ranked]) -> str:
+def without_feedback(found: Sequence[Standing]) -> str:
     """Words for a track's heading if a tape is within ``NEAR`` of the best policy or better; else ""."""
     policies = [each for each in found if each.rank is not None and not control_of(each.policy)]
     tapes = [each for each in found if control_of(each.policy) == TAPE and isfinite(each.change)]
@@ -134,19 +121,15 @@ def without_feedback(found: Sequence[Ranked]) -> str:
     return f"needs no feedback: {tape.policy} {tape.change:.1f} %, {best.policy} {best.change:.1f} %"
 
 
-def with_feedback(title: str, found: Sequence[Ranked]) -> str:
+def with_feedback(title: str, found: Sequence[Standing]) -> str:
     """A title, and that a tape is nearly as good as the best policy where it is."""
     return "; ".join(filter(None, (title, without_feedback(found))))
 
 
-def next_in_ranking(found: Sequence[Ranked]) -> dict[str, str]:
+def next_in_ranking(found: Sequence[Standing]) -> dict[str, str]:
     """The policy that is ranked next after each one."""
     ranked = sorted((each for each in found if each.rank is not None), key=lambda each: each.rank or 0)
     return {one.policy: after.policy for one, after in pairwise(ranked)}
-
-
-def _place(one: Cell) -> LineAtSpeed:
-    return LineAtSpeed(one.catenary, one.pantograph, one.speed_kmh)
 
 
 def _clusters(rows: Sequence[Row]) -> Clusters:
@@ -186,32 +169,21 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
 
 def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clusters: Clusters) -> Standing:
     """changes: relative changes of sigma, (trainings, passes)."""
-
-    def mean(name: str) -> float:
-        return float(np.mean([getattr(each, name) for each in trainings]))
-
-    worst = max(trainings, key=lambda each: -np.inf if np.isnan(each.worst) else each.worst)
+    names = ["change", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"]
+    names += ["saturation"] if trainings[0].oracle_share is None else ["saturation", "oracle_share"]
+    means: dict[str, Any] = {n: float(np.mean([getattr(each, n) for each in trainings])) for n in names}
     out = next((each for each in trainings if each.disqualified), None)
-    return Standing(
+    return replace(
+        max(trainings, key=lambda each: -np.inf if np.isnan(each.worst) else each.worst),
         policy=method,
-        change=mean("change"),
         interval=interval_of_mean(100 * changes, clusters),
         interval_for_lines=interval_for_lines(100 * changes, clusters),
-        worst_quarter=mean("worst_quarter"),
-        worst=worst.worst,
-        worst_at=worst.worst_at,
-        improved=mean("improved"),
-        contact_loss=mean("contact_loss"),
-        cost_change=mean("cost_change"),
-        effort=mean("effort"),
-        power=mean("power"),
-        saturation=mean("saturation"),
-        oracle_share=None if trainings[0].oracle_share is None else mean("oracle_share"),
         passes=sum(each.passes for each in trainings),
         moved=sum(each.moved for each in trainings),
         most_moved=max((each.most_moved for each in trainings), key=_size),
         disqualified=f"{out.policy}: {out.disqualified}" if out else "",
         trainings={each.policy: each.change for each in trainings},
+        **means,
     )
 
 

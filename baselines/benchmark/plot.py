@@ -6,18 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports
-from panto_env.base import marks
-from panto_env.base.colours import LIMIT, series_colour
-from panto_env.base.units import from_kmh
-from panto_env.metrics import en50367
-from panto_env.metrics.labels import LABELS
+from panto_env.analysis.plots import mark_supports_of_run
+from panto_env.base import plotting as marks
+from panto_env.base.arrays import from_kmh
+from panto_env.base.plotting import LIMIT, series_colour
+from panto_env.metrics import compliance as en50367
+from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
-from panto_env.metrics.spans import in_words
 
-from .actions import Played
 from .run import Benchmark
-from .settings import Line
 from .single_pass import drive
 from .statistics import Cell
 
@@ -44,7 +41,7 @@ def plot(outcome: Benchmark) -> Figure:
         above, below = part.subfigures(2, 1)
         forces, (sigmas, changes) = above.subplots(), below.subplots(1, 2)
         _forces(forces, outcome, k, colours)
-        cells = _cells_of(outcome, line)
+        cells = [each for each in outcome.cells if each.place[:2] == (line.catenary, line.pantograph)]
         _sigmas(sigmas, cells, colours)
         _changes(changes, cells, colours)
         where = f"pantograph {line.pantograph}, line {line.catenary}"
@@ -54,36 +51,27 @@ def plot(outcome: Benchmark) -> Figure:
     return figure
 
 
-def _cells_of(outcome: Benchmark, line: Line) -> list[Cell]:
-    names = (line.catenary, line.pantograph)
-    return [cell for cell in outcome.cells if (cell.catenary, cell.pantograph) == names]
-
-
-def _played(outcome: Benchmark, line: Line, policy: str, speed_kmh: float, seed: int) -> Played:
-    """What a policy did in a pass."""
-    wanted = (policy, line.catenary, line.pantograph, speed_kmh, seed)
-    return next(
-        played
-        for row, played in zip(outcome.rows, outcome.played, strict=True)
-        if (row.policy, row.catenary, row.pantograph, row.speed_kmh, row.seed) == wanted
-    )
-
-
-def _forces(axes: Axes, outcome: Benchmark, place: int, colours: dict[str, str]) -> None:
-    settings, line = outcome.settings, outcome.settings.lines[place]
+def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> None:
+    settings, line = outcome.settings, outcome.settings.lines[k]
     speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
-    first, last = outcome.spans[place]
+    first, last = outcome.spans[k]
     shown = max(first, last - 1), last
+    rows = zip(outcome.rows, outcome.played, strict=True)
+    place = (line.catenary, line.pantograph, speed, seed)
+    actions = {
+        row.policy: played
+        for row, played in rows
+        if (row.catenary, row.pantograph, row.speed_kmh, row.seed) == place
+    }
     for policy, colour in colours.items():
-        played = _played(outcome, line, policy, speed, seed)
-        run, _ = drive(settings, line, policy, speed, seed, played)
+        run, _ = drive(settings, line, policy, speed, seed, actions[policy])
         inside = run.alignment.within(run.position, shown)
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
     limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
     marks.fit_force_axis([axes], limit, en50367.maximum_source(run.line.system))
-    mark_supports(axes, run)
+    mark_supports_of_run(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
         xlabel=marks.POSITION,
@@ -116,7 +104,8 @@ def _changes(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
             x = cell.speed_kmh + apart * (k - (len(colours) - 1) / 2)
             low, high = cell.interval or (cell.change, cell.change)
             axes.plot([x, x], [low, high], color=colour, linewidth=1.6)
-            axes.plot(x, cell.change, "o", color=colour, markerfacecolor=_fill(cell, colour), markersize=5)
+            fill = "white" if cell.disqualified else colour
+            axes.plot(x, cell.change, "o", color=colour, markerfacecolor=fill, markersize=5)
     axes.axhline(0.0, color="0.4", linewidth=0.9)
     axes.set(
         title="against a passive pantograph of the same mean force",
@@ -124,10 +113,6 @@ def _changes(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
         ylabel="change of σ (%), and its 95 % interval",
         xticks=speeds,
     )
-
-
-def _fill(cell: Cell, colour: str) -> str:
-    return "white" if cell.disqualified else colour
 
 
 def _by_speed(cells: list[Cell], policy: str) -> list[Cell]:

@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from panto_env.metrics.labels import LABELS, Label
+from panto_env.metrics.figures import LABELS, Label
 from panto_env.terminal import number
 
 from .overall import next_in_ranking, with_feedback

@@ -16,8 +16,7 @@ from panto_env.cluster import spread
 from panto_env.envs import IDS
 from panto_env.policies import errors_name, find_policy, wishes
 
-from .controls import control_of
-from .settings import Line
+from .settings import Line, control_of
 
 INGREDIENTS: dict[str, dict[str, Any]] = {
     "all": {},

@@ -9,30 +9,33 @@ from pathlib import Path
 from typing import Any
 
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
-from panto_env.base.checksums import write_checked
+from panto_env.base.checksums import __version__, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import check_output, finite
 from panto_env.base.machine import cores
-from panto_env.base.table_file import TABLES, write_rows
-from panto_env.base.version import __version__
+from panto_env.base.table import TABLES, write_rows
 from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.lines import fewest_spans, on_example
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.labels import HEADINGS
-from panto_env.metrics.spans import FIRST_SETTLED
+from panto_env.metrics.figures import FIRST_SETTLED, HEADINGS
 from panto_env.plant.catenary.schema import CLEAR
 
 from ..oracle.stored import stored_changes
 from . import actions, apart
-from .actions import Played
-from .controls import ORACLE_TAPE, control_of, policy_of
+from .actions import Played, Trace
 from .overall import Standing, standings
-from .seeds import salt_hash
-from .settings import BenchmarkSettings, Line
+from .settings import (
+    ORACLE_TAPE,
+    BenchmarkSettings,
+    Line,
+    LineAtSpeed,
+    control_of,
+    policy_of,
+    salt_hash,
+)
 from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
-from .statistics import Cell, LineAtSpeed, compare
-from .trace import Trace
+from .statistics import Cell, compare
 
 SUFFIXES = (".json", *TABLES)
 """Suffixes of the files that an outcome can be saved to."""
@@ -176,9 +179,9 @@ def stored_bounds(
     found = {}
     for line, covered in zip(settings.lines, spans, strict=True):
         for speed in line.speeds_kmh:
-            changes = stored_changes(along(settings, line) | {"speed_kmh": speed}, covered)
-            found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
-    return {place: changes for place, changes in found.items() if changes}
+            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered):
+                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
+    return found
 
 
 def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:

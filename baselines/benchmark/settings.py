@@ -1,19 +1,30 @@
-"""Settings of a benchmark, from keywords or a TOML file."""
+"""Settings of a benchmark, its seeds and its controls.
+
+Controls of a benchmark: a policy without its observations, and a record of its actions without the policy.
+
+"blind of pd" is the policy given its first observation at every step; "tape of pd" plays back the actions
+that it took on another line, drawn under another seed, and "tape of oracle" those of the stored oracle. If a
+control scores as well as the policy itself, the benchmark does not need feedback.
+"""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterable
 from itertools import chain
+from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from panto_configs import find
-from panto_env.base.errors import InputError
+from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
-from panto_env.base.ranges import Between
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.base.shown import shown
+from panto_env.control.observation import Context
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,
@@ -21,26 +32,124 @@ from panto_env.control.settings import (
     default,
     description,
 )
-from panto_env.plant.actuators import ActuatorSettings, actuator_settings
-from panto_env.plant.catenary.schema import MOST_SPANS
-from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
+from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SensorSettings, sensor_settings
-from panto_env.policies import check_named
+from panto_env.policies import Policy, check_named, wishes
 
-from ..line import LineAndTrain, as_clause, distinct
-from .controls import policy_of
-from .seeds import TEST, check_seeds, salted_seed
+from ..line import Actuator, Condition, LineAndTrain, Span, as_clause, distinct
 
-_Span = Annotated[int, Between(1, MOST_SPANS)]
+Number = Annotated[
+    float,
+    BeforeValidator(lambda value: nan if value is None else value),
+    AfterValidator(lambda value: value if isfinite(value) else nan),
+]
+"""A figure; nan if there is none, which is null in JSON."""
+
+
+class LineAtSpeed(NamedTuple):
+    """A line, the pantograph on it, and its speed (km/h)."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+
+
+TEST = range(1000)
+SELECTION = range(1000, 2000)
+TRAINING = range(2000, 1_000_000)
+# Above the seeds under which the benchmark records its tapes (``controls.OTHER_SEED``).
+DATA = range(2_000_000, 3_000_000)
+Purpose = Literal["test", "selection", "training", "data"]
+SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING, "data": DATA}
+"""Ranges of seeds by purpose, disjoint: a seed draws a line, its pantograph and all noise."""
+
+SALTED = range(2**52, 2**53)
+"""Test seeds made with a salt: so many that nobody can try them all, and each an exact number in JSON."""
+
+
+def check_seeds(seeds: Iterable[int], purpose: Purpose) -> None:
+    """Raise InputError for a seed that is reserved for another purpose."""
+    own = SEEDS[purpose]
+    wrong = next((seed for seed in seeds if seed not in own), None)
+    if wrong is not None:
+        raise InputError(
+            f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {wrong}: a policy must be trained, "
+            "selected and judged on different seeds."
+        )
+
+
+def salted_seed(salt: str, number: int) -> int:
+    """The test seed that a salt makes of a number.
+
+    These are the first 8 bytes of the SHA-256 of "salt:number", modulo the size of their range.
+    """
+    digest = hashlib.sha256(f"{salt}:{number}".encode()).digest()
+    return SALTED.start + int.from_bytes(digest[:8], "big") % (SALTED.stop - SALTED.start)
+
+
+def salt_hash(salt: str) -> str:
+    """SHA-256 of a salt, which may be published before the salt itself: `printf %s SALT | sha256sum`."""
+    return hashlib.sha256(salt.encode()).hexdigest()
+
+
+Array = NDArray[np.float64]
+BLIND, TAPE = "blind of ", "tape of "
+ORACLE_TAPE = TAPE + "oracle"
+OTHER_SEED = 1_000_003
+"""Added to the seed of a pass, so that a tape is recorded on a different line."""
+
+
+def control_of(name: Any) -> str:
+    """Kind of control that a policy's name stands for, BLIND or TAPE; "" for a policy itself."""
+    return next((kind for kind in (BLIND, TAPE) if isinstance(name, str) and name.startswith(kind)), "")
+
+
+def policy_of(name: Any) -> Any:
+    """Name of the policy behind a control; the name itself if it is not a control's."""
+    return name[len(control_of(name)) :] if control_of(name) else name
+
+
+class Blind:
+    """A policy that only ever sees the first observation of its episode."""
+
+    def __init__(self, policy: Policy) -> None:
+        """policy: the policy that gets the first observation at every step."""
+        self._policy = policy
+        vars(self).update(wishes(policy))
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._first: NDArray[np.float32] | None = None
+        self._policy.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> Array:
+        """Action of the policy, (actions,), for the first observation of the episode."""
+        if self._first is None:
+            self._first = observation.copy()
+        return self._policy.act(self._first.copy())
+
+
+class Tape:
+    """Plays back recorded actions, (control steps, actions); zeros after the last one."""
+
+    def __init__(self, actions: Array, washout: float = 0.0) -> None:
+        """actions: in the order of the control steps, each in -1..1. washout: see ``Policy``."""
+        self._actions, self.washout = actions, washout
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode."""
+        self._step = 0
+
+    def act(self, observation: NDArray[np.float32]) -> Array:
+        """The next action, (actions,)."""
+        step, self._step = self._step, self._step + 1
+        return self._actions[step] if step < len(self._actions) else np.zeros_like(self._actions[0])
+
+
 REFERENCE = "passive"
 """The policy that every other one is compared with."""
 
 
-def _condition(value: Any) -> LineCondition:
-    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
-
-
-_Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
 _Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(as_clause(sensor_settings))]]
 
 
@@ -52,7 +161,7 @@ class Line(LineAndTrain):
     """
 
     distance: Positive | None = Field(None, description="of a run (m); to the end of the line by default")
-    spans: tuple[_Span, _Span] | None = Field(
+    spans: tuple[Span, Span] | None = Field(
         None,
         description="first and last span that the figures cover, counted from 1; by default from the "
         "tenth, where the start has died out, to the last one that every run covers completely",
@@ -100,11 +209,11 @@ class BenchmarkSettings(Settings):
         description="whether installed policies run in the process of the plant instead of apart from it; "
         "those from a file never do",
     )
-    actuator: _Actuator = Field(
+    actuator: Actuator = Field(
         default("actuator"), validate_default=True, description=description("actuator")
     )
     sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
-    line_condition: Annotated[LineCondition, BeforeValidator(as_clause(_condition))] = Field(
+    line_condition: Condition = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
     pantograph_scatter: PantographScatter = Field(
@@ -164,10 +273,6 @@ class BenchmarkSettings(Settings):
     @model_validator(mode="after")
     def _with_distinct_names(self) -> Self:
         distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
-        return self
-
-    @model_validator(mode="after")
-    def _without_repeated_line(self) -> Self:
         # Rows and cells tell lines apart by these.
         distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
         return self

@@ -1,4 +1,4 @@
-"""One pass of a benchmark: a policy on a line at a speed under a seed."""
+"""The passive pantograph that a policy is compared with: one at the policy's own mean contact force."""
 
 from __future__ import annotations
 
@@ -14,22 +14,63 @@ from numpy.typing import NDArray
 from panto_env import Trajectory, simulate
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.context import Context
 from panto_env.control.entries import FULL as NOT_MEASURED
+from panto_env.control.observation import Context
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import Figures
 from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
 from ..oracle.stored import stored_actions
-from .actions import Played
+from .actions import Played, Trace, trace
 from .apart import find_apart
-from .controls import BLIND, ORACLE_TAPE, OTHER_SEED, TAPE, Blind, Tape, control_of, policy_of
-from .same_mean import NONE, PassiveFigures, passive_at_mean_of
-from .settings import REFERENCE, BenchmarkSettings, Line
-from .trace import Trace, trace
+from .settings import (
+    BLIND,
+    ORACLE_TAPE,
+    OTHER_SEED,
+    REFERENCE,
+    TAPE,
+    BenchmarkSettings,
+    Blind,
+    Line,
+    Tape,
+    control_of,
+    policy_of,
+)
 
 Array = NDArray[np.float64]
+
+
+class PassiveFigures(NamedTuple):
+    """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
+
+    std: float  # sigma (N)
+    cost_function: float  # CF (N m)
+
+
+NONE = PassiveFigures(float("nan"), float("nan"))
+
+
+def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
+    """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
+
+    Of a train each has the mean force that it had, and the figures are those of the controlled one
+    whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
+    policy.
+    """
+    means = [own.summary(spans).mean for own in run.train]
+    if not min(means) > 0:
+        return NONE
+    try:
+        mean = means if len(means) > 1 else means[0]
+        passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
+    except InputError:  # no static force gives this mean
+        return NONE
+    if passive.terminated:
+        return NONE
+    worst = passive.worst_controlled(spans).summary(spans)
+    return PassiveFigures(worst.std, worst.cost_function)
+
 
 FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
@@ -109,8 +150,11 @@ def run_pass(
     Raises InputError, naming the policy, if the policy fails.
     """
     first, recorders = _record(settings, line, policy, speed_kmh, seed, played)
-    number = 0 if first.terminated else judged(first, line, spans)
-    run, recorder = first.train[line.controlled[number] - 1], recorders[number]
+    # Of several controlled pantographs the one with the largest sigma is judged.
+    controlled = [first.train[number - 1] for number in line.controlled]
+    run = first.worst_controlled(spans)
+    recorder = next(each for each, own in zip(recorders, controlled, strict=True) if own is run)
+    several = controlled if len(controlled) > 1 else []
     figures, at_same_mean = Figures.none(), NONE
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
@@ -139,7 +183,9 @@ def run_pass(
         power=watts,
         pressed_std=at_same_mean.std,
         pressed_cost_function=at_same_mean.cost_function,
-        controlled_means=_controlled_means(first, line, spans) if len(line.controlled) > 1 else (),
+        controlled_means=tuple(
+            float("nan") if first.terminated else own.summary(spans).mean for own in several
+        ),
     )
     kept = traced and not run.terminated
     return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)
@@ -159,19 +205,6 @@ def drive(
     """
     run, recorders = _record(settings, line, policy, speed_kmh, seed, played)
     return run.controlled, recorders[0].forces()
-
-
-def _controlled_means(run: Trajectory, line: Line, spans: tuple[int, int]) -> tuple[float, ...]:
-    """Mean force of each controlled pantograph (N); nan if the run ended early."""
-    if run.terminated:
-        return len(line.controlled) * (float("nan"),)
-    return tuple(run.train[number - 1].summary(spans).mean for number in line.controlled)
-
-
-def judged(run: Trajectory, line: Line, spans: tuple[int, int]) -> int:
-    """Which of the controlled pantographs is judged, from 0: that with the largest sigma."""
-    worst = run.worst_controlled(spans)
-    return next(agent for agent, number in enumerate(line.controlled) if run.train[number - 1] is worst)
 
 
 def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: float) -> Array:

@@ -1,22 +1,104 @@
-"""A submission: a folder with a policy, what it requires, and a card that says what it is."""
+"""A result played again from the actions that it keeps: its rows must follow from them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field, field_validator
 
 from panto_env.analysis.pool import Progress
+from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import read_toml
+from panto_env.base.files import finite, read_toml
 from panto_env.base.settings import Settings, parse
+from panto_env.cluster import spread
 
-from .controls import TAPE
+from . import actions
 from .overall import Standing
-from .run import Benchmark, run
-from .settings import REFERENCE, BenchmarkSettings
+from .run import Benchmark, outcome_of, passes_of, run
+from .settings import REFERENCE, TAPE, BenchmarkSettings
+from .single_pass import run_pass
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A row of a result, and how far the pass that was played again differs from it."""
+
+    row: Mapping[str, Any]
+    difference: float  # maximum over its numbers, relative; 0 is bit for bit, infinite another kind of value
+
+
+@dataclass(frozen=True)
+class Replay:
+    """All rows that were played again."""
+
+    rows: tuple[Replayed, ...]
+    follows: bool | None  # whether cells and standings follow from the rows; None if not all are bit for bit
+
+
+def replay(
+    result: str | Path,
+    policies: Collection[str] = (),
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Replay:
+    """Play the passes of a result again, by default those of all its policies.
+
+    No policy runs: the plant gets the actions that are kept beside the result. On the same kind of machine
+    everything is the same bit for bit; other processors round differently. Raises InputError for a damaged
+    result, one without its actions, and a policy that is not in it.
+    """
+    table = read_checked(result)
+    try:
+        settings = parse(BenchmarkSettings, table["settings"], str(result))
+        spans = tuple((int(first), int(last)) for first, last in table["spans"])
+        rows, expected = table["rows"], table["actions_sha256"]
+        passes = list(passes_of(settings, spans))
+        kept = actions.read(actions.beside(result), expected)
+        named = [row["policy"] for row in rows]
+        learnt = tuple(table.get("learnt", ()))
+    except (LookupError, TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{result} is no result of `panto benchmark --output RESULT.json`.") from error
+    if not len(rows) == len(passes) == len(kept):
+        raise InputError(
+            f"{result} has {len(rows)} rows and the actions of {len(kept)} passes; make it again."
+        )
+    unknown = next((policy for policy in policies if policy not in named), None)
+    if unknown is not None:
+        raise InputError(f"{result} has no policy '{unknown}': it has {', '.join(dict.fromkeys(named))}.")
+    chosen = [k for k, policy in enumerate(named) if not policies or policy in policies]
+    first = settings.drawn_seeds[0]
+    jobs = [
+        partial(run_pass, settings, *passes[k], traced=passes[k][-1] == first, played=kept[k]) for k in chosen
+    ]
+    again = spread(jobs, workers=workers, progress=progress)
+    replayed = tuple(
+        Replayed(rows[k], _difference(rows[k], finite(each.row.as_dict())))
+        for k, each in zip(chosen, again, strict=True)
+    )
+    follows = None
+    if len(again) == len(rows) and not any(each.difference for each in replayed):
+        outcome = outcome_of(settings, spans, again, learnt).as_dict()
+        follows = all(table[part] == outcome[part] for part in ("standings", "cells", "traces"))
+    return Replay(replayed, follows)
+
+
+def _difference(stored: Mapping[str, Any], again: Mapping[str, Any]) -> float:
+    """Maximum relative difference of two rows; infinite where they differ in more than finite numbers."""
+    if stored.keys() != again.keys():
+        return math.inf
+    pairs = [(stored[name], again[name]) for name in again if stored[name] != again[name]]
+    if not all(isinstance(value, float) for pair in pairs for value in pair):
+        return math.inf
+    return max((abs(one - other) / max(abs(one), abs(other)) for one, other in pairs), default=0.0)
+
 
 CARD, REQUIREMENTS = "card.toml", "requirements.txt"
 """Files of a submission: its card, which it must have, and packages that its policy requires."""
@@ -52,30 +134,16 @@ class Checked:
     """A submission as a benchmark sees it."""
 
     card: Card
-    policy: str  # as the benchmark calls it
     requirements: tuple[str, ...]
     outcome: Benchmark
-
-    @property
-    def standing(self) -> Standing:
-        """Its result over all lines, speeds and seeds."""
-        return self.standing_of(self.policy)
-
-    @property
-    def tape(self) -> Standing:
-        """Result of its own actions, played on other lines: what it reaches without feedback."""
-        return self.standing_of(f"{TAPE}{self.policy}")
-
-    def standing_of(self, policy: str) -> Standing:
-        """Result of a policy over all lines, speeds and seeds."""
-        return next(each for each in self.outcome.standings if each.policy == policy)
+    standing: Standing  # its result over all lines, speeds and seeds
+    tape: Standing  # that of its own actions, played on other lines: what it reaches without feedback
 
 
 def read_submission(folder: str | Path) -> tuple[Card, str, tuple[str, ...]]:
     """Card, policy and requirements of a submission; nothing of it has run.
 
-    Raises InputError, naming file and key, where it is not whole, has characters that control a terminal, or
-    a link that leaves the folder.
+    Raises InputError, naming file and key, where it is not whole.
     """
     path, required = Path(folder) / CARD, Path(folder) / REQUIREMENTS
     card = parse(Card, read_toml(path), str(path))
@@ -83,16 +151,10 @@ def read_submission(folder: str | Path) -> tuple[Card, str, tuple[str, ...]]:
     source = Path(folder) / file
     if not source.is_file():
         raise InputError(f"{path} names the policy '{card.policy}', but there is no file {source}.")
-    for each in (path, source, required):
-        if not each.resolve().is_relative_to(Path(folder).resolve()):
-            raise InputError(f"{each} is a link that leaves the folder; put the file itself there.")
     try:
         requirements = tuple(required.read_text("utf-8").split()) if required.exists() else ()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{required} could not be read: write it as text in UTF-8.") from error
-    words = " ".join((*requirements, *card.authors, *(str(value) for key, value in card if key != "authors")))
-    if not all(each.isprintable() or each in "\n\t" for each in words):
-        raise InputError(f"{folder}: card and requirements may hold printable characters only.")
     return card, ":".join((str(source), *rest)), requirements
 
 
@@ -111,10 +173,6 @@ def check(
     lines = tuple(line.model_copy(update={"policies": ()}) for line in settings.lines)
     policies = (REFERENCE, policy, f"{TAPE}{policy}")
     changes = {"policies": policies, "lines": lines, "trainings": {}, "trusted": False}
-    judged = settings.model_copy(update=changes)
-    return Checked(card, policy, requirements, run(judged, workers, progress))
-
-
-def place_among(change: float, others: Sequence[float]) -> int:
-    """Rank, from 1, of a change of sigma (%) among those of other policies that are ranked."""
-    return 1 + sum(other < change for other in others)
+    outcome = run(settings.model_copy(update=changes), workers, progress)
+    found = {each.policy: each for each in outcome.standings}
+    return Checked(card, requirements, outcome, *(found[each] for each in policies[1:]))

@@ -39,7 +39,7 @@ def episodes(
 
     Finished work is kept: the same command continues after an interruption.
     """
-    from .make_episodes import make_episodes
+    from .make import make_episodes
     from .settings import chosen, load_episodes
 
     settings = load_episodes(config)
@@ -79,8 +79,8 @@ def designs(
 
     Finished work is kept: the same command continues after an interruption.
     """
-    from .designs_settings import load_designs
-    from .make_designs import make_designs
+    from .designs import load_designs
+    from .make import make_designs
 
     settings = load_designs(config)
     if count is not None:
@@ -103,7 +103,7 @@ def verify(
     json: Json = False,
 ) -> None:
     """Check by SHA-256 that the files of data sets are undamaged."""
-    from .checksums import verify as verify_folder
+    from .make import verify as verify_folder
 
     found = verify_folder(path)
     if json:

@@ -9,14 +9,16 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from panto_env.base.array_file import read_arrays, write_arrays
+from panto_env.base.checksums import read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
-from ..benchmark.seeds import DATA
+from ..benchmark.settings import DATA
 from .settings import ENVIRONMENT, EpisodesSettings, Plan
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
@@ -35,9 +37,7 @@ class Episode(NamedTuple):
     rewards: NDArray[np.float64]  # (n,)
     terminations: NDArray[np.bool_]  # (n,)
     truncations: NDArray[np.bool_]  # (n,)
-    infos: dict[
-        str, NDArray[np.float64]
-    ]  # (n + 1,): INFOS, "reward_terms/...", "policy_action" (n + 1, actions)
+    infos: dict[str, NDArray[np.float64]]  # (n + 1, ...): INFOS, "reward_terms/...", "policy_action"
     figures: dict[str, float]  # of the whole episode, from the environment's info
 
 
@@ -45,9 +45,7 @@ class Beginning(NamedTuple):
     """The start of an episode."""
 
     policy: Policy
-    twin: (
-        gymnasium.Env[Any, Any] | None
-    )  # gives the policy the observation that it requests; None: it sees the recorded one
+    twin: gymnasium.Env[Any, Any] | None  # gives the policy its observation; None: it sees the recorded one
     observation: NDArray[np.float32]  # recorded observation
     seen: NDArray[np.float32]  # observation that the policy sees
     info: dict[str, Any]
@@ -131,7 +129,9 @@ class Stage:
         steps: list[tuple[Any, ...]] = []
         ended = False
         while not ended:
-            policy_action = _action(policy, plan.policy, seen, shape)
+            with errors_name(plan.policy, "act"):
+                action = checked_action(policy.act(seen.copy()), shape)  # a copy: the policy may keep it
+            policy_action = np.clip(action, -1.0, 1.0)
             noisy = policy_action + plan.noise * random.standard_normal(shape)
             action = np.clip(noisy, -1.0, 1.0).astype(np.float32)
             observation, reward, terminated, truncated, info = env.step(action)
@@ -154,28 +154,26 @@ class Stage:
     def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
         """Begin an episode. Raises InputError if the policy cannot begin it."""
         policy = find_policy(name)
-        self._check_washout(policy, name)
-        twin = self._twin(policy)
+        twin = self._twin(policy, name)
         observation, info = self._env.reset(seed=seed, options=options)
         seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
         with errors_name(name, "reset"):
             policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
         return Beginning(policy, twin, observation, seen, info)
 
-    def _check_washout(self, policy: Policy, name: str) -> None:
-        """Raise InputError for a policy that needs another washout: its actions would mean other forces."""
-        offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
-        needed, there = wishes(policy)["washout"], offered.washout
-        if needed != there:
-            raise InputError(
-                f"The policy '{name}' needs washout = {needed:g}, and the data set's environment has "
-                f"{there:g}; set washout = {needed:g} in its environment, or leave the policy out."
-            )
+    def _twin(self, policy: Policy, name: str) -> gymnasium.Env[Any, Any] | None:
+        """Environment with the observation that a policy requests; None if that is the recorded one.
 
-    def _twin(self, policy: Policy) -> gymnasium.Env[Any, Any] | None:
-        """Environment with the observation that a policy requests; None if that is the recorded one."""
+        Raises InputError for a policy that needs another washout: its actions would mean other forces.
+        """
         offered = self._env.unwrapped.task.settings  # type: ignore[attr-defined]
         changes = {key: value for key, value in wishes(policy).items() if value != getattr(offered, key)}
+        if "washout" in changes:
+            needed = changes["washout"]
+            raise InputError(
+                f"The policy '{name}' needs washout = {needed:g}, and the data set's environment has "
+                f"{offered.washout:g}; set washout = {needed:g} in its environment, or leave the policy out."
+            )
         key = repr(sorted(changes.items()))
         if changes and key not in self._twins:
             self._twins[key] = make(self._settings, **changes)
@@ -196,15 +194,80 @@ def _seen(
     return seen
 
 
-def _action(policy: Policy, name: str, seen: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[Any]:
-    """A policy's action for an observation, clipped to -1..1. Raises InputError if it is not valid."""
-    with errors_name(name, "act"):
-        action = checked_action(policy.act(seen.copy()), shape)  # a copy: the policy may keep it
-    clipped: NDArray[Any] = np.clip(action, -1.0, 1.0)
-    return clipped
-
-
 def _kept(info: dict[str, Any], policy_action: NDArray[Any]) -> dict[str, Any]:
     """Recorded entries of an info, as a flat table."""
     terms = {f"reward_terms/{name}": value for name, value in info["reward_terms"].items()}
     return {name: info[name] for name in INFOS} | terms | {"policy_action": policy_action}
+
+
+STEPS = "steps.parquet"
+"""Name of the table in a data set's folder."""
+PER_GROUP = 100
+"""Episodes per row group."""
+
+
+COLUMNS = {
+    "episode": "number of the episode, from 0",
+    "step": "number of the control step in its episode, from 0",
+    "policy": "policy that acted",
+    "observation": "before the step, as the environment returned it",
+    "action": "taken, noise included, as a share of the actuator's force limit",
+    "reward": "of the step",
+    "next_observation": "after the step",
+    "terminated": "whether the step ended the episode early",
+    "truncated": "whether the episode reached its distance",
+}
+"""Descriptions of the columns before the infos, which have the names of Minari's, at the step's end."""
+
+
+class StepsTable:
+    """Writes the table; a context manager."""
+
+    def __init__(self, path: Path) -> None:
+        """path: of the file to write."""
+        self._path = path
+        self._writer: pq.ParquetWriter | None = None
+        self._waiting: list[pa.Table] = []
+
+    def __enter__(self) -> StepsTable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._flush()
+        if self._writer is not None:
+            self._writer.close()
+
+    def add(self, plan: Plan, episode: Episode) -> None:
+        """Add an episode."""
+        count = len(episode.rewards)
+        values = (
+            pa.array(np.full(count, plan.number)),
+            pa.array(np.arange(count)),
+            pa.array([plan.policy] * count),
+            _column(episode.observations[:-1]),
+            _column(episode.actions),
+            pa.array(episode.rewards),
+            _column(episode.observations[1:]),
+            pa.array(episode.terminations),
+            pa.array(episode.truncations),
+        )
+        infos = {name: _column(array[1:]) for name, array in episode.infos.items()}
+        self._waiting.append(pa.table(dict(zip(COLUMNS, values, strict=True)) | infos))
+        if len(self._waiting) == PER_GROUP:
+            self._flush()
+
+    def _flush(self) -> None:
+        if not self._waiting:
+            return
+        table = pa.concat_tables(self._waiting)
+        if self._writer is None:
+            self._writer = pq.ParquetWriter(self._path, table.schema, compression="zstd")
+        self._writer.write_table(table)
+        self._waiting.clear()
+
+
+def _column(array: Any) -> Any:
+    """Arrow array of (n,) numbers, or of (n, k) as lists of k."""
+    if array.ndim == 1:
+        return pa.array(array)
+    return pa.FixedSizeListArray.from_arrays(pa.array(array.ravel()), array.shape[1])

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from panto_env.base.checksums import __version__
 from panto_env.base.errors import InputError
-from panto_env.base.version import __version__
 
 from .episodes import Episode, make
 from .settings import EpisodesSettings, Plan, PolicySet
@@ -55,12 +55,14 @@ def write_minari(
     )
     env.close()
     version = f"panto-env {made_of['version']}"
+    noises = sorted(noise for noise in policy_set.noise if noise)
+    added = f", with white noise of rms {', '.join(f'{noise:g}' for noise in noises)} on the action"
     storage.update_metadata(
         {
             "dataset_id": settings.dataset_id(policy_set),
             "minari_version": minari.__version__,
             "author": {settings.author},
-            "algorithm_name": _algorithm(policy_set),
+            "algorithm_name": " and ".join(policy_set.policies) + (added if noises else ""),
             "code_permalink": f"{version}, commit {made_of['commit']}" if made_of["commit"] else version,
             "description": description,
             "requirements": [f"panto-env=={__version__}"],
@@ -97,12 +99,6 @@ def _facts(settings: EpisodesSettings, plan: Plan, episode: Episode) -> dict[str
         "return": float(np.sum(episode.rewards)),
     }
     return facts | {f"figures/{name}": value for name, value in episode.figures.items()}
-
-
-def _algorithm(policy_set: PolicySet) -> str:
-    noises = sorted(noise for noise in policy_set.noise if noise)
-    added = f", with white noise of rms {', '.join(f'{noise:g}' for noise in noises)} on the action"
-    return " and ".join(policy_set.policies) + (added if noises else "")
 
 
 def _nested(infos: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -13,13 +12,12 @@ from pydantic import Field, field_validator, model_validator
 from panto_configs import find
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
-from panto_env.base.ranges import Between
-from panto_env.base.settings import NonNegative, Settings, parse
-from panto_env.base.shown import shown
+from panto_env.base.settings import Between, NonNegative, Settings, parse
 from panto_env.control.settings import description
 from panto_env.policies import check_named
 
-from ..benchmark.seeds import DATA
+from ..benchmark.settings import DATA
+from ..line import distinct
 
 ENVIRONMENT = "Pantograph-v0"
 """Id of the environment that episodes are recorded in."""
@@ -61,7 +59,7 @@ class PolicySet(Settings):
     @field_validator("policies", "noise")
     @classmethod
     def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return _checked_distinct(value)
+        return distinct(value)
 
 
 class Plan(NamedTuple):
@@ -91,8 +89,8 @@ class EpisodesSettings(Settings):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        _checked_distinct(tuple(each.name for each in self.sets))
-        _checked_distinct(tuple((each.catenary, each.pantograph) for each in self.places))
+        distinct(tuple(each.name for each in self.sets))
+        distinct(tuple((each.catenary, each.pantograph) for each in self.places))
         of_a_place = next((key for key in EpisodePlace.model_fields if key in self.environment), None)
         if of_a_place is not None:
             raise ValueError(f"{of_a_place} belongs into places, not into environment")
@@ -128,13 +126,6 @@ class EpisodesSettings(Settings):
     def options(self, plan: Plan) -> dict[str, Any]:
         """Options of ``reset`` for an episode: none at the first place."""
         return self.places[plan.place].options() if plan.place else {}
-
-
-def _checked_distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    twice = next((value for value, count in Counter(values).items() if count > 1), None)
-    if twice is not None:
-        raise ValueError(f"{shown(twice)} is given twice")
-    return values
 
 
 def load_episodes(path: str | Path) -> EpisodesSettings:

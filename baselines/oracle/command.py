@@ -29,8 +29,7 @@ from panto_env.terminal import (
 from ..line import OPTIONS
 
 if TYPE_CHECKING:
-    from .search import Oracle
-    from .solver import Iteration
+    from .search import Iteration, Oracle
 
 CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
 """Options that all cells have in common."""
@@ -82,8 +81,7 @@ def oracle(
     from . import report
     from .problem import Problem
     from .search import find
-    from .settings import oracle_settings
-    from .stored import as_data, cell, read, requests, save, stored_cells
+    from .stored import as_data, cell, oracle_settings, read, requests, save, stored_cells
 
     if known:
         print_table(report.stored_table(stored_cells()))

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports
-from panto_env.base import marks
-from panto_env.base.colours import BLUE
-from panto_env.base.legend import legend_above
+from panto_env.analysis.plots import mark_supports_of_run
+from panto_env.base import plotting as marks
+from panto_env.base.plotting import BLUE, legend_above
 from panto_env.base.table import Table
-from panto_env.metrics.spans import in_words
+from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.terminal import number
 
 from .search import STARTS, Oracle
-from .solver import Iteration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,21 +45,21 @@ def convergence(oracle: Oracle) -> Table:
     """Table of every iteration of every search of one pass."""
     rows, ends, passive = [], [], oracle.problem.figures
     for search in oracle.searches:
-        rows += [(search.start, *_numbers(each, passive.std)) for each in search.iterations]
+        rows += [
+            (
+                search.start,
+                str(each.number),
+                number(each.std, 3),
+                number(100 * (each.std / passive.std - 1), 2),
+                number(each.mean, 3),
+                number(100 * each.at_limits, 0),
+                number(each.step, 2),
+            )
+            for each in search.iterations
+        ]
         ends.append(len(rows) - 1)
     headings = ("start", "iteration", "σ (N)", "of passive (%)", "mean (N)", "at limits (%)", "step")
     return Table(f"{title(oracle)}: passive σ {passive.std:.3f} N", headings, rows, section_ends=tuple(ends))
-
-
-def _numbers(iteration: Iteration, passive_std: float) -> tuple[str, ...]:
-    return (
-        str(iteration.number),
-        number(iteration.std, 3),
-        number(100 * (iteration.std / passive_std - 1), 2),
-        number(iteration.mean, 3),
-        number(100 * iteration.at_limits, 0),
-        number(iteration.step, 2),
-    )
 
 
 def summary(oracles: Sequence[Oracle]) -> Table:
@@ -146,7 +144,7 @@ def plot(oracle: Oracle) -> Figure:
             actuator.plot(position, values[inside], linewidth=0.9, label=label)
     actuator.set(ylabel="actuator force (N)", xlabel=marks.POSITION)
     for axis in (force, actuator):
-        mark_supports(axis, run)
+        mark_supports_of_run(axis, run)
         axis.set_xlim(position[0], position[-1])
     for each in oracle.searches:
         search.plot(

@@ -1,21 +1,210 @@
-"""Oracle of one pass: searches from several starts; the commands of the best one are replayed."""
+"""Gauss-Newton on the knots, within the actuator's limits and at the passive run's mean force.
+
+Each iteration takes the response of the filtered force to every knot from the true plant, minimises the sum
+of squares of its linear model under the limits and the mean (a quadratic programme, solved by OSQP: Stellato
+et al., Math. Prog. Comp. 12 (2020) 637), and goes along that way as far as the true plant agrees. What
+is found is a local optimum that is reached: a bound on what control can reach, not a proof that
+there is nothing better.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from scipy.sparse import csc_matrix, eye_array, kron
 
 from panto_env import Trajectory
 from panto_env.base.arrays import Array
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
+from panto_env.base.errors import InputError, shown
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.low_pass import zero_phase_low_pass
 
-from .problem import Problem
-from .solver import Descent, Progress, descend
+from .problem import Limits, Problem
+
+SHARES = (1.0, 0.6, 0.3, 0.1)
+"""Shares of a step that are tried, all at once."""
+DAMPING = 0.1
+"""Initial weight of the step's own size, relative to the mean square of the response to one knot."""
+DAMPINGS = (0.03, 0.3, 3.0, 30.0)
+"""Factors on the last damping, tried in each iteration: for large steps the linear model is wrong."""
+MEAN_TOLERANCE = 5e-4
+"""Maximum difference of the mean force from the passive run's at the end of a search, as a share of it."""
+MEAN_WEIGHT = 2.0
+"""Weight of the mean's error (N) in the merit; a lower mean by 1 N lowers σ by a few tenths."""
+MEAN_STIFFNESS = 1e3
+"""Weight of the mean's squared error, relative to σ squared; hundredths of a newton remain."""
+WORTH, ENOUGH = 2e-2, 5e-4
+"""Relative gains of an iteration: below the first the response is measured anew; if it was new, the search
+ends below the second."""
+MOST_ITERATIONS = 20
+OSQP = {"verbose": False, "eps_abs": 1e-4, "eps_rel": 1e-4, "max_iter": 10_000}
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """State of the search after an iteration."""
+
+    number: int
+    std: float  # σ of the filtered force (N)
+    mean: float  # N
+    at_limits: float  # share of the knots at a limit of force or rate
+    step: float  # share taken of the last step
+
+
+@dataclass(frozen=True)
+class Descent:
+    """One search from one start."""
+
+    start: str
+    knots: Array  # (count, places): N
+    iterations: tuple[Iteration, ...]
+
+    @property
+    def std(self) -> float:
+        """σ reached (N)."""
+        return self.iterations[-1].std
+
+
+Progress = Callable[[str, Iteration], None]
+
+
+def descend(
+    problem: Problem,
+    start: str,
+    knots: Array,
+    *,
+    basis: Array | None = None,
+    iterations: int = MOST_ITERATIONS,
+    progress: Progress | None = None,
+) -> Descent:
+    """Search from knots, (count, places) (N), that keep the limits; start: name of these knots.
+
+    basis: (knots of all places, directions), to search only these combinations. progress: called with each
+    iteration. The merit, σ plus a weighted error of the mean, falls from iteration to iteration. If the mean
+    is not met after ``iterations``, up to as many more follow.
+    """
+    one = problem.knots.limits(problem.count)
+    # Of the knots of all actuators, (count, places), flattened row by row.
+    matrix = csc_matrix(kron(one.matrix, eye_array(problem.places)))
+    limits = Limits(matrix, np.repeat(one.low, problem.places), np.repeat(one.high, problem.places))
+    force, damping = problem.forces(knots[None])[0], DAMPING
+    found = [_iteration(problem, 0, knots, force, 0.0)]
+    if progress is not None:
+        progress(start, found[-1])
+    response, fresh = _response(problem, knots, basis), True
+    while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
+        before = merit(problem, force)
+        model = Model.of(problem, response, force, basis)
+        weights = damping * np.array(DAMPINGS)
+        best_steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
+        steps = np.array([share * step for step in best_steps for share in SHARES])
+        tried = knots + (steps if basis is None else steps @ basis.T).reshape(-1, *knots.shape)
+        forces = problem.forces(tried)
+        merits = [merit(problem, each) for each in forces]
+        best = int(np.argmin(merits))
+        share = SHARES[best % len(SHARES)] if merits[best] < before else 0.0
+        if share > 0:
+            change = (forces[best] - force)[:: problem.every]
+            response = corrected(response, steps[best], change)
+            knots, force = tried[best], forces[best]
+            damping = weights[best // len(SHARES)]
+        else:
+            damping = weights[-1]
+        found.append(_iteration(problem, len(found), knots, force, share))
+        if progress is not None:
+            progress(start, found[-1])
+        gain = (before - merit(problem, force)) / before
+        if gain < ENOUGH and fresh and _mean_met(problem, force):
+            break
+        fresh = gain < WORTH
+        if fresh:
+            response = _response(problem, knots, basis)
+    return Descent(start, knots, tuple(found))
+
+
+def _response(problem: Problem, knots: Array, basis: Array | None) -> Array:
+    return problem.response(knots) if basis is None else problem.response_along(knots, basis)
+
+
+def merit(problem: Problem, force: Array) -> float:
+    """Merit (N), to minimise: σ of a filtered force, (samples,), plus the weighted error of its mean."""
+    return float(force.std() + MEAN_WEIGHT * abs(force.mean() - problem.figures.mean))
+
+
+def _mean_met(problem: Problem, force: Array) -> bool:
+    """Whether the mean of a filtered force, (samples,) (N), is that of the passive run."""
+    required = problem.figures.mean
+    return abs(float(force.mean()) - required) <= MEAN_TOLERANCE * required
+
+
+class Model(NamedTuple):
+    """Quadratic model of a step: squares of the filtered force about its mean, and of the mean's error."""
+
+    square: Array  # (directions, directions)
+    slope: Array  # (directions,)
+    size: float  # of ``square``: mean of its diagonal
+    basis: Array | None
+
+    @classmethod
+    def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
+        """Model about the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
+        rest = force[:: problem.every]
+        mean = response.mean(axis=0)
+        stiffness = MEAN_STIFFNESS * len(rest)
+        missing = problem.figures.mean - float(force.mean())
+        about_mean = response - mean
+        square = about_mean.T @ about_mean
+        size = float(np.trace(square)) / len(square)
+        square += stiffness * np.outer(mean, mean)
+        slope = about_mean.T @ (rest - rest.mean()) - stiffness * missing * mean
+        return cls(square, slope, size, basis)
+
+    def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
+        """Best step along each direction (N) within the limits; damping: see ``DAMPING``.
+
+        knots: the present knots, flat (N). Without a basis each direction is a knot.
+        Raises InputError if OSQP finds no step.
+        """
+        now = limits.matrix @ knots
+        matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
+        square = self.square + damping * self.size * np.eye(len(self.square))
+        scale = 1.0 / float(np.diag(square).max())
+        solver = quadratic_solver()
+        quadratic = csc_matrix(np.triu(scale * square))
+        solver.setup(quadratic, scale * self.slope, matrix, limits.low - now, limits.high - now, **OSQP)
+        answer = solver.solve(raise_error=False)
+        if answer.x is None or not np.isfinite(answer.x).all():
+            raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
+        return np.asarray(answer.x)
+
+
+def corrected(response: Array, step: Array, change: Array) -> Array:
+    """The response with the smallest correction that gives the change, (rows,), of a step, (directions,) (N).
+
+    Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
+    """
+    return np.asarray(response + np.outer(change - response @ step, step) / (step @ step))
+
+
+def quadratic_solver() -> Any:
+    """A solver of OSQP. Raises InputError if OSQP, an extra, is not installed."""
+    try:
+        import osqp
+    except ImportError as error:
+        raise InputError(
+            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with its extra "
+            "'control'."
+        ) from error
+    return osqp.OSQP()
+
+
+def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:
+    at_limits = problem.knots.at_limits(knots)
+    return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)
+
 
 STARTS = ("zero", "periodic", "random")
 """Starts of a search: zero force; the best force that repeats from span to span; noise."""
@@ -30,7 +219,7 @@ DECIMALS = 2
 """Decimals of the commands (N) that are replayed and stored."""
 METHOD = 2
 """Version of the search; raised by changes that give other commands, so that older results are redone."""
-MEAN_TOLERANCE = 1e-3
+MEAN_TOLERANCE_OF_RUN = 1e-3
 """Maximum difference of the mean force from the passive run's, as a share of it."""
 
 
@@ -48,7 +237,7 @@ class Oracle:
     @property
     def best(self) -> Descent:
         """The search that reached the minimum σ."""
-        return min(self.searches, key=_std)
+        return min(self.searches, key=lambda search: search.std)
 
     @property
     def change(self) -> float:
@@ -77,15 +266,15 @@ def find(
         name = f"seed {neighbour.problem.seed}"
         searches = [descend(problem, name, neighbour.best.knots, progress=progress)]
     for hop in range(1, hops + 1):
-        shaken = min(searches, key=_std).knots + noise(problem, HOP_FORCE, hop)
+        shaken = min(searches, key=lambda search: search.std).knots + noise(problem, HOP_FORCE, hop)
         searches.append(descend(problem, f"hop {hop}", problem.knots.within(shaken), progress=progress))
-    best = min(searches, key=_std)
+    best = min(searches, key=lambda search: search.std)
     commands = np.round(problem.knots.commands(best.knots), DECIMALS)
     run = problem.replay(commands)
     if run.terminated:
         raise InputError(f"The oracle's pass has no figures. {run.ending}")
     figures, mean = run.summary(problem.chosen), problem.figures.mean
-    if abs(figures.mean - mean) > MEAN_TOLERANCE * mean:
+    if abs(figures.mean - mean) > MEAN_TOLERANCE_OF_RUN * mean:
         raise InputError(
             f"The oracle's mean force is {figures.mean:.2f} N, but the passive run's is {mean:.2f} N; search "
             "from other starts."
@@ -96,10 +285,6 @@ def find(
         zero_phase_low_pass(run.contact_force, run.time_step),
     )
     return Oracle(problem, tuple(searches), commands, run, figures, forces)
-
-
-def _std(search: Descent) -> float:
-    return search.std
 
 
 def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterator[Descent]:

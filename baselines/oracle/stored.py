@@ -1,28 +1,113 @@
-"""Oracles stored in a file, and how they are looked up."""
+"""Settings of a search for oracles: passes as a table of cells, from keywords or a TOML file."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from panto_env.base.checksums import read_checked, with_checksum
+from panto_configs import find
+from panto_env.base.checksums import __version__, read_checked, with_checksum
 from panto_env.base.errors import InputError
-from panto_env.base.files import finite, write_whole
-from panto_env.base.version import __version__
-from panto_env.catalog.content import is_entry
+from panto_env.base.files import finite, read_toml, write_whole
+from panto_env.base.settings import Positive, Settings, parse
+from panto_env.catalog.loader import is_entry
 from panto_env.control.identity import OF_TRAINS
 from panto_env.control.lines import draws_line, line_name
-from panto_env.control.settings import RunSettings, run_settings
+from panto_env.control.settings import (
+    ControlInterval,
+    PantographScatter,
+    SpeedDrift,
+    default,
+    description,
+    run_settings,
+)
+from panto_env.plant.line_condition import LINE_CONDITIONS
 
-from .search import METHOD, Oracle
-from .settings import OracleSettings
+from ..line import Actuator, Condition, LineAndTrain, Span
+from .search import METHOD, STARTS, Oracle
+
+MOST_HOPS = 1000
+"""Maximum number of hops; each takes about as long as the first search."""
+Start = Literal[STARTS]  # type: ignore[valid-type]
+
+
+class OracleCell(LineAndTrain):
+    """A train with an actuator on a line, and the speeds to run at."""
+
+    actuator: Actuator = Field(
+        default("actuator"), validate_default=True, description=description("actuator")
+    )
+    speeds_kmh: tuple[Positive, ...] = Field((300.0,), min_length=1, description="km/h")
+
+
+class OracleSettings(Settings):
+    """Cells, and the settings common to all of them."""
+
+    cells: tuple[OracleCell, ...] = Field(
+        (OracleCell(),), min_length=1, description="lines, actuators and speeds"
+    )
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1, description="seeds")
+    spans: tuple[Span, Span] | None = Field(
+        None, description="first and last span over which σ is minimised; by default those after the start"
+    )
+    starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
+    hops: int = Field(
+        0,
+        ge=0,
+        le=MOST_HOPS,
+        description="further searches, each from the best result plus noise; more find steadier forces",
+    )
+    line_condition: Condition = Field(
+        LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
+    )
+    pantograph_scatter: PantographScatter = Field(
+        default("pantograph_scatter"), description=description("pantograph_scatter")
+    )
+    speed_drift: SpeedDrift = Field(default("speed_drift"), description=description("speed_drift"))
+    control_interval: ControlInterval = Field(
+        default("control_interval"), description=description("control_interval")
+    )
+
+    def runs(self) -> Iterator[dict[str, Any]]:
+        """Settings of a run, by name, for each cell at each speed."""
+        for cell in self.cells:
+            for speed in cell.speeds_kmh:
+                yield self.given(cell, speed)
+
+    def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
+        """Settings of a run, by name, for a cell at a speed (km/h)."""
+        return {
+            "catenary": cell.catenary,
+            **cell.riding,
+            "speed_kmh": speed_kmh,
+            "actuator": cell.actuator,
+            "line_condition": self.line_condition,
+            "pantograph_scatter": self.pantograph_scatter,
+            "speed_drift": self.speed_drift,
+            "control_interval": self.control_interval,
+        }
+
+
+def oracle_settings(
+    source: str | Path | None, changes: Mapping[str, Any], cell: Mapping[str, Any]
+) -> OracleSettings:
+    """Settings from a TOML file, given by its path or a name of ``configs/``, or the defaults, with changes.
+
+    cell: if not empty, the only cell. Raises InputError for settings that are not valid.
+    """
+    table = {} if source is None else read_toml(find(source, "oracle"))
+    if cell:
+        table["cells"] = [dict(cell)]
+    return parse(OracleSettings, table | dict(changes), "the oracle" if source is None else str(source))
+
 
 RESULTS = Path(__file__).parent / "results"
 """Folder of the project's own oracles; the key ``command`` of each file says how they were made."""
@@ -76,11 +161,15 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
     """A cell as plain data, with its passes under all seeds; request: its entry of ``requests``."""
     first = passes[0].problem
     settings = first.settings
+    train: dict[str, Any] = {}
+    if settings.pantographs:
+        train = {name: getattr(settings, name) for name in ("distances", "controlled")}
+        train = {"pantographs": [each.name for each in settings.pantographs]} | train
     table: dict[str, Any] = finite(
         {
             "catenary": line_name(run_settings(first.given)),
             "pantograph": settings.pantograph.name,
-            **_train(settings),
+            **train,
             "speed_kmh": settings.speed_kmh[0],
             "actuator": settings.actuator.model_dump(mode="json"),
             "line_condition": [each.model_dump(mode="json") for each in settings.line_condition],
@@ -96,23 +185,9 @@ def cell(request: Mapping[str, Any], passes: Sequence[Oracle]) -> dict[str, Any]
     return table
 
 
-def _train(settings: RunSettings) -> dict[str, Any]:
-    """Pantographs, distances and the controlled one of a train of several, as plain data."""
-    if not settings.pantographs:
-        return {}
-    names = [each.name for each in settings.pantographs]
-    return {"pantographs": names, "distances": settings.distances, "controlled": settings.controlled}
-
-
 def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
     """Content of a file: cells made by ``cell``, and the text of the command that found them."""
     return {"version": __version__, "command": command, "cells": list(cells)}
-
-
-def as_text(data: Mapping[str, Any]) -> str:
-    """Text of a file: data of ``as_data`` with a checksum, one line per cell and per pass."""
-    text = json.dumps(with_checksum(data), separators=(",", ":"))
-    return text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"') + "\n"
 
 
 def _pass(oracle: Oracle) -> dict[str, Any]:
@@ -132,9 +207,11 @@ def _pass(oracle: Oracle) -> dict[str, Any]:
 
 
 def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> None:
-    """Write cells as JSON, whole or not at all."""
+    """Write cells as JSON with a checksum, one line per cell and per pass, whole or not at all."""
+    text = json.dumps(with_checksum(as_data(cells, command)), separators=(",", ":"))
+    text = text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"')
     with write_whole(path) as temporary:
-        temporary.write_text(as_text(as_data(cells, command)), encoding="utf-8")
+        temporary.write_text(f"{text}\n", encoding="utf-8")
 
 
 def read(path: str | Path) -> dict[str, Any]:

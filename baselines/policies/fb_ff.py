@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.base.units import METRES_PER_SECOND, to_kmh
-from panto_env.control.context import Context
+from panto_env.base.arrays import METRES_PER_SECOND, to_kmh
+from panto_env.base.errors import InputError, shown
+from panto_env.control.observation import Context
 
-from .force_law import ForceLaw, number, time_constant
+from .feedback import ForceLaw, number, time_constant
+from .lanes_law import Array, Gain, Observations, Source, TunableLaw
 
 FORCE_RANGE = (0.0, 300.0)
 """Range (N) to which the feedback clips the contact force (paper 1)."""
@@ -97,18 +98,12 @@ class FeedbackFeedforward(ForceLaw):
 
     def force(self, observation: NDArray[np.float32]) -> float:
         """Force (N) for an observation, before the actuator's limit."""
-        return self._feedback(self.read(observation, "contact force")) + self._feedforward(
-            self._distance(observation)
-        )
-
-    def _feedback(self, contact_force: float) -> float:
         lowest, highest = FORCE_RANGE
-        shortfall = self.context.nominal_force - min(max(contact_force, lowest), highest)
-        outside_dead_zone = max(abs(shortfall) - self.dead_zone, 0.0)
-        return self._gain * math.copysign(outside_dead_zone, shortfall)
-
-    def _feedforward(self, distance: float) -> float:
-        return self.amplitude * math.sin(self._wavenumber * distance - self.theta)
+        contact_force = min(max(self.read(observation, "contact force"), lowest), highest)
+        shortfall = self.context.nominal_force - contact_force
+        feedback = self._gain * math.copysign(max(abs(shortfall) - self.dead_zone, 0.0), shortfall)
+        distance = self._distance(observation)
+        return feedback + self.amplitude * math.sin(self._wavenumber * distance - self.theta)
 
     def _distance(self, observation: NDArray[np.float32]) -> float:
         """Distance (m) from the support behind the start of the run, as if all spans had the mean length."""
@@ -123,3 +118,38 @@ class FeedbackFeedforward(ForceLaw):
             self._spans -= round(share - self._share)  # nearly a span back: the next has begun
         self._share = share
         return (self._spans + share) * self.context.alignment.mean_length
+
+
+class TunedFeedbackFeedforward(TunableLaw):
+    """The law of ``fb+ff`` (paper 1, section 5) with gain, amplitude and phase fitted to a line, and a
+    constant force that keeps the mean where it was.
+
+    u = gain (F_N - F) + sine sin(2 pi x / s) + cosine cos(2 pi x / s) + bias, with F clipped to 0-300 N and x
+    the place within the span s: Eq. 11 as the paper's text describes it, A sin(2 pi x / s - theta) with
+    A^2 = sine^2 + cosine^2 and tan(theta) = - cosine / sine; no dead zone.
+
+    It needs to know the nominal force and the place within the span, and nothing of the line but its gains.
+    """
+
+    TUNED: ClassVar[Mapping[str, Gain]] = {
+        "gain": Gain(0.05),
+        "sine": Gain(2.0),
+        "cosine": Gain(2.0),
+        "bias": Gain(1.0),
+    }
+
+    def __init__(self, gains: Source = "tuned-fb+ff", washout: float | None = None) -> None:
+        """gains: (4,): gain (N/N), sine (N), cosine (N), bias (N); or the name or path of a file of gains.
+        washout: see ``FeedbackFeedforward``; it makes the bias idle.
+        """
+        super().__init__(gains)
+        self.washout = time_constant(washout)
+
+    def forces(self, observations: Observations) -> Array:
+        """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        gain, sine, cosine, bias = self.gains
+        contact_force = np.clip(self.read(observations, "contact force"), *FORCE_RANGE)
+        angle = self.span_angle(observations)
+        feedforward = sine * np.sin(angle) + cosine * np.cos(angle)
+        force: Array = gain * (self.context.nominal_force - contact_force) + feedforward + bias
+        return force

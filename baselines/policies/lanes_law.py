@@ -1,19 +1,158 @@
-"""Bases of controllers that return the forces of many lanes at once: a tuner runs them in batches."""
+"""Gains of policies as `panto tune` stores them: one file per policy, one table per line and pantograph."""
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.control.context import Context
+from panto_configs import FOLDER
+from panto_env.base.arrays import to_kmh
+from panto_env.base.checksums import remembered
+from panto_env.base.errors import InputError, shown
+from panto_env.base.files import read_toml
+from panto_env.base.settings import Settings, parse
+from panto_env.catalog.drawn_lines import DRAWN
+from panto_env.catalog.loader import is_entry
+from panto_env.control.observation import Context
+from panto_env.plant.catenary.schema import CatenaryData
+from panto_env.plant.pantograph.schema import PantographData
+from panto_env.plant.state import Place
 
-from .gains import Source, find_gains
+Source = str | Sequence[float]
+GAINS_FOLDER = FOLDER / "policies"
+MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)
+"""How the names begin of what lines are drawn from."""
+REACH = 12.5
+"""Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
+
+
+class Tuning(Settings):
+    """Gains for one line and pantograph over speed, and how they were made."""
+
+    catenary: str
+    pantograph: str
+    catenary_sha256: str | None = Field(None, description="of its values, unless it is the catalogue's")
+    pantograph_sha256: str | None = Field(None, description="likewise")
+    place: str = Field(description="where the actuator acts: frame, head or both")
+    names: tuple[str, ...] = Field(description="of the gains")
+    speeds_kmh: tuple[float, ...] = Field(min_length=1, description="rising (km/h)")
+    gains: tuple[tuple[float, ...], ...] = Field(description="at each speed")
+    command: str
+    version: str
+    actuator: dict[str, Any]
+    sensors: dict[str, Any]
+    line_condition: str
+    washout: float = Field(0.0, description="time constant of the action's washout, 0 for none (s)")
+    seeds: tuple[int, ...] = Field(description="of the training's lines and noise")
+    passes: int = Field(description="simulated passes that the tuning took")
+    std_change: tuple[float, ...] = Field(
+        description="relative change of sigma from passive on selection seeds, by speed (-)"
+    )
+    mean_change: tuple[float, ...] = Field(description="relative change of the mean force, likewise (-)")
+
+    @model_validator(mode="after")
+    def _fit(self) -> Self:
+        if len(self.gains) != len(self.speeds_kmh) or any(len(row) != len(self.names) for row in self.gains):
+            raise ValueError("gains must have a row for each speed and a number for each name")
+        if list(self.speeds_kmh) != sorted(set(self.speeds_kmh)):
+            raise ValueError("speeds_kmh must rise")
+        return self
+
+    def is_for(self, catenary: CatenaryData, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made for this line and pantograph, by their values, and place of the actuator."""
+        return self._is_of(pantograph, place) and is_entry(catenary, self.catenary, self.catenary_sha256)
+
+    def is_for_any_line(self, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made on many lines, drawn from a family or a section, for this pantograph."""
+        return self._is_of(pantograph, place) and self.catenary.startswith(MANY_LINES)
+
+    def _is_of(self, pantograph: PantographData, place: str) -> bool:
+        return place == self.place and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
+
+
+class GainFile(Settings):
+    """A file of gains."""
+
+    policy: str
+    tunings: tuple[Tuning, ...] = ()
+
+
+def gain_file(source: str | Path) -> Path:
+    """Path of a file of gains, given by its path or by the name of one that comes with the project."""
+    path = Path(source)
+    return path if path.suffix == ".toml" else GAINS_FOLDER / f"{source}.toml"
+
+
+def load_gains(path: Path) -> GainFile:
+    """Read a file of gains. Raises InputError, naming the file, where it cannot be read or is not valid."""
+    if not os.path.isfile(path):
+        raise InputError(
+            f"There is no file of gains {path}; make it with `panto tune`, or give the parameter gains."
+        )
+    return _load(path, path.stat().st_mtime_ns)
+
+
+def place_of(channels: Sequence[int]) -> str:
+    """Place where the actuators act: frame, head or both."""
+    return "both" if len(channels) > 1 else Place(channels[0]).name.lower()
+
+
+def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
+    """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
+
+    Stored ones are found by the values of line and pantograph, whatever their names; those that were made on
+    many lines, drawn from a family, are for any line that has none of its own. Those that were made with the
+    episode's washout come first; those made with another one are not taken. Raises InputError if
+    there are none for them, for the place of the actuator, and for the speed.
+    """
+    if not isinstance(source, str):
+        if len(source) != len(names):
+            raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
+        return np.array(source, dtype=float)
+    path = gain_file(source)
+    place, tunings = place_of(context.channels), load_gains(path).tunings
+    able = [each for each in tunings if each.washout in (0.0, context.washout)]
+    able.sort(key=lambda each: each.washout != context.washout)
+    own = [each for each in able if each.is_for(context.catenary, context.pantograph, place)]
+    others = [each for each in able if each.is_for_any_line(context.pantograph, place)]
+    if own or others:
+        return _at_speed((*own, *others)[0], names, to_kmh(context.speed), path)
+    line, pantograph = context.catenary.name, context.pantograph.name
+    named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
+    but = ", only for others of these names with other values" if named else ""
+    for each in tunings:
+        if each not in able and each.is_for(context.catenary, context.pantograph, place):
+            but = f", only for a washout of {each.washout:g} s, which the policy must then have"
+    raise InputError(
+        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
+        f"at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
+        f"{', ...' if len(names) > 4 else ''}) as the parameter gains, or take a policy that needs none."
+    )
+
+
+def _at_speed(tuning: Tuning, names: Sequence[str], speed_kmh: float, path: Path) -> NDArray[np.float64]:
+    low, high = tuning.speeds_kmh[0], tuning.speeds_kmh[-1]
+    if not low - REACH <= speed_kmh <= high + REACH:
+        raise InputError(
+            f"{path.name} has gains for '{tuning.catenary}' from {low:g} to {high:g} km/h, "
+            f"not for {speed_kmh:g} km/h; tune it there."
+        )
+    if tuning.names != tuple(names):
+        raise InputError(f"The gains in {path.name} are not those of this policy; tune it again.")
+    return np.array([np.interp(speed_kmh, tuning.speeds_kmh, column) for column in np.array(tuning.gains).T])
+
+
+@remembered
+def _load(path: Path, _modified: int) -> GainFile:
+    return parse(GainFile, read_toml(path), str(path))
+
 
 Array = NDArray[np.float64]
 Observations = NDArray[np.float32]

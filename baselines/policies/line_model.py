@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
-from panto_env.control.context import Context
+from panto_env.control.observation import Context
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.pantograph.build import STRIP_STIFFNESS, matrices
+from panto_env.plant.pantograph.schema import STRIP_STIFFNESS, matrices
 
 Array = NDArray[np.float64]
 DELAY, LAG = 0.010, 0.015

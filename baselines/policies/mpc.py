@@ -7,12 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from panto_env.base.errors import InputError
-from panto_env.base.shown import shown
-from panto_env.control.context import Context
+from panto_env.base.errors import InputError, shown
+from panto_env.control.observation import Context
 
-from .gains import Source
-from .lanes_law import Array, FromAverage, Gain, Observations, TunableLaw
+from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 

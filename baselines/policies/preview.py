@@ -6,21 +6,25 @@ A policy that knows the design may compute both beforehand; it sees nothing of t
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.arrays import to_kmh
+from panto_env.base.checksums import remembered
 from panto_env.base.errors import InputError
-from panto_env.base.remember import remembered
-from panto_env.base.units import to_kmh
 from panto_env.control import Task
-from panto_env.control.context import Context
-from panto_env.control.settings import run_settings
+from panto_env.control.observation import Context
+from panto_env.control.settings import RunSettings, run_settings
+from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.actuators.lagged import LaggedActuator
 from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.state import Place
+from panto_env.policies import Policy, find_policy, wishes
+
+from ..benchmark.settings import TRAINING
 
 Array = NDArray[np.float64]
 SETTLED = 9
@@ -103,3 +107,190 @@ def _preview(
     )
     start = first * stride - alignment.support(SETTLED)
     return Preview(start, stride, passive - passive.mean(), response / PULSE)
+
+
+PLACES = tuple(range(0, 31, 2))
+"""Places ahead (m) at which the force in front is observed."""
+PASSES, EXCITED = 6, 3
+"""Passes without control, and with test forces, from which gains are fitted."""
+DISTANCE = 1500.0
+"""Length of these passes (m)."""
+BEGIN = 120
+"""Control steps of a pass that are left out at its start, while waves build up."""
+PULSES, PULSE_STEPS = 20.0, 5
+"""Test forces (N), up or down at random, and control steps that each is held."""
+RESPONSE = 40
+"""Control steps in which a command acts on the contact force."""
+PAST = range(2, 60, 3)
+"""Control steps ago at which the force in front at the own place is remembered, for waves that come late."""
+RIDGE = 0.3
+"""Weight of the squared command beside the squared force that it leaves."""
+
+
+class Gains(NamedTuple):
+    """Gains for one line, speed and train."""
+
+    mean: float  # contact force in front (N)
+    gains: Array  # (places, then times of ``PAST``): command by its deviation (N/N)
+
+
+class FrontPreview:
+    """Feed-forward of the contact force that the pantograph in front had at places ahead, and of its past.
+
+    On a line as built the force behind repeats much of the force in front, with a phase that depends on
+    distance and speed: at 250 and 300 km/h a filter of the force in front, 40 m to either side, explains 55
+    to 86 % of the variance 100 and 200 m behind (`docs/train.md`). The command minimises, by least squares
+    over passes under training seeds on lines as built, the square of the force that it leaves,
+    sum(h * front) + g * u, beside 0.3 of its own square; g is the mean response of the
+    contact force to commands, found from test forces in the same passes. So it knows line, train and
+    actuator as designed, and nothing of the line's defects but what the one in front has told.
+
+    Its command is added to that of a base policy, which runs in these passes too; "" for none. Own choice of
+    the project.
+    """
+
+    front = PLACES
+
+    def __init__(
+        self, base: str = "repetitive", actuator: str = "realistic", sensors: str = "realistic"
+    ) -> None:
+        """base: name of the policy to which it adds. actuator, sensors: presets that gains are fitted with.
+
+        Raises InputError for an unknown policy.
+        """
+        self._assumed = base, actuator, sensors
+        self._base = find_policy(base or "passive")
+        for name, value in _wished(self._base).items():
+            setattr(self, name, value)
+
+    def reset(self, context: Context) -> None:
+        """Find the gains. Raises InputError where no pantograph is in front."""
+        train, number = context.train, context.collector
+        if number == 0:
+            raise InputError("front-preview needs a pantograph in front: control one behind another.")
+        distances = tuple(own.distance for own in train.collectors)
+        pantographs = tuple(own.pantograph for own in train.collectors)
+        if len(context.channels) > 1:
+            raise InputError("front-preview drives one actuator, on frame or head, not both.")
+        self._gains = _gains(
+            context.catenary,
+            pantographs,
+            distances[1:],
+            number + 1,
+            context.speed,
+            context.control_interval,
+            Place(context.channels[0]).name.lower(),
+            self._assumed,
+        )
+        self._base.reset(context)
+        layout = context.layout
+        self._columns = [layout.index(f"front force, {metres:g} m ahead") for metres in PLACES]
+        self._scale = layout.scale[self._columns]
+        self._limit = context.force_limit
+        self._past = np.full(max(PAST) + 1, self._gains.mean)
+
+    def act(self, observation: NDArray[np.float32]) -> Array:
+        """Action, (1,), for an observation."""
+        ahead = observation[self._columns] * self._scale
+        self._past = np.append(self._past[1:], ahead[0])
+        told = np.append(ahead, self._past[[-1 - steps for steps in PAST]]) - self._gains.mean
+        more = told @ self._gains.gains / self._limit
+        return np.clip(self._base.act(observation) + more, -1.0, 1.0)
+
+
+@remembered
+def _gains(
+    catenary: object,
+    pantographs: tuple[object, ...],
+    distances: tuple[float, ...],
+    controlled: int,
+    speed: float,
+    interval: float,
+    place: str,
+    assumed: tuple[str, str, str],
+) -> Gains:
+    base, actuator, sensors = assumed
+    policy = find_policy(base or "passive")
+    settings = run_settings(
+        _wished(policy)
+        | {
+            "catenary": catenary,
+            "pantographs": pantographs,
+            "distances": distances,
+            "controlled": controlled,
+            "speed_kmh": to_kmh(speed),
+            "control_interval": interval,
+            "line_condition": "as-built",
+            "actuator": f"{actuator}:place={place}",
+            "sensors": sensors,
+            "front": PLACES,
+            "distance": DISTANCE,
+        }
+    )
+    passes = [_Pass(settings, policy, seed) for seed in TRAINING[:PASSES]]
+    response = _response(settings, policy, passes[:EXCITED])
+    mean = float(np.mean([own.told[BEGIN:, 0].mean() for own in passes]))
+    told, moved, left = [], [], []
+    for own in passes:
+        features = own.features(mean)
+        acted = np.stack([np.convolve(each, response)[: len(each)] for each in features.T], axis=1)
+        force = own.force[BEGIN:]
+        told.append(features[BEGIN:])
+        moved.append(acted[BEGIN:])
+        left.append(force - force.mean())
+    x, z, y = np.concatenate(moved), np.concatenate(told), np.concatenate(left)
+    normal = x.T @ x + RIDGE * z.T @ z + 1e-3 * len(x) * np.eye(x.shape[1])
+    return Gains(mean, np.linalg.solve(normal, -x.T @ y))
+
+
+def _wished(policy: Policy) -> dict[str, Any]:
+    """Settings of a policy's observation, measured values unless it has others, and its washout."""
+    return {"observation": "measured"} | wishes(policy)
+
+
+class _Pass:
+    """One pass under a seed: what the one in front told, commands, and the contact force that followed."""
+
+    def __init__(
+        self, settings: RunSettings, policy: Policy, seed: int, commands: Array | None = None
+    ) -> None:
+        """commands: (n,) (N), added to the policy's, for as many control steps as there are."""
+        task = Task(settings)
+        task.reset(0, np.random.default_rng(seed))
+        policy.reset(task.context(0))
+        columns = [task.layout.index(f"front force, {metres:g} m ahead") for metres in PLACES]
+        scale, limit = task.layout.scale[columns], task.actuator.force_limit
+        told: list[Array] = []
+        given: list[float] = []
+        while not task.results.flags[0].any():
+            told.append(task.results.observation[0, columns] * scale)
+            given.append(0.0 if commands is None else commands[len(given) % len(commands)])
+            action = policy.act(task.results.observation[0].copy()) + given[-1] / limit
+            task.step(action[None])
+        own = task.trajectory(0, last=True).controlled
+        count = len(given) * task.length.control_steps
+        force = low_pass(own.contact_force, own.time_step)[-count:]
+        self.told, self.given = np.array(told), np.array(given)
+        self.force = force.reshape(len(given), -1).mean(axis=1)
+
+    def features(self, mean: float) -> Array:
+        """Deviations of what was told, at places ahead and in the past, (n, gains)."""
+        ahead = self.told - mean
+        here = ahead[:, 0]
+        past = [np.concatenate([np.zeros(steps), here[: len(here) - steps]]) for steps in PAST]
+        return np.concatenate([ahead, np.stack(past, axis=1)], axis=1)
+
+
+def _response(settings: RunSettings, policy: Policy, without: list[_Pass]) -> Array:
+    """Contact force by commands 0, 1, ... control steps ago, (RESPONSE,) (N/N), in the mean along a line."""
+    acted, changed = [], []
+    for seed, own in zip(TRAINING, without, strict=False):
+        random = np.random.default_rng(seed)
+        commands = np.repeat(random.choice([-PULSES, PULSES], len(own.force)), PULSE_STEPS)
+        excited = _Pass(settings, policy, seed, commands)
+        given = excited.given
+        rows = [np.concatenate([np.zeros(k), given[: len(given) - k]]) for k in range(RESPONSE)]
+        acted.append(np.stack(rows, axis=1)[BEGIN:])
+        changed.append((excited.force - own.force)[BEGIN:])
+    x, y = np.concatenate(acted), np.concatenate(changed)
+    return np.asarray(np.linalg.solve(x.T @ x + 1e2 * np.eye(RESPONSE), x.T @ y))

@@ -2,128 +2,31 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from panto_env.base.checksums import read_checked
 from panto_env.base.errors import InputError
-from panto_env.base.explanation import dotted
+from panto_env.base.settings import dotted
 
-from ..benchmark.intervals import Share
-from ..benchmark.overall import with_feedback
-from ..benchmark.statistics import LineAtSpeed
-
-Number = Annotated[
-    float,
-    BeforeValidator(lambda value: nan if value is None else value),
-    AfterValidator(lambda value: value if isfinite(value) else nan),
-]
-"""A figure; nan if it is missing, which is null in JSON."""
-Series = Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
-Interval = tuple[FiniteFloat, FiniteFloat] | None
+from ..benchmark.actions import Trace
+from ..benchmark.overall import Standing, with_feedback
+from ..benchmark.settings import LineAtSpeed
+from ..benchmark.statistics import Cell
 
 
-class ResultTable(BaseModel):
-    """A table of the file; keys that the page does not use are ignored."""
+class Result(BaseModel):
+    """Result of one track, as far as the page shows it; keys that the page does not use are ignored."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
-
-
-class AtPlace(ResultTable):
-    """Base of tables that belong to one policy on one line at one speed."""
-
-    policy: str
-    catenary: str
-    pantograph: str
-    speed_kmh: FiniteFloat
-
-    @property
-    def place(self) -> LineAtSpeed:
-        """Line, pantograph and speed."""
-        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
-
-
-class StoredCell(AtPlace):
-    """A cell read from a file; its fields are those of ``benchmark.statistics.Cell``."""
-
-    seeds: int
-    nominal_force: FiniteFloat
-    figures: dict[str, Number]
-    change: Number
-    interval: Interval
-    cost_change: Number
-    mean_change: Number
-    moved: int
-    improved: Number
-    disqualified: str
-    rank: int | None
-    oracle: float | None = None  # change of σ (%) in the passes that an oracle ran; None without one
-    oracle_share: float | None = None  # share of its gain, in these passes
-
-
-class Trace(AtPlace):
-    """A trace read from a file; its fields are those of ``benchmark.trace.Trace``."""
-
-    seed: int
-    position: Series
-    force: Series
-    frequency: Series
-    amplitude: Series
-
-    @model_validator(mode="after")
-    def _pairs(self) -> Self:
-        for along, values in ((self.position, self.force), (self.frequency, self.amplitude)):
-            if len(along) != len(values) or not along[0] < along[-1]:
-                raise ValueError("must have one value for each position, and positions that rise")
-        return self
-
-
-class StoredStanding(ResultTable):
-    """A policy's overall result read from a file; its fields are those of ``benchmark.overall.Standing``."""
-
-    policy: str
-    change: Number
-    interval: Interval
-    interval_for_lines: Interval = None  # not in older results
-    worst_quarter: Number
-    worst: Number
-    worst_at: str
-    improved: Number
-    contact_loss: Number = nan  # not in older results
-    cost_change: Number = nan
-    effort: Number
-    power: Number
-    saturation: Number
-    passes: int
-    moved: int
-    most_moved: Number
-    better_than: dict[str, Share]
-    trainings: dict[str, Number]
-    disqualified: str
-    rank: int | None
-    oracle_share: float | None = None
-
-
-class Result(ResultTable):
-    """Result of one track, as far as the page shows it."""
+    model_config = ConfigDict(frozen=True)
 
     version: str
     settings: dict[str, Any]
     spans: tuple[tuple[int, int], ...]
-    standings: tuple[StoredStanding, ...]
-    cells: tuple[StoredCell, ...]
+    standings: tuple[Standing, ...]
+    cells: tuple[Cell, ...]
     traces: tuple[Trace, ...]
 
     @property
@@ -147,7 +50,7 @@ class Result(ResultTable):
         return {name: one.policy for one in self.standings for name in one.trainings}
 
     @property
-    def by_rank(self) -> list[StoredStanding]:
+    def by_rank(self) -> list[Standing]:
         """Standings, the best first, each method before its trainings, and last those without a rank."""
         method_of = self.method_of
         ranked = sorted(self.standings, key=lambda one: (one.rank is None, one.rank or 0))
@@ -173,6 +76,10 @@ class Result(ResultTable):
             raise ValueError("must have a cell for every policy")
         if not set(self.method_of) <= standing:
             raise ValueError("must have a standing for every training")
+        for one in self.traces:
+            for along, values in ((one.position, one.force), (one.frequency, one.amplitude)):
+                if len(along) != len(values) or not along or not along[0] < along[-1]:
+                    raise ValueError("must have one value for each position, and positions that rise")
         return self
 
 

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import isfinite, isnan, nan
+from statistics import mean
 from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
-from panto_env.metrics.labels import LABELS
+from panto_env.base.table import Table
+from panto_env.metrics.figures import LABELS
 from panto_env.terminal import number
 
-from ..benchmark.overall import next_in_ranking
+from ..benchmark.overall import Standing, next_in_ranking, with_feedback
 from ..benchmark.report import FIGURES, OWN_LABELS
+from ..benchmark.settings import LineAtSpeed
+from ..benchmark.statistics import Cell
 from .charts import Scale
-from .result import Result, StoredCell, StoredStanding
+from .result import Result
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
 FAR_OFF = 25.0
 """Change of σ (%) beyond which a disqualified policy is left out of the scales of pictures and colours."""
-R = TypeVar("R", StoredStanding, StoredCell)
+R = TypeVar("R", Standing, Cell)
 
 
 class Bar(NamedTuple):
@@ -58,7 +62,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A sortable table; its second column, the policy, is the heading of each row."""
 
     caption: str
@@ -66,10 +70,10 @@ class Table:
     rows: list[Row]
 
 
-def leaderboard(result: Result) -> Table:
+def leaderboard(result: Result) -> PageTable:
     """Table of the policies that ran on every line, over all lines, speeds and seeds."""
     after = next_in_ranking(result.standings)
-    columns: list[Column[StoredStanding]] = [
+    columns: list[Column[Standing]] = [
         *_first_columns(result.standings, result.method_of),
         Column("CL (%)", lambda one: _figure(one.contact_loss, 2)),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
@@ -86,10 +90,10 @@ def leaderboard(result: Result) -> Table:
     return _table("All lines, speeds and seeds", columns, result.by_rank)
 
 
-def table_of_cells(cells: Sequence[StoredCell], caption: str) -> Table:
+def table_of_cells(cells: Sequence[Cell], caption: str) -> PageTable:
     """Table of all policies on one line at one speed."""
     figures = {name: _of_figure(name, decimals) for name, decimals in FIGURES.items()}
-    columns: list[Column[StoredCell]] = [
+    columns: list[Column[Cell]] = [
         *_first_columns(cells),
         *(figures.pop(name) for name in ("std", "contact_loss", "cost_function")),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
@@ -122,8 +126,8 @@ def _first_columns(rows: Sequence[R], method_of: Mapping[str, str] = MappingProx
     return columns
 
 
-def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Table:
-    return Table(
+def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> PageTable:
+    return PageTable(
         caption=caption,
         headings=[column.heading for column in columns],
         rows=[
@@ -133,7 +137,7 @@ def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Tab
     )
 
 
-def _of_figure(name: str, decimals: int) -> Column[StoredCell]:
+def _of_figure(name: str, decimals: int) -> Column[Cell]:
     label = (LABELS | OWN_LABELS)[name]
     return Column(
         label.short_heading.removesuffix(" (-)"),
@@ -163,7 +167,7 @@ def _share(value: float | None) -> Entry:
     return Entry(f"{100 * value:.0f} %", _key(value))
 
 
-def _better(one: StoredStanding, other: str | None) -> Entry:
+def _better(one: Standing, other: str | None) -> Entry:
     share = one.better_than.get(other or "")
     return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
 
@@ -176,19 +180,19 @@ def _key(value: float) -> str:
     return f"{value:.9g}" if isfinite(value) else ""
 
 
-def _change(one: StoredStanding | StoredCell, scale: Scale) -> Entry:
+def _change(one: Standing | Cell, scale: Scale) -> Entry:
     if not isfinite(one.change):
         return Entry("–")
     low, high = one.interval or (one.change, one.change)
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
-    if isinstance(one, StoredStanding) and one.interval_for_lines is not None:
+    if isinstance(one, Standing) and one.interval_for_lines is not None:
         note += "; other lines {} to {}".format(*(signed(end, 1) for end in one.interval_for_lines))
     inside = scale.lowest <= low and high <= scale.highest
     bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
     return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
-def _scale(rows: Sequence[StoredStanding | StoredCell]) -> Scale:
+def _scale(rows: Sequence[Standing | Cell]) -> Scale:
     """Scale of the pictures of intervals; a disqualified policy that is far off does not stretch it."""
     ends = [
         end
@@ -198,3 +202,75 @@ def _scale(rows: Sequence[StoredStanding | StoredCell]) -> Scale:
     ]
     lowest, highest = min([-1.0, *ends]), max([1.0, *ends])
     return Scale(lowest, highest, 4.0, BAR - 4.0)
+
+
+OVERALL = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
+"""Headings of the columns over all passes."""
+TRAINING = "· "
+"""Before the name of a method's training."""
+
+
+def summary(result: Result) -> Table:
+    """Table of policies, by rank, over lines and speeds; the best policy of each column is marked with *.
+
+    Cells are changes of sigma (%) from the passive pantograph at the same mean force. A cell without a rank
+    shows by how much the policy moves the mean, or that it ended early. The last columns are over all passes:
+    the change with its 95 % interval, the mean of the worst quarter of passes, the share of passes in which
+    the policy is better than the next one, with its interval, and in how many it moves the mean by more than
+    1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
+    """
+    several = len({place[:2] for place in result.places}) > 1
+    of_places = (
+        f"{at.catenary}, {at.speed_kmh:g}" if several else f"{at.speed_kmh:g} km/h" for at in result.places
+    )
+    headings = ("policy", *of_places, *OVERALL)
+    cells = {(cell.policy, cell.place): cell for cell in result.cells}
+    after = next_in_ranking(result.standings)
+    rows = []
+    for one in result.by_rank:
+        name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
+        own = [[cells[run, place] for run in one.trainings or (one.policy,)] for place in result.places]
+        rows.append((name, *map(_text, own), *_overall(one, after.get(one.policy))))
+    oracles = [_oracle(result, place) for place in result.places]
+    if any(oracles):
+        rows.append(("*oracle*", *(each or "–" for each in oracles), *["–"] * len(OVERALL)))
+    seeds = result.cells[0].seeds
+    title = with_feedback(f"{result.title}: Δσ (%), {seeds} seeds", result.standings)
+    return Table(title, headings, tuple(rows))
+
+
+def _overall(one: Standing, after: str | None) -> tuple[str, ...]:
+    """The columns ``OVERALL`` of a policy; after: the policy ranked next."""
+    moved = f"{one.moved} of {one.passes}"
+    losses = number(one.contact_loss, 2), number(one.cost_change, 0)
+    if one.disqualified:
+        return "–", "–", *losses, "–", "–", moved
+    between = "–" if one.interval is None else "{:.1f} to {:.1f}".format(*one.interval)
+    if one.interval_for_lines is not None:
+        between += " (other lines {:.1f} to {:.1f})".format(*one.interval_for_lines)
+    return (
+        f"{one.change:.1f}",
+        between,
+        *losses,
+        f"{one.worst_quarter:.1f}",
+        str(one.better_than.get(after or "", "–")),
+        moved,
+    )
+
+
+def _text(cells: Sequence[Cell]) -> str:
+    """Change in a policy's cell, or the mean over the cells of a method's trainings."""
+    change, moved = mean(cell.change for cell in cells), mean(cell.mean_change for cell in cells)
+    if isnan(change):
+        return "ended early"
+    if any(cell.disqualified for cell in cells):
+        return f"({change:.1f}; mean {moved:+.1f})"
+    return f"{change:.1f}{' *' if cells[0].rank == 1 and len(cells) == 1 else ''}"
+
+
+def _oracle(result: Result, place: LineAtSpeed) -> str:
+    """Change of sigma (%) of the stored oracle for a line at a speed, or ""."""
+    for cell in result.cells:
+        if cell.place == place and cell.oracle is not None:
+            return f"{cell.oracle:.1f}"
+    return ""

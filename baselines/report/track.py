@@ -1,20 +1,50 @@
-"""Contents of the page for one track: tables, heat map, pairs, charts, and a section for each policy."""
+"""What the page shows of one track; no code of a user's is run for it."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
+from pathlib import Path
 
-from ..benchmark.intervals import Share
-from ..benchmark.settings import REFERENCE
-from ..benchmark.statistics import LineAtSpeed
+from panto_env.base import plugins
+from panto_env.base.errors import InputError
+from panto_env.policies import maker_of
+
+from ..benchmark.actions import Trace
+from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
+from ..benchmark.statistics import Cell
+from ..line import as_toml
 from .charts import Chart, Line, Point, curves, dots
-from .descriptions import what_is
-from .result import Result, StoredCell, Trace
-from .tables import FAR_OFF, Table, leaderboard, signed, table_of_cells
-from .toml import as_toml
+from .result import Result
+from .tables import FAR_OFF, PageTable, leaderboard, signed, table_of_cells
+
+CONTROLS = {
+    BLIND: "A control: {}, given its first observation at every step.",
+    TAPE: "A control: the actions that {} took on another line, under another seed, played back.",
+}
+
+
+def what_is(policy: str) -> str:
+    """First paragraph of an installed policy's docstring; for any other policy, what its name says."""
+    control = control_of(policy)
+    if control:
+        return CONTROLS[control].format(policy_of(policy))
+    name = policy.partition(":")[0]
+    if name in plugins.installed(plugins.POLICIES):
+        try:
+            text = inspect.getdoc(maker_of(name)) or "It has no description."
+        except InputError as error:  # a package that it needs is missing
+            return str(error)
+        return " ".join(text.partition("\n\n")[0].split())
+    if name.endswith(".py"):
+        return "A class in a Python file of the user's, which is not read for this page."
+    if Path(policy).suffix[1:] in plugins.installed(plugins.LOADERS):
+        return "A model from a file, which is not read for this page."
+    return "It is not installed where this page was made."
+
 
 STRONGEST = 0.6
 """Opacity of a heat map's strongest colour, so that text on it stays legible."""
@@ -44,9 +74,8 @@ class Shade:
 class Section:
     """Table and charts of one line at one speed."""
 
-    place: LineAtSpeed
     title: str
-    table: Table
+    table: PageTable
     charts: list[Chart]
 
 
@@ -57,8 +86,8 @@ class About:
     name: str
     text: str
     rank: int | None
-    worst: StoredCell
-    disqualified: list[StoredCell]
+    worst: Cell
+    disqualified: list[Cell]
     everywhere: bool
     method: str  # of which it is a training, or ""
 
@@ -71,7 +100,7 @@ class Track:
     settings: str  # as TOML
     numbers: dict[str, int]  # of policies, for their colours
     shown_first: set[str]  # policies whose traces are shown when the page opens
-    leaderboard: Table
+    leaderboard: PageTable
     lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
     heat: dict[str, list[Shade | None]]  # by policy, over all places
     pairs: dict[str, list[Shade | None]]  # by policy, over all others
@@ -125,7 +154,7 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     }
 
 
-def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
+def _shade(cell: Cell | None, maximum: float) -> Shade | None:
     if cell is None:
         return None
     strength = cell.change / maximum if isfinite(cell.change) else 0.0
@@ -135,14 +164,14 @@ def _shade(cell: StoredCell | None, maximum: float) -> Shade | None:
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
     """Share of passes in which the row's policy has a smaller change of σ than the column's."""
     compared = [one for one in result.standings if one.policy not in result.method_of]
-    table: dict[str, list[Shade | None]] = {}
-    for one in compared:
-        table[one.policy] = [_shade_of_share(one.better_than.get(other.policy)) for other in compared]
-    return table
-
-
-def _shade_of_share(one: Share | None) -> Shade | None:
-    return None if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+    shares = {one.policy: [one.better_than.get(other.policy) for other in compared] for one in compared}
+    return {
+        policy: [
+            one if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+            for one in each
+        ]
+        for policy, each in shares.items()
+    }
 
 
 def _section(result: Result, place: LineAtSpeed) -> Section:
@@ -162,7 +191,6 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
     over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
     traces = [trace for trace in result.traces if trace.place == place]
     return Section(
-        place=place,
         title=title,
         table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
         charts=[

@@ -55,15 +55,13 @@ def tune(
     --force. An interrupted tuning keeps the speeds that are done; the same command continues it.
     With --washout gains are for the policy with that washout: tuned-pd:washout=1.
     """
-    from panto_env.cluster.parts import remove_parts
+    from panto_env.cluster import remove_parts
     from panto_env.control.settings import run_settings
 
-    from ..benchmark.seeds import TRAINING
-    from ..policies.gains import gain_file
-    from .parts import parts_of
-    from .parts import tune as run
-    from .store import check_gain_file, make_tuning, store
-    from .tables import table
+    from ..benchmark.settings import TRAINING
+    from ..policies.lanes_law import gain_file
+    from .store import check_gain_file, make_tuning, parts_of, store, table
+    from .store import tune as run
     from .tune import PASSES, SEEDS, SPEEDS_KMH, tunable
 
     settings = run_settings(

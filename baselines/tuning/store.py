@@ -1,22 +1,73 @@
-"""Writes gains to a TOML file, which may hold gains for several lines."""
+"""A tuning stored speed by speed beside its file of gains, so that an interrupted one can continue."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Any
 
+from panto_env.analysis.pool import Progress
+from panto_env.base.checksums import __version__, read_checked, write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import check_output, write_whole
-from panto_env.base.version import __version__
-from panto_env.catalog.content import content_unless_catalogue
+from panto_env.base.files import alone_in, check_output, write_whole
+from panto_env.base.table import Table
+from panto_env.catalog.loader import content_unless_catalogue
+from panto_env.cluster import identity, open_parts, spread
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
+from panto_env.terminal import number
 
-from ..policies.gains import GainFile, Tuning, load_gains
-from .tune import Tuned
+from ..line import as_toml
+from ..policies.lanes_law import GainFile, Tuning, load_gains
+from .tune import PASSES, SEEDS, SPEEDS_KMH, Tuned, tunable, tune_at
+
+
+def parts_of(gains: Path) -> Path:
+    """Hidden folder that holds the tuned speeds until they are stored in the file of gains."""
+    return gains.with_name(f".{gains.stem}-parts")
+
+
+def tune(
+    folder: Path,
+    policy: str,
+    settings: RunSettings,
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    seeds: int = SEEDS,
+    passes: int = PASSES,
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> list[Tuned]:
+    """Tune a policy for the settings' line, pantograph, actuator and sensors, at each speed.
+
+    Each speed is written to the folder once it is done; speeds that are there already are not tuned again.
+    seeds, passes: see ``tune_at``. workers, ray: see ``spread``; the gains do not depend on them. Raises
+    InputError for a policy without gains, if the folder holds parts of another tuning or a damaged one, and
+    if another process is tuning into it.
+    """
+    tunable(policy)
+    made_of = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
+    with alone_in(folder, "tunes into"):
+        open_parts(folder, identity("tuning", made_of))
+        parts = {speed: folder / f"{speed!r}.json" for speed in speeds_kmh}
+        missing = [speed for speed, path in parts.items() if not path.is_file()]
+        kept = len(parts) - len(missing)
+        if progress is not None:
+            progress(kept, len(parts))
+        spread(
+            [partial(tune_at, policy, settings, speed, seeds, passes) for speed in missing],
+            workers=workers,
+            ray=ray,
+            progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
+            take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
+        )
+        found = map(read_checked, parts.values())
+        return [Tuned(**each | {name: tuple(each[name]) for name in ("gains", "history")}) for each in found]
+
 
 DIGITS = 5
 """Significant digits of a gain: far more than a tuning can resolve."""
@@ -81,20 +132,10 @@ def store(path: Path, policy: str, tuning: Tuning) -> None:
     """Store a tuning in a file of gains; it replaces one for the same case, see ``_case``."""
     old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
+    file = GainFile(policy=policy, tunings=(*kept, tuning)).model_dump(mode="json")
     with write_whole(path) as temporary:
-        temporary.write_text(as_toml(GainFile(policy=policy, tunings=(*kept, tuning))), encoding="utf-8")
-
-
-def as_toml(file: GainFile) -> str:
-    """Text of a file of gains, as TOML."""
-    lines = ["# Gains of a policy, written by `panto tune`.", f"policy = {_value(file.policy)}"]
-    for tuning in file.tunings:
-        lines += ["", "[[tunings]]"]
-        for key, value in tuning:
-            if value is None:
-                continue
-            lines.append(f"{key} = {_value(value)}")
-    return "\n".join(lines) + "\n"
+        head = "# Gains of a policy, written by `panto tune`.\n"
+        temporary.write_text(head + as_toml(file), encoding="utf-8")
 
 
 def _case(tuning: Tuning) -> tuple[str | float, ...]:
@@ -102,12 +143,27 @@ def _case(tuning: Tuning) -> tuple[str | float, ...]:
     return line or tuning.catenary, pantograph or tuning.pantograph, tuning.place, tuning.washout
 
 
-def _value(value: Any) -> str:
-    """A value as TOML, each row of gains on its own line. Strings and numbers are written as in JSON."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, tuple | list) and value and isinstance(value[0], tuple | list):
-        return "[\n" + "".join(f"    {_value(each)},\n" for each in value) + "]"
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
+def table(policy: str, tuned: Sequence[Tuned]) -> Table:
+    """Table with a row per speed: objective before and after, sigma and mean force relative to passive."""
+    headings = (
+        "speed (km/h)",
+        "passes",
+        "iterations",
+        "objective before",
+        "after",
+        "σ to passive (%)",
+        "mean force (%)",
+    )
+    rows = [
+        (
+            f"{each.speed_kmh:g}",
+            str(each.passes),
+            str(len(each.history) - 1),
+            number(each.history[0], 3),
+            number(each.history[-1], 3),
+            f"{100 * each.std_change:+.1f}",
+            f"{100 * each.mean_change:+.2f}",
+        )
+        for each in tuned
+    ]
+    return Table(f"{policy}, tuned: σ and mean on selection seeds", headings, rows)

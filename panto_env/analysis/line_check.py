@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.table import Table
-from ..catalog.en50119 import SOURCE, gradient_limits, gradients, highest_speed
-from ..metrics.criterion import Criterion
-from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import elasticity, non_uniformity, per_span
+from ..base.arrays import Array, to_kmh
+from ..base.table import Alarm, Table
+from ..catalog.family import SOURCE, LineFamily, gradient_limits, gradients, highest_speed
+from ..catalog.section import LineSection
+from ..control.lines import line_generator, line_of_seed
+from ..metrics.compliance import Criterion
+from ..plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from ..plant.catenary.flexible.parts import index_at
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import spans_of
-from ..plant.catenary.flexible.static import hang
+from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest, hang
+from .pool import Progress, in_processes
+from .simulation import simulate
 
 
 class SpanCheck(NamedTuple):
@@ -65,20 +70,12 @@ class LineCheck:
         limits = (None, None) if speed_kmh is None else gradient_limits(speed_kmh)
         fastest = highest_speed(steepest, change)
         allowed = {0.0: "at no speed", np.inf: "at any speed"}.get(fastest, f"up to {fastest:g} km/h")
+        name, note = "maximum change of gradient", f"{SOURCE}, allows these gradients {allowed}"
         forces = [each.static_force for each in self.droppers]
         yields = 1e3 * self.elasticities
         return [
             Criterion("gradient", "maximum gradient", "‰", _shown(steepest), None, limits[0], SOURCE),
-            Criterion(
-                "gradient_change",
-                "maximum change of gradient",
-                "‰",
-                _shown(change),
-                None,
-                limits[1],
-                SOURCE,
-                f"{SOURCE}, allows these gradients {allowed}",
-            ),
+            Criterion("gradient_change", name, "‰", _shown(change), None, limits[1], SOURCE, note),
             Criterion("pre_sag", "maximum pre-sag", "mm", 1e3 * max(each.pre_sag for each in self.spans)),
             Criterion("smallest_dropper_force", "minimum force of a dropper", "N", min(forces)),
             Criterion("largest_dropper_force", "maximum force of a dropper", "N", max(forces)),
@@ -104,24 +101,11 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
     found = []
     for k, span in enumerate(spans if line.sequence else spans[:1]):
         forces = [each.static_force for each in droppers if each.span == k + 1]
-        own = yields.get(k)
-        found.append(
-            SpanCheck(
-                k + 1,
-                supports[k],
-                span.span_length,
-                span.encumbrance,
-                span.contact_height,
-                float(slopes[k]),
-                float(changes[k]),
-                max(span.droppers.sag),
-                min(forces),
-                max(forces),
-                np.nan if own is None else float(own.min()),
-                np.nan if own is None else float(own.max()),
-                np.nan if own is None else non_uniformity(own),
-            )
-        )
+        part = yields.get(k, np.array([np.nan]))
+        geometry = supports[k], span.span_length, span.encumbrance, span.contact_height
+        changing = float(slopes[k]), float(changes[k]), max(span.droppers.sag)
+        elastic = float(part.min()), float(part.max()), non_uniformity(part)
+        found.append(SpanCheck(k + 1, *geometry, *changing, min(forces), max(forces), *elastic))
     return LineCheck(line, found, droppers, places, elasticities, force)
 
 
@@ -145,9 +129,11 @@ def span_tables(spans: Sequence[SpanCheck], name: Callable[[int], str] = str) ->
             name(each.number),
             f"{1e3 * each.pre_sag:.0f}",
             f"{each.smallest_force:.0f} to {each.largest_force:.0f}",
-            *_yields(each),
+            "–" if np.isnan(each.non_uniformity) else f"{1e3 * low:.3f} to {1e3 * high:.3f}",
+            "–" if np.isnan(each.non_uniformity) else f"{each.non_uniformity:.1f}",
         )
         for each in spans
+        for low, high in [(each.smallest_elasticity, each.largest_elasticity)]
     ]
     headings = ("span", "from (m)", "length (m)", "contact height (m)", "encumbrance (m)", "gradient (‰)")
     at_first = (*headings, "change of gradient (‰)")
@@ -173,13 +159,118 @@ def elasticity_table(checks: Sequence[LineCheck]) -> Table:
     return Table("Elasticity (in brackets: published, see `panto list LINE`)", ("line", *headings), rows)
 
 
-def _yields(span: SpanCheck) -> tuple[str, str]:
-    if np.isnan(span.non_uniformity):
-        return "–", "–"
-    lowest, highest = 1e3 * span.smallest_elasticity, 1e3 * span.largest_elasticity
-    return f"{lowest:.3f} to {highest:.3f}", f"{span.non_uniformity:.1f}"
-
-
 def _shown(value: float) -> float:
     """A gradient (‰) without the rounding of heights and lengths."""
     return round(value, 6) + 0.0
+
+
+@dataclass(frozen=True)
+class DrawnLine:
+    """A drawn line and a passive run at its highest speed; means over spans where nothing else is said."""
+
+    seed: int
+    draws: Annotated[int, "draws until a line is taken"]
+    milliseconds: Annotated[float, "time to draw it (ms)"]
+    length: Annotated[float, "length of the line (m)"]
+    span_length: Annotated[float, "span (m)"]
+    shortest_span: Annotated[float, "shortest span (m)"]
+    longest_span: Annotated[float, "longest span (m)"]
+    gradient: Annotated[float, "maximum gradient (‰)"]
+    gradient_change: Annotated[float, "maximum change of gradient (‰)"]
+    droppers: Annotated[float, "droppers of a span"]
+    encumbrance: Annotated[float, "encumbrance (m)"]
+    pre_sag: Annotated[float, "pre-sag (m)"]
+    contact_tension: Annotated[float, "tension of the contact wire (kN)"]
+    messenger_tension: Annotated[float, "tension of the messenger (kN)"]
+    wave_speed_kmh: Annotated[float, "wave speed (km/h)"]
+    speed_kmh: Annotated[float, "highest speed of trains (km/h)"]
+    force_deviation: Annotated[float, "σ / F_m at that speed"]  # nan where the run ended early, as the next
+    uplift: Annotated[float, "uplift at a support at that speed (m)"]
+    elasticity: Annotated[float, "maximum elasticity (m/N)"]
+    non_uniformity: Annotated[float, "non-uniformity of the elasticity (%)"]
+    ending: str  # where and why the run ended early; empty if it did not
+
+    def outside(self, lines: LineFamily | LineSection) -> list[str]:
+        """Names of the values that lie outside the bands; all of a run that ended early."""
+        bands = lines.plausible.model_dump(exclude={"pantograph"})
+        return [name for name, (low, high) in bands.items() if not low <= getattr(self, name) <= high]
+
+
+_HINTS = get_type_hints(DrawnLine, include_extras=True)
+LABELS: dict[str, str] = {
+    name: hint.__metadata__[0] for name, hint in _HINTS.items() if get_origin(hint) is Annotated
+}
+OF_SECTIONS = ("length", "shortest_span", "longest_span", "gradient", "gradient_change")
+"""Values that say nothing of a line whose spans are all alike."""
+
+
+def drawn_line(lines: LineFamily | LineSection, seed: int) -> DrawnLine:
+    """The line of a seed, the one that an environment with this seed has, and a run on it."""
+    begun = time.perf_counter()
+    line, (_, speed_kmh) = line_of_seed(lines, seed)
+    milliseconds = 1e3 * (time.perf_counter() - begun)
+    assert isinstance(line, FlexibleCatenaryData)
+    drawn = lines.drawn(line_generator(np.random.default_rng(seed)), (0.0, lines.fastest_kmh))
+    draws = 1 + next(k for k, one in enumerate(drawn) if one is not None)
+    run = simulate(line, lines.plausible.pantograph, speed_kmh, record_droppers=False)
+    figures = None if run.terminated else run.summary()
+    _, yields = elasticity(line, run.nominal_force)
+    each, heights, encumbrances = spans_of(line)
+    alignment = line.alignment()
+    slopes, changes = gradients(heights, alignment.supports)
+    return DrawnLine(
+        seed=seed,
+        draws=draws,
+        milliseconds=milliseconds,
+        length=alignment.length,
+        span_length=alignment.mean_length,
+        shortest_span=float(alignment.lengths.min()),
+        longest_span=float(alignment.lengths.max()),
+        gradient=float(np.abs(slopes).max()),
+        gradient_change=float(np.abs(changes).max()),
+        droppers=float(np.mean([len(span.droppers.positions) for span in each])),
+        encumbrance=float(np.mean(encumbrances)),
+        pre_sag=max(max(span.droppers.sag) for span in each),
+        contact_tension=line.contact_wire.tension / 1e3,
+        messenger_tension=line.messenger_wire.tension / 1e3,
+        wave_speed_kmh=to_kmh(line.contact_wire.wave_speed),
+        speed_kmh=speed_kmh,
+        force_deviation=figures.std / figures.mean if figures else np.nan,
+        uplift=figures.max_uplift if figures else np.nan,
+        elasticity=float(yields.max()),
+        non_uniformity=non_uniformity(yields),
+        ending=run.ending,
+    )
+
+
+def drawn_lines(
+    lines: LineFamily | LineSection, seeds: Sequence[int], progress: Progress | None = None
+) -> list[DrawnLine]:
+    """The lines of all seeds, on all cores; with progress as ``in_processes`` reports it."""
+    return in_processes([partial(drawn_line, lines, seed) for seed in seeds], progress=progress)
+
+
+def table(lines: LineFamily | LineSection, found: Sequence[DrawnLine]) -> Table:
+    """Minimum, median and maximum of each value, its band, and how many lines lie outside it."""
+    outside = [one.outside(lines) for one in found]
+    rows = []
+    for name, label in LABELS.items():
+        if name in OF_SECTIONS and not isinstance(lines, LineSection):
+            continue
+        values = np.array([getattr(one, name) for one in found], dtype=float)
+        band, beyond = getattr(lines.plausible, name, None), sum(name in each for each in outside)
+        rows.append(
+            (
+                label,
+                *(float(np.nanquantile(values, share)) for share in (0.0, 0.5, 1.0)),
+                "" if band is None else f"{band[0]:g} to {band[1]:g}",
+                "" if band is None else Alarm(beyond) if beyond else "0",
+            )
+        )
+    title = f"{len(found)} lines of {lines.kind} {lines.name}"
+    return Table(title, ("value", "minimum", "median", "maximum", "plausible", "lines outside"), rows)
+
+
+def facts(lines: LineFamily | LineSection, found: Sequence[DrawnLine]) -> list[dict[str, Any]]:
+    """All lines as plain data, with what lies outside the bands."""
+    return [asdict(one) | {"outside": one.outside(lines)} for one in found]

@@ -1,4 +1,4 @@
-"""The settings of a run as options of a command: names, defaults and help are stated only in the settings."""
+"""Options of commands: the settings of a run, and what several commands share."""
 
 from __future__ import annotations
 
@@ -14,61 +14,41 @@ import typer
 from typer.models import OptionInfo
 
 from ..base.errors import InputError
-from ..base.table_file import TABLES
+from ..base.table import TABLES
 from ..control.settings import fields
-from ..metrics.spans import FIRST_SETTLED, SpanChoice, check_spans
+from ..metrics.compliance import Criterion, criteria_table, remarks
+from ..metrics.figures import FIRST_SETTLED, SpanChoice, check_spans
 from ..plant.numerics import Numerics
-from ..terminal import writable
+from ..terminal import console, print_table, writable
+
+
+def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
+    """Print the table of criteria with limits, then notes and values without limits."""
+    table = criteria_table(criteria, title)
+    if table.rows:
+        print_table(table)
+    for line in remarks(criteria):
+        console.print(line, soft_wrap=True)
+
 
 RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""
-OTHER_UNITS = {"time_step": ("s", "ms", 1e-3)}
-"""Options in another unit than the setting: the setting's unit, the option's unit, and the factor."""
+IN_MILLISECONDS = ("time_step",)
+"""Options in milliseconds, of settings in seconds."""
 SEVERAL: dict[str, type] = {"pantograph": str, "distances": float, "controlled": int}
 """Options that may be given several times, and the type of each value. A command without distances takes one
 pantograph."""
 SIMPLE = (bool, int, float, str)
-LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS = (
-    "Line",
-    "Pantograph",
-    "Run",
-    "Output",
-    "Control and learning",
-)
+PANELS = ("Line", "Pantograph", "Run", "Output", "Control and learning")
 """Panels of the help, in its order."""
 LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS
-PANEL_OF = {
-    **dict.fromkeys(("catenary", "line_condition", "spans"), LINE),
-    **dict.fromkeys(
-        (
-            "pantograph",
-            "distances",
-            "controlled",
-            "mean_force",
-            "pantograph_scatter",
-            "actuator",
-            "sensors",
-        ),
-        PANTOGRAPH,
-    ),
-    **dict.fromkeys(
-        (
-            "control_interval",
-            "washout",
-            "observation",
-            "harmonics",
-            "history",
-            "line_values",
-            "normalise",
-            "estimator",
-            "known_pantograph",
-            "reward",
-            "cost",
-            "settle",
-        ),
-        LEARNING,
-    ),
+_SETTINGS = {
+    LINE: "catenary line_condition spans",
+    PANTOGRAPH: "pantograph distances controlled mean_force pantograph_scatter actuator sensors",
+    LEARNING: "control_interval washout observation harmonics history line_values normalise estimator "
+    "known_pantograph reward cost settle",
 }
+PANEL_OF = {name: panel for panel, names in _SETTINGS.items() for name in names.split()}
 """Panels of settings; others are in that of the run."""
 OUTPUTS = {"output", "figures", "droppers", "plot", "html", "force", "live", "json"}
 OUTPUTS |= {"first_span", "seconds", "slow_motion", "size"}  # of a film
@@ -111,7 +91,7 @@ def with_settings(
     of the settings. Its other arguments become arguments and options as usual. defaults: whether options that
     are not given have their default, which the help then shows.
     """
-    names = [name for name in only or _names() if name not in left_out]
+    names = [name for name in only or filter(_type, fields()) if name not in left_out]
     trains = "distances" in names
 
     def decorate(command: Command) -> Command:
@@ -119,7 +99,9 @@ def with_settings(
         def with_options(**given: Any) -> None:
             options = {name: given.pop(RENAMED.get(name, name)) for name in names}
             settings = {
-                name: _to_setting(name, value) for name, value in options.items() if value is not None
+                name: 1e-3 * value if name in IN_MILLISECONDS else value
+                for name, value in options.items()
+                if value is not None
             }
             command(_riding(settings) if trains else settings, **given)
 
@@ -150,11 +132,6 @@ def parse_spans(text: str | None) -> SpanChoice:
     return spans
 
 
-def _names() -> list[str]:
-    """Settings that can be given by a word or a number."""
-    return [name for name in fields() if _type(name) is not None]
-
-
 def _riding(settings: dict[str, Any]) -> dict[str, Any]:
     """Settings in which a pantograph that is named once is the only one, and several are a train."""
     named = settings.pop("pantograph", None) or []
@@ -181,9 +158,8 @@ def _type(name: str) -> type | None:
 def _option(name: str, defaults: bool, trains: bool) -> inspect.Parameter:
     field, kind, several = fields()[name], _type(name), trains and name in SEVERAL
     text = field.description or ""
-    if name in OTHER_UNITS:
-        unit, shown, _ = OTHER_UNITS[name]
-        text = text.replace(f"({unit})", f"({shown})", 1)
+    if name in IN_MILLISECONDS:
+        text = text.replace("(s)", "(ms)", 1)
     text = f"{text[:1].upper()}{text[1:]}."
     if several:
         text += " May be given several times."
@@ -217,7 +193,3 @@ def _place(parameter: inspect.Parameter) -> tuple[int, bool]:
     panels = [getattr(each, "rich_help_panel", None) for each in get_args(parameter.annotation)]
     place = next((PANELS.index(panel) for panel in panels if panel in PANELS), -1)
     return place, parameter.name in Numerics.model_fields
-
-
-def _to_setting(name: str, value: Any) -> Any:
-    return value * OTHER_UNITS[name][2] if name in OTHER_UNITS else value

@@ -4,22 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import marks
-from ..base.colours import BLUE, GREEN, PURPLE, VERMILION, series_colour
+from ..base import plotting as marks
 from ..base.files import PICTURES, check_output, write_whole
-from ..base.legend import legend_above
-from ..metrics import en50367
-from ..metrics.figures import losses_of_contact
+from ..base.plotting import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    POSITION,
+    PURPLE,
+    SUPPORT,
+    VERMILION,
+    legend_above,
+    mark_supports,
+    series_colour,
+)
+from ..metrics import compliance as en50367
+from ..metrics.figures import SpanChoice, in_words, losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
+from ..plant.catenary.flexible.on_grid import dropper_positions
+from ..plant.catenary.flexible.overlaps import profiles
+from ..plant.catenary.flexible.spans import spans_of
+from ..plant.catenary.flexible.static import hang
+from .line_check import LineCheck
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,7 +103,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
     supply = run.line.system
     marks.fit_force_axis(contacts, en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply))
     for axis in figure.axes:
-        mark_supports(axis, run)
+        mark_supports_of_run(axis, run)
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
     figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
@@ -109,7 +124,7 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
         _draw_force(axis, run, run.alignment.within(run.position, spans), raw="0.8")
         note = ", ended early" if run.terminated else ""
         axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
-        mark_supports(axis, run)
+        mark_supports_of_run(axis, run)
     limit = en50367.maximum_limit(runs[0].speed, runs[0].line.system)
     marks.fit_force_axis(axes.tolist(), limit, en50367.maximum_source(runs[0].line.system))
     legend_above(axes[0])
@@ -120,7 +135,7 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
     return figure
 
 
-def mark_supports(axis: Axes, run: Trajectory) -> None:
+def mark_supports_of_run(axis: Axes, run: Trajectory) -> None:
     """Draw dashed lines at the supports of a run."""
     marks.mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
 
@@ -156,3 +171,68 @@ def _not_shown(run: Trajectory, shown: Spans | None) -> str:
     if shown is None:
         return f"all {run.distance:.0f} m of the run"
     return f"spans {in_words(shown)}; the rest of the run's {run.distance:.0f} m is not shown"
+
+
+SHOWN = 3
+"""Number of spans that are drawn of a line whose spans are all alike."""
+POINTS = 60
+"""Points per span."""
+
+
+def plot_line(found: LineCheck) -> Figure:
+    """Both wires with supports and droppers, the contact wire alone, and the elasticity, along the line.
+
+    Heights are exaggerated. Of a line whose spans are all alike, three are drawn.
+    """
+    from matplotlib.figure import Figure
+
+    line, shape = found.line, hang(found.line)
+    spans, heights, encumbrances = spans_of(line) if line.sequence else spans_of(line, SHOWN)
+    supports = np.array(line.alignment(len(spans)).supports)
+    between = [np.linspace(*ends, POINTS) for ends in pairwise(supports)]
+    parts = profiles(line, shape, len(spans))
+    droppers = dropper_positions(line, len(spans))
+    x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
+    width = min(max(9.0, supports[-1] / 80.0), 40.0)
+    figure = Figure(figsize=(width, 8.2), layout="constrained")
+    wires, contact, elasticity = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
+    for axis in (wires, contact, elasticity):
+        mark_supports(axis, supports.tolist())
+    tops = np.array(heights) + encumbrances
+    wires.vlines(supports, min(heights) - 0.15, tops, color=SUPPORT, linewidth=2.5, label="support")
+    bottoms = np.zeros(len(droppers))
+    for part, lower, upper in parts:
+        own = x[(x >= part.begin) & (x <= part.end)]
+        wires.plot(own, upper.height(own - part.begin), color=GREEN, label="messenger wire")
+        wires.plot(own, lower.height(own - part.begin), color=BLUE, label="contact wire")
+        bottoms[part.droppers] = lower.height(droppers[part.droppers] - part.begin)
+    for rope in shape.ropes:
+        for begin in [0.0] if line.sequence else supports:
+            wires.plot(begin + rope.places, rope.heights, color=ORANGE, linewidth=1.0, label="stitch wire")
+    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
+    tops_of_droppers = bottoms + np.tile(stretched, len(droppers) // len(stretched))
+    wires.vlines(droppers, bottoms, tops_of_droppers, color="0.3", linewidth=0.8, label="dropper")
+    for k, span in enumerate(spans):
+        wires.annotate(
+            f"{line.alignment().mast(k) or k + 1}\n{span.span_length:.3g} m",
+            ((supports[k] + supports[k + 1]) / 2, tops.max()),
+            ha="center",
+            va="top",
+            fontsize="x-small",
+        )
+    alike = "" if line.sequence else f" ({SHOWN} of {line.spans} spans, all alike)"
+    wires.set(ylabel="height (m)", title=f"line {line.name} at rest{alike}; heights are exaggerated")
+    named = dict(zip(*reversed(wires.get_legend_handles_labels()), strict=True))  # each name once
+    figure.legend(named.values(), named, loc="outside upper right", ncols=5, fontsize="small")
+    for part, lower, _ in parts:
+        own = x[(x >= part.begin) & (x <= part.end)]
+        contact.plot(own, 1e3 * lower.height(own - part.begin), color=BLUE)
+    contact.plot(droppers, 1e3 * bottoms, ".", color=BLUE)
+    contact.set(ylabel="contact wire (mm)")
+    places, yields = found.places, 1e3 * found.elasticities
+    if not line.sequence:
+        places, yields = np.add.outer(supports[:-1], places).ravel(), np.tile(yields, SHOWN)
+    elasticity.plot(places, yields, color=VERMILION)
+    elasticity.set(xlabel=POSITION, ylabel=f"elasticity\nat {found.force:g} N (mm/N)", xlim=(0, supports[-1]))
+    elasticity.set_ylim(bottom=0)
+    return figure

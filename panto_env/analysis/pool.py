@@ -1,18 +1,40 @@
-"""Many jobs on all cores, in processes or in threads, with results in the order of the jobs."""
+"""Jobs in processes, which end with their parent, in threads, or one by one."""
 
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 from typing import TypeVar
 
 from ..base.errors import InputError
 from ..base.machine import cores
-from .worker import end_with_parent
+
+ORPHANED = 1
+"""Exit status of a worker whose parent is gone."""
+
+
+def end_with_parent() -> None:
+    """End this worker as soon as its parent ends, for whatever reason: SIGKILL leaves no time for a message.
+
+    An interrupt from the keyboard, which every process of a command gets, is left to the parent.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_watch, name="panto-parent", daemon=True).start()
+
+
+def _watch() -> None:
+    parent = parent_process()
+    assert parent is not None  # a worker has one
+    wait([parent.sentinel])
+    os._exit(ORPHANED)  # in the middle of its work, for which nobody waits any more
+
 
 T = TypeVar("T")
 Job = Callable[[], T]
@@ -21,7 +43,6 @@ Progress = Callable[[int, int], None]
 """Called with the numbers of finished jobs and of all jobs."""
 Take = Callable[[int, T], None]
 """Called with the index and the result of each job as soon as it is finished."""
-
 MOST_PASSES = 100_000
 """Maximum number of passes of a sweep or a benchmark: an hour and more, on two cores."""
 LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
@@ -81,18 +102,14 @@ def one_by_one(jobs: Sequence[Job[T]], *, progress: Progress | None = None) -> l
     return results
 
 
-MOST_PER_CORE = 4
-"""Maximum number of workers per core; more would only take their time to start."""
-
-
 def workers_for(jobs: int, workers: int | None) -> int:
-    """Number of workers for a number of jobs, by default one per core, never more than a few per core.
+    """Number of workers for jobs, by default one per core, at most four. Raises InputError for less than one.
 
-    Raises InputError for less than one.
+    More would only take their time to start.
     """
     if workers is not None and workers < 1:
         raise InputError(f"workers must be 1 or more, not {workers}.")
-    return max(1, min(cores() if workers is None else workers, MOST_PER_CORE * cores(), jobs))
+    return max(1, min(cores() if workers is None else workers, 4 * cores(), jobs))
 
 
 def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[T] | None = None) -> list[T]:
@@ -110,7 +127,6 @@ def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[
 def _through(
     executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None, take: Take[T] | None = None
 ) -> list[T]:
-    """Submit all jobs, collect their results, and shut the executor down."""
     try:
         return collect([executor.submit(job) for job in jobs], progress, take)
     except (KeyboardInterrupt, SystemExit):

@@ -6,23 +6,25 @@ import inspect
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from numbers import Integral
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.shown import shown
+from ..base.errors import InputError, shown
 from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
+from ..control.identity import identity, settings_of
 from ..control.lines import on_drawn_line
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..control.state import Result
-from ..metrics.spans import SpanChoice
-from ..metrics.trajectory import Trajectory
+from ..metrics.figures import SpanChoice
+from ..metrics.low_pass import low_pass
+from ..metrics.trajectory import SUFFIXES, Trajectory
 from ..plant.catenary import CATENARIES
 from ..plant.state import Row
-from ..policies import Policy, checked_action, errors_name, find_policy, wishes
+from ..policies import Policy, check_named, checked_action, errors_name, find_policy, wishes
 
 OFF_LINE = 1e-6
 """Position before the line's start (m) from which on a pantograph waits: nearer is rounding."""
@@ -65,7 +67,8 @@ def simulate(
         raise InputError(f"seed must be a whole number from 0 up, not {shown(seed)}.")
     if not isinstance(record_droppers, bool):
         raise InputError(f"record_droppers must be True or False, not {shown(record_droppers)}.")
-    drivers = [] if policy is None else _drivers(policy)
+    several = policy if isinstance(policy, list | tuple) else [policy]
+    drivers = [] if policy is None else [find_policy(each) for each in several]
     given = {"catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
     given |= wishes(drivers[0] if drivers else None) | settings
     task = _ready(given, seed, trimmed_over, record_droppers)
@@ -74,7 +77,7 @@ def simulate(
     if not drivers:
         task.run_passively(watch)
         return task.trajectory(0, seed=seed, last=True)
-    first = policy[0] if isinstance(policy, list | tuple) else policy
+    first = several[0]
     name = first if isinstance(first, str) else str(getattr(first, "name", type(first).__name__))
     for share in steps_of_policy(task, drivers, name):
         if progress is not None:
@@ -84,13 +87,7 @@ def simulate(
     return task.trajectory(0, policy=name, seed=seed, last=True)
 
 
-def _drivers(policy: Any) -> list[Policy]:
-    several = policy if isinstance(policy, list | tuple) else [policy]
-    return [find_policy(each) for each in several]
-
-
 def _ready(given: dict[str, Any], seed: int, trimmed_over: SpanChoice, record_droppers: bool) -> Task:
-    """A task with these settings, its lane reset under the seed."""
     random = np.random.default_rng(seed)
     checked = far_enough(on_drawn_line(run_settings(given), lambda: random))
     trim = trim_of_pass(checked, seed, trimmed_over, passive_mean)
@@ -147,12 +144,77 @@ def let_act(task: Task, row: int, driver: Policy, action: Array) -> None:
         action[:] = checked_action(driver.act(observation), action.shape)
 
 
-def _explicit() -> inspect.Signature:
-    """The signature of ``simulate`` with every setting by name."""
-    named = inspect.signature(simulate).parameters
-    first = [argument for argument in named.values() if argument.kind is not inspect.Parameter.VAR_KEYWORD]
-    others = [argument for argument in parameters() if argument.name not in named]
-    return inspect.Signature([*first, *others])
+_named = inspect.signature(simulate).parameters
+simulate.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    [
+        *(each for each in _named.values() if each.kind is not inspect.Parameter.VAR_KEYWORD),
+        *(argument for argument in parameters() if argument.name not in _named),
+    ]
+)
 
 
-simulate.__signature__ = _explicit()  # type: ignore[attr-defined]
+TOLERANCE = 0.1
+"""Maximum rms difference (N) of the low-passed force for the same run: the last digit of printed figures.
+Rounding on another processor makes about 0.0002 N."""
+
+
+def is_saved_run(source: Any) -> bool:
+    """Whether a source is the file of a saved run, by its suffix."""
+    return isinstance(source, str | Path) and Path(source).suffix.lower() in SUFFIXES
+
+
+def load_with_settings(path: str | Path) -> tuple[Trajectory, dict[str, Any]]:
+    """A saved run, and the settings with which ``simulate`` repeats it, besides its policy and seed.
+
+    Raises InputError where the file is not a saved run, or its version did not save the line.
+    """
+    run = Trajectory.load(path)
+    try:
+        return run, _as_given(settings_of(run.settings, run.design), run)
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            f"{path} was written by another version, {run.settings.get('version', 'unknown')}, without its "
+            "line or with other settings, so the run cannot be repeated; write it again with "
+            "`panto simulate --output`."
+        ) from error
+
+
+def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
+    """The settings without grid and time step, where the defaults give the same ones.
+
+    A policy's own passive runs, which normalise its readings, are at other speeds, with other grids.
+    """
+    without = {
+        name: value for name, value in settings.items() if name not in ("time_step", "spacing", "window")
+    }
+    task = Task(run_settings(without), keep_samples=False)
+    found = identity(task.settings, task.plant, task.length.own_distance)
+    return without if found == run.settings else settings
+
+
+def check_made_anew(run: Trajectory, settings: dict[str, Any], path: str | Path) -> None:
+    """Repeat a saved run, and raise InputError unless its contact force is that of the file.
+
+    Its policy must be an installed one or a model file: the run may be anyone's.
+    """
+    try:
+        check_named(run.controlled.policy, "it")
+        repeated = simulate(policy=run.controlled.policy, seed=run.seed, record_droppers=False, **settings)
+    except InputError as error:
+        raise InputError(f"The run of {path} cannot be repeated: {error}") from error
+    if len(repeated.time) != len(run.time):
+        raise _different(run, path, f"it ends at {repeated.distance:.1f} m instead of {run.distance:.1f} m")
+    pairs = zip(repeated.train, run.train, strict=True)
+    differences = [low_pass(new.contact_force - old.contact_force, run.time_step) for new, old in pairs]
+    rms = max(float(np.sqrt(np.mean(difference**2))) for difference in differences)
+    if not rms <= TOLERANCE:
+        raise _different(run, path, f"its contact force differs by {rms:.2g} N rms")
+
+
+def _different(run: Trajectory, path: str | Path, how: str) -> InputError:
+    return InputError(
+        f"The run of {path} cannot be repeated: with its settings and policy '{run.controlled.policy}' it "
+        f"comes out differently now, {how}. The policy or the version has changed, or its mean force was met "
+        "over --spans, or its policy saw another observation, which the file does not record; write it again "
+        "with `panto simulate --output`."
+    )

@@ -12,45 +12,38 @@ from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import InputError
-from ..base.names import hint
+from ..base.errors import InputError, hint, shown
 from ..base.settings import Settings
-from ..base.shown import shown
-from ..base.table_file import write_rows
+from ..base.table import write_rows
 from ..control import Task
 from ..control.arguments import check_arguments
 from ..control.settings import RunSettings, default, run_settings, speed_range
-from ..metrics.droppers import evaluated, near_train
-from ..metrics.figures import Figures
-from ..metrics.labels import HEADINGS, LABELS, NUMBER
-from ..metrics.spans import SpanChoice, in_words
+from ..metrics.by_span import evaluated, near_train
+from ..metrics.figures import HEADINGS, LABELS, NUMBER, Figures, SpanChoice, in_words
 from ..metrics.trajectory import Trajectory
 from ..policies import find_policy, with_parameters
-from .parameters import change, check_name, parameter_label, parameter_names
-from .pool import Progress, check_passes, in_threads, workers_for
-from .simulation import simulate
-from .swept_train import (
+from .parameters import (
     DISTANCES,
+    change,
     changed_train,
-    distance_label,
+    check_name,
     is_distance,
+    parameter_label,
+    parameter_names,
     placed,
     riding,
     with_distances,
 )
+from .pool import Progress, check_passes, in_threads, workers_for
+from .simulation import simulate
 
 SPEED = "speed_kmh"
 POLICY = "policy"
 """First part of a parameter of all policies, for example ``policy.gain``."""
-MOST_PARAMETERS = 3
 FIRST = ("catenary.span_length", "catenary.droppers.spacing")
 """Parameters that lay out droppers anew, in the order in which they are changed, before all others."""
 
 Row = dict[str, Any]
-DISCRETISATION = ("time_step", "spacing", "window")
-"""Settings that may depend on a swept value, and which a row therefore contains."""
-SEEN_BY_POLICIES = ("actuator", "sensors")
-"""Families without effect on the passive pantograph."""
 FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, for example ``pantograph.masses.1``."""
 
@@ -81,11 +74,10 @@ def sweep(
     ``catenary.droppers.spacing``, ``actuator.lag``), ``speed_kmh``, ``policy.gain`` for a keyword of
     every policy, or ``distances``, that of the second of two ``pantographs`` (m), ``distances.1``,
     ``distances.2`` where there are more; ``pantograph.`` changes all pantographs of a train. policies: names,
-    model files, or None for the passive pantograph. spans: spans of the figures, first and last from 1, or
-    "all"; by default those after the start. line_spans: ``spans`` of ``simulate``, the number of the line's.
-    workers: threads, one per core by default; the results do not depend on it. progress: called with the
-    numbers of finished and of all passes. seed, settings: as for ``simulate`` (catenary, pantograph,
-    speed_kmh, distance (m), ...).
+    model files, or None for the passive pantograph. spans: of the figures, as ``Trajectory.summary`` takes
+    them. line_spans: ``spans`` of ``simulate``, the number of the line's. workers: threads, one per core by
+    default; the results do not depend on it. progress: called with the numbers of finished and of all passes.
+    seed, settings: as for ``simulate``.
 
     Returns one row per pass, in the order of values, then policies: the swept values, the run's settings,
     every figure of ``Trajectory.summary``, the maximum force of a dropper (N), the number of droppers that go
@@ -140,16 +132,14 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
     for name in parameters:
         family, _, rest = name.partition(".")
         if is_distance(name):
-            found[name] = distance_label(name)
-        found.setdefault(
-            name,
-            parameter_label(name, entries[family]) if family in entries else f"policy: {rest}",
-        )
+            number = int(rest or 1) + 1
+            found[name] = f"distance of pantograph {number} behind the first (m)"
+        elif name != SPEED:
+            found[name] = parameter_label(name, entries[family]) if family in entries else f"policy: {rest}"
     return found
 
 
 def _entries(settings: RunSettings) -> dict[str, Settings]:
-    """Entries whose values a sweep can change, by family."""
     entries: dict[str, Settings] = {family: getattr(settings, family) for family in FAMILIES[:-1]}
     return entries | {"catenary": settings.line, "line_condition": settings.line_condition[0]}
 
@@ -159,7 +149,7 @@ def _check(
     entries: Mapping[str, Settings],
     policies: Sequence[str | Path | None],
 ) -> None:
-    if not 1 <= len(parameters) <= MOST_PARAMETERS:
+    if not 1 <= len(parameters) <= 3:
         raise InputError(f"One to three parameters can be swept, not {len(parameters)}.")
     if not policies:
         raise InputError("There is no policy to run; name at least one, or leave policies at its default.")
@@ -171,7 +161,7 @@ def _check(
         if len(values) == 0:
             raise InputError(f"There are no values of {name} to run.")
         family = name.partition(".")[0]
-        if family in SEEN_BY_POLICIES and all(policy is None for policy in policies):
+        if family in ("actuator", "sensors") and all(policy is None for policy in policies):
             raise InputError(f"{name} changes nothing without a policy; name one.")
         twice = next((value for value, count in Counter(values).items() if count > 1), None)
         if twice is not None:
@@ -184,7 +174,13 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
 
     The longest pass is built, not run: it needs the most memory.
     """
-    longest = max(passes, key=_seconds)
+
+    def seconds(one_pass: _Pass) -> float:
+        line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
+        length = distance or line.alignment().length
+        return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
+
+    longest = max(passes, key=seconds)
     given = {name: value for name, value in longest.arguments.items() if name in RunSettings.model_fields}
     with _named(longest):
         cost = Task(run_settings(given), record_droppers=True).cost
@@ -192,16 +188,8 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
     cost._replace(memory=at_once * cost.memory).check(f"{at_once} passes at once", ", or fewer workers")
 
 
-def _seconds(one_pass: _Pass) -> float:
-    """Approximate duration of a pass (s)."""
-    line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
-    length = distance or line.alignment().length
-    return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
-
-
 @contextmanager
 def _named(one_pass: _Pass) -> Iterator[None]:
-    """Within the body an InputError names the swept values."""
     try:
         yield
     except InputError as error:
@@ -260,7 +248,6 @@ def _prepare(
 
 
 def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
-    """Rows of a pass, one for each pantograph."""
     with _named(one_pass):
         run = simulate(**one_pass.arguments)
         train = run.train
@@ -277,7 +264,7 @@ def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
             "system": own.line.system,
             "speed_kmh": one_pass.arguments["speed_kmh"],
             "seed": own.seed,
-            **{name: own.settings[name] for name in DISCRETISATION},
+            **{name: own.settings[name] for name in ("time_step", "spacing", "window")},  # as the values need
             "nominal_force": own.nominal_force,
             "terminated": own.terminated,
             "ending": own.ending,
@@ -294,7 +281,6 @@ NOT_JUDGED: Row = dict.fromkeys(("dropper_force", "slack_droppers", "slack"), ma
 
 
 def _judged(run: Trajectory, spans: SpanChoice) -> Row:
-    """Droppers and requirements of a pass, with the keys of ``NOT_JUDGED``."""
     criteria = {each.key: each for each in run.compliance(spans)}
     broken = [LABELS[k].short if k in LABELS else k for k, each in criteria.items() if each.kept is False]
     row: Row = {"requirements": f"broken: {', '.join(broken)}" if broken else "kept"}

@@ -7,12 +7,12 @@ from math import isnan
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from ..base import marks
-from ..base.colours import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..base import plotting as marks
+from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
-from ..metrics import en50367
-from ..metrics.labels import LABELS, NUMBER
+from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..metrics import compliance as en50367
+from ..metrics.figures import LABELS, NUMBER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,16 +21,12 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 DASHES = (0, (5, 3))
 """Line style of limits: longer dashes than those of a maximum."""
-LETTERS = 40
-"""Maximum length of a line of an axis's label (letters)."""
-FORCES: dict[str, tuple[str, Any]] = {
+FORCES: dict[str, Any] = {
     "maximum": ("max", "--"),
     "mean": ("mean", "-"),
     "minimum": ("min", ":"),
 }
 """Figures of the contact force over one parameter, by their name in the legend: key and line style."""
-BELOW_FORCE = ("std", "contact_loss", "max_uplift")
-"""Figures that a plot over one parameter shows below the contact force."""
 MAPPED = {"std": HIGH_IS_BAD, "max": HIGH_IS_BAD, "min": LOW_IS_BAD}
 """Figures that are shown as maps over two parameters, and their colours."""
 
@@ -66,7 +62,7 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    shown = [key for key in BELOW_FORCE if not all(isnan(row[key]) for row in rows)]
+    shown = [key for key in ("std", "contact_loss", "max_uplift") if not all(isnan(row[key]) for row in rows)]
     no_loss = all(row["contact_loss"] == 0 for row in rows)
     if no_loss:
         shown.remove("contact_loss")
@@ -144,12 +140,11 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
             axis.set_title(f"{LABELS[key].name}, {policy}", fontsize="medium")
         figure.colorbar(mesh, ax=column, label=f"{LABELS[key].unit}; bright is worse")
     figure.supxlabel(labels[parameters[0]], fontsize="medium")
-    figure.supylabel(fill(labels[parameters[1]], LETTERS), fontsize="medium")
+    figure.supylabel(fill(labels[parameters[1]], 40), fontsize="medium")
     return figure
 
 
 def _series(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each policy, and of each pantograph of a train, in the order in which they were given."""
     found: dict[str, list[Row]] = {}
     for row in rows:
         name = f"{row['policy']}, pantograph {row[NUMBER]}" if NUMBER in row else row["policy"]

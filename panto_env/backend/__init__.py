@@ -8,14 +8,23 @@ select a function by the type of its first argument; ``constants`` gives kernels
 With ``NUMBA_DISABLE_JIT=1`` all of them do the same in plain Python.
 """
 
-from .cache import cache_folder, source_hash
-from .compile import JIT, called, constants, inlined, kernel, python_function
-from .dispatch import implements, operation
-from .mathematics import NOT_NEGATIVE, any_of, choose, larger
-from .memory import CACHE_LINE, aligned_zeros, copy_whole
-from .packed import bind, open_packed, pack
+from .cache import cache_folder, cached, source_hash
+from .compile import JIT, called, constants, implements, inlined, kernel, operation, python_function
+from .packed import CACHE_LINE, aligned_zeros, bind, copy_whole, open_packed, pack
 from .threads import LaneThreads
-from .vectors import WIDTH, gather, load_row, scatter_add, shift_down, shift_up, store_row
+from .vectors import (
+    NOT_NEGATIVE,
+    WIDTH,
+    any_of,
+    choose,
+    gather,
+    larger,
+    load_row,
+    scatter_add,
+    shift_down,
+    shift_up,
+    store_row,
+)
 
 __all__ = [
     "CACHE_LINE",
@@ -27,6 +36,7 @@ __all__ = [
     "any_of",
     "bind",
     "cache_folder",
+    "cached",
     "called",
     "choose",
     "constants",

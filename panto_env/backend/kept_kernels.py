@@ -69,8 +69,6 @@ class _InPackage(_CacheLocator):  # type: ignore[misc]
 
 
 class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
-    """Compiled kernels in their form on disk."""
-
     _locator_classes = (_InPackage, *CompileResultCacheImpl._locator_classes)
 
     def reduce(self, result: Any) -> tuple[bytes, bytes]:
@@ -87,8 +85,6 @@ class _CheckedResults(CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class _InWheel(_InPackage):
-    """Place of a kernel that the wheel brought."""
-
     def get_cache_path(self) -> str:
         return str(_brought_folder())
 
@@ -181,7 +177,6 @@ class KeptKernels(FunctionCache):  # type: ignore[misc]
 
 
 def _loaded(kept: Any, types: Any, target_context: Any) -> Any:
-    """The compiled form for these types; None where it is missing or damaged."""
     try:
         kernel = kept.load_overload(types, target_context)
     except Exception:  # damaged files can lead to any error
@@ -201,7 +196,6 @@ def _locked(file: int) -> bool:
 
 
 def _announce() -> None:
-    """Announce the compilation on standard error, where a user sees it."""
     global _announced
     seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if seen and time.monotonic() - _announced > PAUSE:

@@ -137,7 +137,6 @@ def _number(k: int) -> Any:
 
 
 def _vector(builder: Any, numbers: list[Any]) -> Any:
-    """A vector of eight numbers, or another count of them."""
     vector = ir.Constant(ir.VectorType(numbers[0].type, len(numbers)), ir.Undefined)
     for k, number in enumerate(numbers):
         vector = builder.insert_element(vector, number, _number(k))
@@ -161,13 +160,11 @@ def _numbers(context: Any, builder: Any, array_type: Any, array: Any, places: li
 
 
 def _in_row(builder: Any, i: Any, count: int) -> list[Any]:
-    """Places of the numbers of row ``i`` of ``count``."""
     first = builder.mul(i, ir.Constant(i.type, count))
     return [builder.add(first, ir.Constant(i.type, k)) for k in range(count)]
 
 
 def _row(context: Any, builder: Any, array_type: Any, values: Any, count: int) -> Any:
-    """Address of a row of ``count`` numbers in C's order."""
     array, i = values
     data = make_array(array_type)(context, builder, array).data
     first = builder.gep(data, [builder.mul(i, ir.Constant(i.type, count))])
@@ -304,3 +301,49 @@ def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any
         return context.get_dummy_value()
 
     return types.void(rows, places, types.intp, VectorType(rows.dtype)), build
+
+
+NOT_NEGATIVE = 0xFFFFFFF
+"""Mask by which the compiler knows that an index is not negative, so that it need not wrap around."""
+
+
+def _common(*given: Any) -> Any:
+    """Type of the result of an operation on vectors and numbers; None where no vector is among them."""
+    if not all(isinstance(each, VectorType | types.Number) for each in given):
+        return None
+    return next((each for each in given if isinstance(each, VectorType)), None)
+
+
+@in_python(np.where)
+def choose(typing: Any, mask: Any, a: Any, b: Any) -> Any:
+    """``choose(mask, a, b)``: a where the mask is true, b elsewhere."""
+    kind = _common(a, b)
+    if kind is None or not isinstance(mask, MaskType):
+        return None
+    return kind(mask, kind, kind), lambda context, builder, sig, values: builder.select(*values)
+
+
+@in_python(np.maximum)
+def larger(typing: Any, a: Any, b: Any) -> Any:
+    """``larger(a, b)``: the larger one; b where one is nan."""
+    kind = _common(a, b)
+    if kind is None:
+        return None
+
+    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(">", *values), *values)
+
+    return kind(kind, kind), build
+
+
+@in_python(np.any)
+def any_of(typing: Any, mask: Any) -> Any:
+    """``any_of(mask)``: whether any element of a mask is true."""
+    if not isinstance(mask, MaskType):
+        return None
+
+    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        bits = builder.bitcast(values[0], ir.IntType(mask.count))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return types.boolean(mask), build

@@ -1,11 +1,44 @@
 """Types of numeric arrays in signatures; shapes are given in docstrings and comments."""
 
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.linalg
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 Array = NDArray[np.floating[Any]]
 Index = NDArray[np.integer[Any]]
 Lanes = int | Index
 """Numbers of lanes: one, or an array of them."""
+
+
+T = TypeVar("T", float, Array)
+
+METRES_PER_SECOND = 3.6
+"""1 m/s in km/h."""
+
+
+def from_kmh(speed: T) -> T:
+    """Speed (m/s), or speeds, from km/h."""
+    return speed / METRES_PER_SECOND
+
+
+def to_kmh(speed: T) -> T:
+    """Speed (km/h), or speeds, from m/s."""
+    return METRES_PER_SECOND * speed
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Within the body, linear algebra uses one thread: several would sum in another order.
+
+    This holds for libraries that are loaded when the body begins. SciPy has its own library: import
+    ``scipy.linalg`` before the body where it is used.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
-from .errors import InputError
-from .files import check_regular
-from .names import suggest
+from .errors import InputError, suggest
+from .files import write_whole
 
 JITTER = 0.05
 """Maximum distance of a time stamp from equal steps, as a share of the step: more is not rounding."""
@@ -127,8 +126,36 @@ def equal_step(time: Array, minimum: int, purpose: str) -> float:
     return step
 
 
+def read_series(
+    path: str | Path,
+    columns: Mapping[str, Column],
+    units: Mapping[str, str] | None,
+    minimum: int,
+    purpose: str,
+) -> tuple[float, Read]:
+    """Time step (s) and columns of a record at equal steps, as ``equal_step`` and ``read_columns`` do."""
+    values = read_columns(path, columns, units)
+    try:
+        return equal_step(values["time"], minimum, purpose), values
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def write_series(path: str | Path, columns: Mapping[str, Array]) -> None:
+    """Write columns, (n,) each, as CSV under their headings, to twelve digits, whole or not at all."""
+    with write_whole(path) as temporary:
+        np.savetxt(
+            temporary,
+            np.column_stack(list(columns.values())),
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+            fmt="%.12g",
+            encoding="utf-8",
+        )
+
+
 def _text(path: str | Path) -> str:
-    check_regular(path)
     try:
         data = Path(path).read_bytes()
     except OSError as error:

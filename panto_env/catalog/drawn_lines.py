@@ -1,23 +1,135 @@
 """Descriptions from which lines are drawn that hang and that an engineer would build.
 
 Each kind is a TOML file with a schema of its own, and is named where a line is expected by its kind, a colon
-and its name or its file: "family:high-speed".
+and its name or its file: "family:high-speed". Values that belong together are not drawn apart: a wire's mass,
+tension and bending stiffness follow from its section and stress.
 """
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings
+from ..plant.catenary import check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from .line_ranges import Length, Range, Share
+from ..plant.catenary.flexible.spans import evenly, parabola
+from ..plant.catenary.flexible.static import hang
+from ..plant.catenary.schema import LONGEST_SPAN
+from .values import values_of
+
+N = TypeVar("N")
+
+
+def _two(value: Any) -> Any:
+    return value if isinstance(value, list | tuple) else (value, value)
+
+
+def _rising(ends: tuple[N, N]) -> tuple[N, N]:
+    if ends[0] > ends[1]:  # type: ignore[operator]
+        raise ValueError("must not fall from the first number to the second")
+    return ends
+
+
+Range: TypeAlias = Annotated[tuple[N, N], BeforeValidator(_two), AfterValidator(_rising)]
+"""A range to draw from evenly: two numbers, or one that all lines have."""
+Share = Annotated[float, Between(0, 1)]
+Length = Annotated[float, Between(0, LONGEST_SPAN, "m")]
+
+
+class WireRanges(Settings):
+    """A wire by its section and stress, from which its mass, tension and bending stiffness follow."""
+
+    section: Range[Annotated[float, Between(1e-6, 1e-3, "m^2")]] = Field(description="area (m^2)")
+    stress: Range[Annotated[float, Between(1e6, 2e9, "Pa")]] = Field(description="tension per area (Pa)")
+    density: Annotated[float, Between(500, 20_000, "kg/m^3")] = Field(description="mass per volume (kg/m^3)")
+    modulus: Annotated[float, Between(1e8, 1e12, "Pa")] = Field(
+        description="E of the bending stiffness E A^2 / (4 pi), that of a solid round wire (Pa)"
+    )
+
+    def draw(self, random: np.random.Generator) -> dict[str, float]:
+        """Values of a ``Wire``."""
+        section, stress = random.uniform(*self.section), random.uniform(*self.stress)
+        return {
+            "mass": self.density * section,
+            "tension": stress * section,
+            "bending_stiffness": self.modulus * section**2 / (4 * math.pi),
+        }
+
+
+class DropperRanges(Settings):
+    """Droppers of a span, symmetric about its middle, at even distances between the outer two."""
+
+    first: Range[Share] = Field(
+        description="distance of the first dropper from the support, as a share of the span (-)"
+    )
+    distance: Range[Annotated[float, Between(1, LONGEST_SPAN, "m")]] = Field(
+        description="between droppers (m), approximately, which gives their number"
+    )
+    shortest: Length = Field(description="minimum length of a dropper (m)")
+    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = Field(
+        description="stiffness in tension (N/m)"
+    )
+    mass: Range[Annotated[float, Between(0, 5, "kg/m")]] = Field(description="mass per length (kg/m)")
+    clamp_mass: Range[Annotated[float, Between(0, 10, "kg")]] = Field(description="each clamp (kg)")
+
+    def draw(self, random: np.random.Generator, span: float, pre_sag: float) -> dict[str, Any]:
+        """Values of ``Droppers``. span: m. pre_sag: of the contact wire in the middle of the span (m)."""
+        first, distance = span * random.uniform(*self.first), random.uniform(*self.distance)
+        x = evenly(span, first, distance)
+        clamp = random.uniform(*self.clamp_mass)
+        return {
+            "positions": x.tolist(),
+            "sag": parabola(x, pre_sag).tolist(),
+            "stiffness": random.uniform(*self.stiffness),
+            "mass": random.uniform(*self.mass),
+            "messenger_clamp_mass": clamp,
+            "contact_clamp_mass": clamp,
+        }
+
+
+class PreSagRange(Settings):
+    """How far the contact wire hangs below its height at the supports, in the middle of the span."""
+
+    chance: Share = Field(description="share of lines that have any; on the others the wire is flat (-)")
+    share: Range[Annotated[float, Between(0, 0.01)]] = Field(description="as a share of the span (-)")
+
+
+class SteadyArmRanges(Settings):
+    """Steady arms, which some lines have in the model and others do not."""
+
+    chance: Share = Field(description="share of lines that have any (-)")
+    mass: Range[Annotated[float, Between(0, 50, "kg")]] = Field(
+        description="mass that moves with the contact wire (kg)"
+    )
+    stiffness: Range[Annotated[float, Between(0, 1e6, "N/m")]] = Field(description="vertical stiffness (N/m)")
+
+
+class SupportRanges(Settings):
+    """What holds the messenger wire at a mast."""
+
+    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = Field(
+        description="vertical stiffness (N/m)"
+    )
+    damping: Range[Annotated[float, Between(0, 1e6, "N s/m")]] = Field(description="vertical damping (N s/m)")
+
+
+class DampingRanges(Settings):
+    """Damping matrix alpha M + beta K."""
+
+    alpha: Range[Annotated[float, Between(0, 50, "1/s")]] = Field(
+        description="mass-proportional damping (1/s)"
+    )
+    beta: Range[Annotated[float, Between(0, 0.1, "s")]] = Field(
+        description="stiffness-proportional damping (s)"
+    )
+
 
 DRAWN = ("family", "section")
 """Kinds of descriptions."""
@@ -63,9 +175,9 @@ class DrawnLines(Settings):
         """Maximum speed of trains on any of the lines (km/h)."""
 
     @property
-    @abstractmethod
     def fewest_spans(self) -> int | None:
         """Number of spans after which a line ends at the earliest; None where none of the lines ends."""
+        return None
 
     @abstractmethod
     def speeds(self, wave_speed: float, speed_kmh: Speeds | None = None) -> Speeds:
@@ -96,6 +208,18 @@ class DrawnLines(Settings):
             if line is not None:
                 return line, self.speeds(line.contact_wire.wave_speed, speed_kmh)
         raise InputError(self.none_found(speed_kmh))
+
+    def hung(self, values: dict[str, Any], shortest: float) -> FlexibleCatenaryData | None:
+        """The line with these values; None where it cannot hang, or has shorter droppers (m)."""
+        try:
+            line = FlexibleCatenaryData.model_validate(values)
+            check_line(line)
+        except ValueError:  # InputError too
+            return None
+        if hang(line).dropper_length.min() < shortest:
+            return None
+        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
+        return line.model_copy(update={"sources": sources})
 
     def drawn(
         self, random: np.random.Generator, speed_kmh: Speeds | None = None

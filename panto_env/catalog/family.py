@@ -1,31 +1,73 @@
-"""A family of lines: ranges from which a line is drawn that hangs and that an engineer would build."""
+"""Families of flexible lines, and the limits of EN 50119 on the gradient of the contact wire."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ..base.ranges import Between
-from ..base.units import to_kmh
-from ..plant.catenary import check_line
+from ..base.arrays import Array, to_kmh
+from ..base.settings import Between
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.static import hang
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, PowerSystem
-from .drawn_lines import Bands, DrawnLines, Speeds, in_words
-from .line_ranges import (
+from .drawn_lines import (
+    Bands,
     DampingRanges,
+    DrawnLines,
     DropperRanges,
     PreSagRange,
     Range,
     Share,
+    Speeds,
     SteadyArmRanges,
     SupportRanges,
     WireRanges,
+    in_words,
 )
-from .values import values_of
+
+GRADIENTS = (
+    (50.0, 25.0, 25.0),
+    (60.0, 20.0, 10.0),
+    (100.0, 6.0, 3.0),
+    (120.0, 4.0, 2.0),
+    (160.0, 3.3, 1.7),
+    (200.0, 2.0, 1.0),
+    (250.0, 1.0, 0.5),
+)
+"""Up to a speed (km/h): maximum gradient, and maximum change of gradient at a support (‰). Above, both are
+0."""
+SOURCE = "EN 50119, recalled"
+ROUNDING = 1e-6
+"""Excess over a limit that is due to rounding (‰)."""
+
+
+def gradient_limits(speed_kmh: float) -> tuple[float, float]:
+    """Maximum gradient and maximum change of gradient (‰) for trains of a speed (km/h)."""
+    return next(((most, change) for speed, most, change in GRADIENTS if speed_kmh <= speed), (0.0, 0.0))
+
+
+def gradients(heights: Sequence[float], supports: Sequence[float]) -> tuple[Array, Array]:
+    """Gradient of each span (‰), and its change at the span's first support (‰), 0 at the line's first one.
+
+    heights: of the contact wire at the supports (m), (spans + 1,). supports: their positions (m).
+    """
+    slopes = 1e3 * np.diff(heights) / np.diff(supports)
+    return slopes, np.diff(slopes, prepend=slopes[:1])
+
+
+def highest_speed(gradient: float, change: float) -> float:
+    """Highest speed of the classes (km/h) for a gradient and its change (‰); 0 for none, inf for all."""
+    if max(gradient, change) <= ROUNDING:
+        return float("inf")
+    kept = [
+        speed
+        for speed, most, most_change in GRADIENTS
+        if gradient <= most + ROUNDING and change <= most_change + ROUNDING
+    ]
+    return max(kept, default=0.0)
 
 
 class LineFamily(DrawnLines):
@@ -65,14 +107,15 @@ class LineFamily(DrawnLines):
         """As ``DrawnLines.fastest_kmh``."""
         return self.max_speed_kmh
 
-    @property
-    def fewest_spans(self) -> None:
-        """As ``DrawnLines.fewest_spans``."""
-        return None
-
     def draw_once(self, random: np.random.Generator, speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
         """A line; None for one that cannot hang, or whose droppers, tensions or speeds do not fit."""
-        return self._line(self._values(random), speed_kmh)
+        values = self._values(random)
+        contact, messenger = values["contact_wire"], values["messenger_wire"]
+        low, high = self.speeds(math.sqrt(contact["tension"] / contact["mass"]), speed_kmh)
+        least, most = self.tension_ratio
+        if not low <= high or not least <= messenger["tension"] / contact["tension"] <= most:
+            return None
+        return self.hung(values, self.droppers.shortest)
 
     def none_found(self, speed_kmh: Speeds | None) -> str:
         """As ``DrawnLines.none_found``."""
@@ -102,6 +145,8 @@ class LineFamily(DrawnLines):
             random.uniform(*ends) for ends in (self.steady_arm.mass, self.steady_arm.stiffness)
         )
         return {
+            "name": self.full_name,
+            "description": f"Drawn from a family. {self.description}",
             "system": self.system,
             "span_length": span,
             "spans": self.spans,
@@ -119,22 +164,3 @@ class LineFamily(DrawnLines):
                 "beta": random.uniform(*self.damping.beta),
             },
         }
-
-    def _line(self, values: dict[str, Any], speed_kmh: Speeds | None) -> FlexibleCatenaryData | None:
-        """The line with these values; None where it is to be drawn again."""
-        contact, messenger = values["contact_wire"], values["messenger_wire"]
-        low, high = self.speeds(math.sqrt(contact["tension"] / contact["mass"]), speed_kmh)
-        least, most = self.tension_ratio
-        if not low <= high or not least <= messenger["tension"] / contact["tension"] <= most:
-            return None
-        try:
-            line = FlexibleCatenaryData.model_validate(
-                {"name": self.full_name, "description": f"Drawn from a family. {self.description}", **values}
-            )
-            check_line(line)
-        except ValueError:  # InputError too
-            return None
-        if hang(line).dropper_length.min() < self.droppers.shortest:
-            return None
-        sources = {each.key: each.source or f"drawn from {self.full_name}" for each in values_of(line)}
-        return line.model_copy(update={"sources": sources})

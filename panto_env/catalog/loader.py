@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import warnings
 from collections.abc import Mapping
@@ -12,20 +14,17 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.errors import InputError, UnusualWarning
-from ..base.explanation import explain
+from ..base.checksums import remembered
+from ..base.errors import InputError, UnusualWarning, nearest, shown, suggest
 from ..base.files import read_toml
-from ..base.names import nearest, suggest
-from ..base.settings import Settings
-from ..base.shown import shown
+from ..base.settings import Settings, explain
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.pantograph.build import check_at_rest
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, check_at_rest
 from .drawn_lines import DRAWN, DrawnLines
 from .family import LineFamily
 from .section import LineSection
-from .unusual import Ranges, ranges_of, remarks
+from .values import Ranges, ranges_of, remarks
 
 E = TypeVar("E", CatenaryData, PantographData)
 
@@ -78,14 +77,12 @@ def load_family(source: str | Path | LineFamily) -> LineFamily:
     Raises InputError, naming the file and the key, where it cannot be read, is not valid, or has no lines.
     Warns of values of an example line that are far from the catalogue's.
     """
-    family: LineFamily = source if isinstance(source, LineFamily) else _load_drawn("family", source)
-    return family
+    return source if isinstance(source, LineFamily) else _load_drawn("family", source)
 
 
 def load_section(source: str | Path | LineSection) -> LineSection:
     """Section to draw from, from a catalogue name, a TOML file, or one already loaded; as ``load_family``."""
-    section: LineSection = source if isinstance(source, LineSection) else _load_drawn("section", source)
-    return section
+    return source if isinstance(source, LineSection) else _load_drawn("section", source)
 
 
 def load_drawn(source: Any) -> LineFamily | LineSection:
@@ -168,11 +165,15 @@ def _load_drawn(kind: str, source: Any) -> Any:
 
 
 def _load(family: str, source: str | Path) -> Any:
-    path = _find(family, source)
+    path = file_of(source, family)
     return _read(family, path, path.stat().st_mtime_ns)
 
 
-def _find(family: str, source: str | Path) -> Path:
+def file_of(source: str | Path, family: str = "catenary") -> Path:
+    """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
+
+    Raises InputError where there is none.
+    """
     if not isinstance(source, str | Path):
         raise InputError(
             f"A {family} must be a catalogue name, a TOML file or a catalogue entry, "
@@ -199,22 +200,14 @@ def parse_catenary(table: Mapping[str, Any], path: Path) -> CatenaryData:
 
     Raises InputError, and warns, as ``load_catenary`` does.
     """
-    line: CatenaryData = _entry("catenary", table, path)
-    return _checked(line, path)
+    line: CatenaryData = _checked(_entry("catenary", table, path), path)
+    return line
 
 
 def parse_pantograph(table: Mapping[str, Any], path: Path) -> PantographData:
     """Pantograph from the table of a TOML file, as ``parse_catenary`` does for lines."""
-    pantograph: PantographData = _entry("pantograph", table, path)
-    return _checked(pantograph, path)
-
-
-def file_of(source: str | Path, family: str = "catenary") -> Path:
-    """TOML file of a line by its name in the catalogue or its path, or of another part of the catalogue.
-
-    Raises InputError where there is none.
-    """
-    return _find(family, source)
+    pantograph: PantographData = _checked(_entry("pantograph", table, path), path)
+    return pantograph
 
 
 @cache
@@ -299,4 +292,43 @@ def _split(table: Mapping[str, Any], prefix: str, sources: dict[str, str]) -> di
             values[key] = _split(item, f"{place}.", sources)
         else:
             values[key] = item
+    return values
+
+
+WORDS = ("name", "description", "sources", "published")
+"""Keys that say nothing of the values."""
+
+
+@remembered
+def content_of(entry: CatenaryData | PantographData) -> str:
+    """SHA-256 of a line's or a pantograph's values, in hexadecimal.
+
+    Values at their defaults are left out, so that a key that is added later changes nothing.
+    """
+    # By its own class, not a base's; a rig holds a line.
+    values = _without_words(entry.model_dump(mode="json", exclude_defaults=True, serialize_as_any=True))
+    return hashlib.sha256(json.dumps([type(entry).__name__, values], sort_keys=True).encode()).hexdigest()
+
+
+def content_unless_catalogue(entry: CatenaryData | PantographData) -> str | None:
+    """``content_of`` an entry, or None where the catalogue has it by its name, with the same values."""
+    found = content_of(entry)
+    return None if _content_in_catalogue(entry, entry.name) == found else found
+
+
+def is_entry(entry: CatenaryData | PantographData, name: str, content: str | None) -> bool:
+    """Whether a line or a pantograph is the one stored by its name and ``content_unless_catalogue``."""
+    known = _content_in_catalogue(entry, name) if content is None else content
+    return known == content_of(entry)  # None where it was a file's: there is nothing to know its values by
+
+
+def _content_in_catalogue(entry: CatenaryData | PantographData, name: str) -> str | None:
+    """``content_of`` the catalogue's entry of a name, of the kind of ``entry``; None where it has none."""
+    family = "catenary" if isinstance(entry, CatenaryData) else "pantograph"
+    return content_of(_load(family, name)) if name in available(family) else None
+
+
+def _without_words(values: Any) -> Any:
+    if isinstance(values, dict):
+        return {key: _without_words(value) for key, value in values.items() if key not in WORDS}
     return values

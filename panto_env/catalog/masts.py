@@ -111,7 +111,6 @@ def _surveyed(columns: Read, masts: str | Path) -> Items:
 
 
 def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, Any]]:
-    """A table for each span, and one of what is at the last mast."""
     lengths = _lengths(columns, masts)
     heights: dict[str, Sequence[float]] = {}
     if "contact_height" in columns:
@@ -142,7 +141,6 @@ def _spans(columns: Read, masts: str | Path) -> tuple[Items, dict[str, Any]]:
 
 
 def _lengths(columns: Read, masts: str | Path) -> list[float]:
-    """Lengths of the spans between masts (m)."""
     if ("position" in columns) == ("span" in columns):
         raise InputError(
             f"{masts} needs either a column position (m) or a column span (m), of each mast; if "

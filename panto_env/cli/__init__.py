@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import io
+import os
 import signal
 import sys
 import warnings
+from contextlib import suppress
 from types import FrameType
 from typing import Annotated, Any, TextIO
 
 import typer
-from typer import Abort
+from typer import Abort, Option
 
-from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning
-from ..base.plain_characters import show_always
-from ..base.shown import one_line
-from ..base.standard_streams import guarded_streams, say
-from ..base.version import __version__
-from ..terminal import NARROW, console
+from ..base.checksums import __version__
+from ..base.errors import AccuracyWarning, InputError, PlugInWarning, UnusualWarning, one_line
+from ..terminal import NARROW, console, say
 from .group import PlugInGroup, give_options_once
 
 UsageError: Any = typer.BadParameter.__base__
@@ -28,15 +28,24 @@ def main() -> None:
 
     SIGTERM ends it like an interrupt from the keyboard, with all clean-up.
     """
-    show_always()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # where an encoding lacks Greek letters
     warnings.showwarning = _show_warning
-    with guarded_streams():
-        sys.exit(_run())
+    sys.exit(_run())
 
 
 def _run() -> int:
     """Exit status of the command."""
-    stopped = _stop_on_sigterm()
+    stopped: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        """Turn the first SIGTERM into an interrupt; a second one kills."""
+        signal.signal(number, signal.SIG_DFL)
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
     status: int | None
     try:
         status = make_app()(standalone_mode=False)  # otherwise Typer draws a box around errors
@@ -52,23 +61,14 @@ def _run() -> int:
         return _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
     except Abort:
         status = 1
+    except OSError as error:  # standard output is full, or nobody reads it on
+        with suppress(OSError):  # otherwise the exit would fail too
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1 if isinstance(error, BrokenPipeError) else _refuse(f"{error}.")
     if stopped:
         say("Stopped by SIGTERM before it was done.")
         status = 128 + signal.SIGTERM
     return status or 0
-
-
-def _stop_on_sigterm() -> list[int]:
-    """Turn the first SIGTERM into an interrupt, and return a list that will hold it; a second one kills."""
-    stopped: list[int] = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        signal.signal(number, signal.SIG_DFL)
-        stopped.append(number)
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
-    return stopped
 
 
 def _refuse(sentence: str) -> int:
@@ -93,25 +93,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
-    from . import (
-        catalogue,
-        compare,
-        diagnose,
-        drift,
-        estimate,
-        family,
-        film,
-        fit,
-        identify,
-        line,
-        record,
-        reproduce,
-        rig,
-        simulate,
-        speed,
-        sweep,
-        validate,
-    )
+    from . import catalogue, diagnose, estimate, fit, identify, lines, records, simulate, studies, sweep
 
     app = typer.Typer(
         name="panto",
@@ -126,22 +108,12 @@ def make_app() -> typer.Typer:
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
-    app.command()(simulate.simulate)
-    app.command()(film.film)
-    app.command()(sweep.sweep)
-    app.command()(family.family)
-    app.command()(line.line)
-    app.command()(validate.validate)
-    app.command()(identify.identify)
-    app.command()(estimate.estimate)
-    app.command()(diagnose.diagnose)
-    app.command()(record.record)
-    app.command()(compare.compare)
-    app.command()(fit.fit)
-    app.command()(drift.drift)
-    app.command()(speed.speed)
-    app.command()(reproduce.reproduce)
-    app.command()(rig.rig)
+    for command in (
+        *(simulate.simulate, simulate.film, sweep.sweep, lines.family, lines.line, studies.validate),
+        *(identify.identify, estimate.estimate, diagnose.diagnose, records.record, records.compare),
+        *(fit.fit, fit.drift, studies.speed, studies.reproduce, studies.rig),
+    ):
+        app.command()(command)
     give_options_once(app)
     return app
 
@@ -153,7 +125,7 @@ def _show_version(requested: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
+    bool, Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
 ]
 
 

@@ -1,39 +1,174 @@
-"""``panto list``: lines, pantographs, policies and presets by name."""
+"""Descriptions of everything with a name: lines, pantographs, policies, presets of settings."""
 
 from __future__ import annotations
 
+import inspect
+import json
 import sys
-from typing import Annotated
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
 
-import typer
+from pydantic import BaseModel
 from rich.table import Table
+from typer import Argument, Option
 
-from ..base.errors import InputError
-from ..base.table_file import TABLES, write_rows
-from ..catalog.loader import text_of
-from ..plant.catenary.flexible.dropper_table import HEADINGS, as_rows, dropper_table
-from ..terminal import Json, console, print_json, print_table, writable
-from .descriptions import LOADERS, POLICY, PRESETS, Description, described, everything
+from ..base.errors import InputError, suggest
+from ..base.files import finite, read_toml
+from ..base.table import TABLES, write_rows
+from ..catalog import available, load_catenary, load_family, load_pantograph, load_section
+from ..catalog.drawn_lines import DrawnLines
+from ..catalog.loader import SCHEMAS, text_of
+from ..catalog.values import by_value, values_of
+from ..plant.actuators import ACTUATOR_PRESETS
+from ..plant.catenary.flexible.static import (
+    HEADINGS,
+    RestingDropper,
+    as_rows,
+    dropper_table,
+    droppers_at_rest,
+)
+from ..plant.catenary.schema import CatenaryData
+from ..plant.line_condition import LINE_CONDITIONS
+from ..plant.pantograph.schema import PantographData
+from ..plant.sensors import SENSOR_PRESETS
+from ..policies import maker_of, parameters_of, policy_names
+from ..terminal import Json, console, into_file, print_json, print_table
+
+Entry = CatenaryData | PantographData | DrawnLines
+LOADERS: Mapping[str, Callable[[str], Entry]] = {
+    "catenary": load_catenary,
+    "pantograph": load_pantograph,
+    "family": load_family,
+    "section": load_section,
+}
+PRESETS: Mapping[str, Mapping[str, BaseModel]] = {
+    "line_condition": LINE_CONDITIONS,
+    "actuator": ACTUATOR_PRESETS,
+    "sensors": SENSOR_PRESETS,
+}
+"""Presets by setting."""
+POLICY = "policy"
+
+
+class Description(NamedTuple):
+    """Description of one line, pantograph, policy or preset."""
+
+    family: str
+    name: str
+    text: str  # paragraphs
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    data: Any  # the same content for JSON
+    droppers: Sequence[RestingDropper] = ()  # of a span of a line
+
+
+def everything() -> dict[str, list[Description]]:
+    """Descriptions of everything with a name, by family."""
+    return {
+        **{
+            family: [_entry(family, load(name)) for name in available(family)]
+            for family, load in LOADERS.items()
+        },
+        POLICY: [_policy_or_why_not(name) for name in policy_names()],
+        **{family: [_preset(family, name) for name in presets] for family, presets in PRESETS.items()},
+    }
+
+
+def described(name: str) -> list[Description]:
+    """Descriptions of everything with this name, or of a TOML file. Raises InputError for an unknown name."""
+    if name.endswith(".toml"):
+        family = _family_of(name)
+        return [_entry(family, LOADERS[family](name))]
+    found = [_entry(family, load(name)) for family, load in LOADERS.items() if name in available(family)]
+    found += [_policy(name)] if name in policy_names() else []
+    found += [_preset(family, name) for family, presets in PRESETS.items() if name in presets]
+    if not found:
+        known = [*(each for family in LOADERS for each in available(family)), *policy_names()]
+        known += [each for presets in PRESETS.values() for each in presets]
+        raise InputError(
+            f"Unknown name '{name}': {suggest(name, list(dict.fromkeys(known)))}; or a TOML file."
+        )
+    return found
+
+
+def _family_of(path: str) -> str:
+    """Family of a TOML file, by its kind; that of lines where the kind is missing or unknown."""
+    kind = read_toml(path).get("kind")
+    return next((family for family, schemas in SCHEMAS.items() if kind in schemas), next(iter(LOADERS)))
+
+
+def _entry(family: str, entry: Entry) -> Description:
+    rows = [(each.key, str(each.value), each.meaning, each.source) for each in values_of(entry)]
+    headings = ("key", "value", "meaning", "source")
+    droppers = droppers_at_rest(entry)
+    data = by_value(entry) | ({"droppers_at_rest": as_rows(droppers)} if droppers else {})
+    return Description(family, entry.name, entry.description, headings, rows, data, droppers)
+
+
+def _policy_or_why_not(name: str) -> Description:
+    """Description of a policy; for a plug-in that can't be loaded the reason."""
+    try:
+        return _policy(name)
+    except InputError as error:
+        data = {"name": name, "description": str(error), "parameters": {}}
+        return Description(POLICY, name, str(error), (), (), data)
+
+
+def _policy(name: str) -> Description:
+    maker = maker_of(name)
+    texts = [inspect.getdoc(maker) or ""]
+    made = maker.__init__ if inspect.isclass(maker) and maker.__init__ is not object.__init__ else None
+    texts += [inspect.getdoc(made) or ""] if made is not None else []
+    text = "\n\n".join(filter(None, texts))
+    defaults = {
+        key: None if each.default is each.empty else each.default
+        for key, each in parameters_of(maker).items()
+    }
+    rows = [(key, repr(value)) for key, value in defaults.items()]
+    plain = {key: value if _fit_for_json(value) else repr(value) for key, value in defaults.items()}
+    data = {"name": name, "description": text, "parameters": plain}
+    return Description(POLICY, name, text, ("parameter", "default"), rows, data)
+
+
+def _fit_for_json(value: Any) -> bool:
+    try:
+        return bool(json.dumps(finite(value)))
+    except (TypeError, ValueError, RecursionError):
+        return False
+
+
+def _preset(family: str, name: str) -> Description:
+    preset = PRESETS[family][name]
+    usual = type(preset)()
+    rows = [
+        (key, str(getattr(preset, key)), str(getattr(usual, key)), field.description or "")
+        for key, field in type(preset).model_fields.items()
+    ]
+    others = ", ".join(PRESETS[family])
+    option = f"--{family.replace('_', '-')}"
+    first = next(key for key, value in usual if isinstance(value, float))
+    text = f"A preset of {option}; presets are {others}. With your own values: {option} {name}:{first}=..."
+    text += f"\n\n{inspect.getdoc(type(preset))}"
+    return Description(
+        family, name, text, ("key", "value", "usually", "meaning"), rows, preset.model_dump(mode="json")
+    )
 
 
 def list_entries(
     name: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Show all values of this line, pantograph, policy, line condition, preset of actuator or "
             "sensors, or TOML file."
         ),
     ] = None,
     toml: Annotated[
-        bool,
-        typer.Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from."),
+        bool, Option("--toml", help="Print the TOML file of a line or pantograph, to start yours from.")
     ] = False,
     droppers: Annotated[
         str | None,
-        typer.Option(
-            help="Write the droppers of the line at rest, with force, length and stretch, to this file "
-            f"({', '.join(TABLES)}).",
-            callback=writable(TABLES),
+        into_file(
+            "Write the droppers of the line at rest, with force, length and stretch, to this file", TABLES
         ),
     ] = None,
     json: Json = False,

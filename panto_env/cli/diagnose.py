@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from ..analysis.plots import save
 from ..base.errors import InputError
+from ..diagnosis import diagnose as judge
+from ..diagnosis import diagnose_records
+from ..diagnosis.diagnosis import findings_table, plot_diagnosis, verdict
+from ..diagnosis.features import FALSE_ALARMS
+from ..fitting.stored import stored
 from ..metrics.trajectory import Trajectory
+from ..records.record_file import read_record
 from ..terminal import Json, Plot, alert, console, print_json, print_table, progress_console, written_last
-from .record import Filtered, Heading, Mass, Unit, reading
-
-if TYPE_CHECKING:
-    from ..diagnosis import Diagnosis
+from .records import Filtered, Heading, Mass, Unit, reading
 
 LEAST_FALSE_ALARMS, MOST_FALSE_ALARMS = 1e-6, 20.0
 """False alarms per km: healthy passes say nothing of rarer ones, and with more, about one per span, a
@@ -24,35 +27,34 @@ threshold has no meaning."""
 def diagnose(
     run: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="Run to be diagnosed, from `panto simulate --output`; with --fit, a record of a train."
         ),
     ],
-    more: Annotated[list[Path] | None, typer.Argument(metavar="", hidden=True)] = None,
+    more: Annotated[list[Path] | None, Argument(metavar="", hidden=True)] = None,
     healthy: Annotated[
         list[Path] | None,
-        typer.Option(
+        Option(
             metavar="RUN...",
             help="Healthy runs over the same line at the same speed, three or more; better ten or more.",
         ),
     ] = None,
     fit: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="Instead of healthy runs: what a fit to earlier records knows of the healthy line, from "
             "`panto fit --keep`."
         ),
     ] = None,
     again: Annotated[
-        list[Path] | None,
-        typer.Option(help="A further run over the diagnosed line, for a mean; may be repeated."),
+        list[Path] | None, Option(help="A further run over the diagnosed line, for a mean; may be repeated.")
     ] = None,
     false_alarms: Annotated[
-        float | None, typer.Option(help="False alarms per km that set the threshold. Default: 0.1.")
+        float | None, Option(help="False alarms per km that set the threshold. Default: 0.1.")
     ] = None,
     pantograph: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Pantograph that the estimator assumes: a name of the catalogue or a TOML file. Default: "
             "the run's, as designed."
         ),
@@ -61,7 +63,7 @@ def diagnose(
     filtered: Filtered = None,
     unit: Unit = None,
     column: Heading = None,
-    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 0,
+    seed: Annotated[int, Option(help="Seed of the sensors' noise.")] = 0,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -73,9 +75,6 @@ def diagnose(
 
     With --fit, the force of a record is compared with that of runs simulated on the fitted line.
     """
-    from ..diagnosis.tables import findings_table, verdict
-    from ..diagnosis.threshold import FALSE_ALARMS
-
     if (healthy is None) == (fit is None):
         raise InputError(
             "Give either the healthy runs, panto diagnose RUN --healthy RUN RUN RUN, or a fit, "
@@ -102,24 +101,24 @@ def diagnose(
     with progress_console.status("reading and diagnosing"):
         files = (run, *(again or []))
         if fit is not None:
-            title, found = _of_records(files, fit, reading(unit, column, mass, filtered), rate, seed)
+            given = reading(unit, column, mass, filtered)
+            records = [read_record(file, **given) for file in files]
+            found = diagnose_records(records, stored(fit), false_alarms=rate, seed=seed)
+            title = f"{run.name}, held against the line fitted in {fit.name}"
         else:
-            title, found = _of_runs(files, (*(healthy or ()), *(more or ())), pantograph, rate, seed)
+            whole = (*(healthy or ()), *(more or ()))
+            runs, reference = ([Trajectory.load(path) for path in paths] for paths in (files, whole))
+            found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
+            place = f"{runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h"
+            title = f"{run.name}: {place}, {len(reference)} healthy runs"
     with written_last() as later:
         if plot is not None:
-            from ..analysis.plots import save
-            from ..diagnosis.plots import plot_diagnosis
-
             later(save, plot_diagnosis(found, title), plot)
         if json:
             findings: list[dict[str, Any]] = [vars(finding) for finding in found.findings]
             facts = {name: getattr(found, name) for name in ("healthy", "changed", "level", "begin", "end")}
-            extra = {
-                "threshold": found.evidence.threshold,
-                "false_alarms": found.false_alarms,
-                "notes": found.notes,
-            }
-            print_json(facts | extra | {"findings": findings})
+            facts |= {"threshold": found.evidence.threshold, "false_alarms": found.false_alarms}
+            print_json(facts | {"notes": found.notes, "findings": findings})
             return
         for sentence in verdict(found):
             console.print(sentence, soft_wrap=True)
@@ -127,28 +126,3 @@ def diagnose(
             print_table(findings_table(found))
         for note in found.notes:
             alert("Degraded:", note)
-
-
-def _of_runs(
-    files: Sequence[Path], healthy: Sequence[Path], pantograph: str | None, rate: float, seed: int
-) -> tuple[str, Diagnosis]:
-    """Title and diagnosis of simulated runs."""
-    from ..diagnosis import diagnose as judge
-
-    runs, reference = ([Trajectory.load(path) for path in paths] for paths in (files, healthy))
-    found = judge(runs, reference, false_alarms=rate, seed=seed, pantograph=pantograph)
-    judged = f"{runs[0].catenary} at {runs[0].speed_kmh:.4g} km/h"
-    return f"{files[0].name}: {judged}, {len(reference)} healthy runs", found
-
-
-def _of_records(
-    files: Sequence[Path], fit: Path, given: dict[str, Any], rate: float, seed: int
-) -> tuple[str, Diagnosis]:
-    """Title and diagnosis of a measuring train's records; given: arguments of ``read_record``."""
-    from ..diagnosis import diagnose_records
-    from ..fitting.stored import stored
-    from ..records.record_file import read_record
-
-    records = [read_record(file, **given) for file in files]
-    found = diagnose_records(records, stored(fit), false_alarms=rate, seed=seed)
-    return f"{files[0].name}, held against the line fitted in {fit.name}", found

@@ -4,33 +4,37 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
+from ..analysis.plots import save
+from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.table import Alarm, Table
-from ..base.table_file import TABLES, Sheet, write_table
-from ..base.units import from_kmh
+from ..base.settings import parse
+from ..base.table import TABLES, Alarm, Sheet, Table, write_table
+from ..catalog import load_pantograph
+from ..estimation.estimate import BANDS, Estimate, Score, plot_estimate, score
+from ..estimation.estimate import estimate as run
+from ..estimation.estimate import tune as find
+from ..estimation.innovations import nis
+from ..estimation.model import EstimatorSettings
+from ..estimation.motion import Motion, read_motion, rezeroed
+from ..metrics.figures import LABELS
+from ..metrics.low_pass import low_pass
+from ..plant.pantograph.schema import PantographData
 from ..terminal import (
     Json,
     Plot,
     alert,
+    into_file,
     number,
     print_json,
     print_table,
     progress_console,
-    writable,
     written_last,
 )
 from .identify import pairs
-
-if TYPE_CHECKING:
-    from ..estimation.estimate import Estimate
-    from ..estimation.motion import Motion
-    from ..estimation.score import Score
-    from ..estimation.settings import EstimatorSettings
-    from ..plant.pantograph.schema import PantographData
 
 TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
 
@@ -38,56 +42,47 @@ TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")
 def estimate(
     file: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="CSV: time, head, frame, and where measured head_velocity, frame_velocity, frame_force, "
             "head_force; a contact_force is compared with the estimate."
         ),
     ],
     pantograph: Annotated[
-        str, typer.Option(help="Name in the catalogue, or a TOML file, e.g. from `panto identify`.")
+        str, Option(help="Name in the catalogue, or a TOML file, e.g. from `panto identify`.")
     ],
     speed: Annotated[
         float | None,
-        typer.Option(help="Speed of the train (km/h); required for aerodynamic uplift.", min=0, max=1000),
+        Option(help="Speed of the train (km/h); required for aerodynamic uplift.", min=0, max=1000),
     ] = None,
-    span: Annotated[float | None, typer.Option(help="Length of a span (m).", min=1, max=1000)] = None,
+    span: Annotated[float | None, Option(help="Length of a span (m).", min=1, max=1000)] = None,
     lift: Annotated[
         float | None,
-        typer.Option(
-            help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0, max=100_000
-        ),
+        Option(help="Static force and aerodynamic uplift (N), if not the pantograph's.", min=0, max=100_000),
     ] = None,
     displacements: Annotated[
-        bool, typer.Option("--displacements", help="Do not use velocities, even if they were measured.")
+        bool, Option("--displacements", help="Do not use velocities, even if they were measured.")
     ] = False,
     force_model: Annotated[
-        str, typer.Option(help="random-walk, shaped or periodic, with values such as 'shaped:wavelength=5'.")
+        str, Option(help="random-walk, shaped or periodic, with values such as 'shaped:wavelength=5'.")
     ] = "random-walk",
     displacement_noise: Annotated[
-        float | None, typer.Option(help="White noise of a sample, rms (m).", show_default="2e-5")
+        float | None, Option(help="White noise of a sample, rms (m).", show_default="2e-5")
     ] = None,
     velocity_noise: Annotated[
-        float | None, typer.Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
+        float | None, Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
     ] = None,
-    lag: Annotated[float, typer.Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
+    lag: Annotated[float, Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
     free_zero: Annotated[
-        bool,
-        typer.Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift."),
+        bool, Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift.")
     ] = False,
     tune: Annotated[
-        bool,
-        typer.Option("--tune", help="First find noise intensities on this record by maximum likelihood."),
+        bool, Option("--tune", help="First find noise intensities on this record by maximum likelihood.")
     ] = False,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
+        Option(help="Unit of a column whose header has none, e.g. head=mm; may be repeated."),
     ] = None,
-    output: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Write the estimate to this file ({', '.join(TABLES)}).", callback=writable(TABLES)
-        ),
-    ] = None,
+    output: Annotated[str | None, into_file("Write the estimate to this file", TABLES)] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -97,13 +92,6 @@ def estimate(
     A record that cannot be a pantograph's is refused with the likely mistake. The mean force depends on the
     lift, and the inertia of the head on its mass: no test shows whether these are wrong.
     """
-    from ..base.settings import parse
-    from ..catalog import load_pantograph
-    from ..estimation.estimate import estimate as run
-    from ..estimation.motion_file import read_motion
-    from ..estimation.plausibility import rezeroed
-    from ..estimation.settings import EstimatorSettings
-
     known = load_pantograph(pantograph)
     metres = None if speed is None else from_kmh(speed)
     motion = read_motion(file, 0.0, speed=metres, span=span, units=pairs(unit or []))
@@ -121,8 +109,6 @@ def estimate(
     given = {key: value for key, value in given.items() if value is not None}
     settings = parse(EstimatorSettings, given, "settings")
     if tune:
-        from ..estimation.tuning import tune as find
-
         names = TUNED if only else (*TUNED, "velocity_noise")
         with progress_console.status("tuning"):
             tuned = find([motion], known, settings, names)
@@ -140,9 +126,6 @@ def estimate(
         if output is not None:
             later(write_table, _sheet(found), output)
         if plot is not None:
-            from ..analysis.plots import save
-            from ..estimation.plots import plot_estimate
-
             title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
             later(save, plot_estimate(found, title, motion.contact_force), plot)
         if json:
@@ -167,8 +150,6 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
 
 
 def _sheet(found: Estimate) -> Sheet:
-    from ..estimation.innovations import nis
-
     normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
     columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
     units = {"time": "time (s)", "contact_force": "contact_force (N)", "nis": "nis (-)"}
@@ -177,22 +158,13 @@ def _sheet(found: Estimate) -> Sheet:
 
 def _figures(found: Estimate) -> dict[str, float]:
     """Statistics of the estimate behind EN 50317's low-pass (N), after the filter's start."""
-    from ..metrics.low_pass import low_pass
-
     step = float(found.time[1] - found.time[0])
     force = low_pass(found.force, step)[found.first :]
-    return {
-        "mean": float(force.mean()),
-        "std": float(force.std()),
-        "max": float(force.max()),
-        "min": float(force.min()),
-    }
+    return {name: float(getattr(force, name)()) for name in ("mean", "std", "max", "min")}
 
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:
     """Comparison with the record's contact force, if any, in bands for which the record is long enough."""
-    from ..estimation.score import BANDS, score
-
     if motion.contact_force is None:
         return []
     kept, scores = slice(found.first, None), []
@@ -215,7 +187,7 @@ def _plain(
         "nis": tested.nis,
         "largest_autocorrelation": tested.whiteness.largest,
         "tests": [
-            {"name": test.name, "value": test.value, "low": test.low, "high": test.high, "kept": test.kept}
+            {key: getattr(test, key) for key in ("name", "value", "low", "high", "kept")}
             for test in found.verdict.tests
         ],
         "believe": found.verdict.believe,
@@ -228,8 +200,6 @@ def _plain(
 def _print(
     found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
 ) -> None:
-    from ..metrics.labels import LABELS
-
     rows: list[tuple[str, str, str]] = [
         (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()
     ]
@@ -253,7 +223,8 @@ def _scores_table(scores: list[Score]) -> Table:
     rows = []
     for each in scores:
         forces = number(each.bias, 2), number(each.rms, 2)
-        likeness = number(each.correlation, 4), number(1e3 * each.delay, 2)
-        rows.append((f"0 to {each.band:g} Hz", *forces, *likeness))
+        rows.append(
+            (f"0 to {each.band:g} Hz", *forces, number(each.correlation, 4), number(1e3 * each.delay, 2))
+        )
     headings = ("band", "bias (N)", "rms error (N)", "correlation", "delay (ms)")
     return Table("Compared with the recorded contact force", headings, rows)

@@ -3,17 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
-from ..base.errors import InputError
-from ..base.table_file import TABLES, write_rows
+from ..analysis.plots import save
+from ..base.errors import InputError, suggest
+from ..base.table import TABLES, write_rows
+from ..catalog import load_catenary, load_pantograph
+from ..fitting import fit as fits
+from ..fitting.drift import FALSE
+from ..fitting.drift import drift as between
+from ..fitting.fitted_line import check_design, write_line, write_pantograph
+from ..fitting.misfit import State
+from ..fitting.stored import SUFFIX, identity_of, kept, knowledge, store, stored
+from ..fitting.stored import keep as keep_state
+from ..fitting.tables import (
+    parts_table,
+    plain,
+    plot_drift,
+    plot_fit,
+    remarks,
+    rows_of,
+    summary_table,
+    values_table,
+)
+from ..fitting.values import FREE, USUAL
+from ..records.record_file import read_record
 from ..terminal import (
     Json,
     Plot,
     alert,
     bars,
+    console,
+    into_file,
     print_json,
     print_table,
     progress_console,
@@ -21,22 +44,18 @@ from ..terminal import (
     written_last,
 )
 from .identify import pairs
-from .record import Filtered, Heading, Mass, Unit, reading
-
-if TYPE_CHECKING:
-    from ..fitting.fit import Fit
-    from ..fitting.misfit import State
+from .records import Filtered, Heading, Mass, Unit, reading
 
 
 def fit(
     files: Annotated[
-        list[Path], typer.Argument(metavar="RECORD...", help="Records, as `panto record` reads them.")
+        list[Path], Argument(metavar="RECORD...", help="Records, as `panto record` reads them.")
     ],
-    line: Annotated[str, typer.Option(help="Line as designed: a name in the catalogue or a TOML file.")],
-    pantograph: Annotated[str, typer.Option(help="Pantograph: a name in the catalogue or a TOML file.")],
+    line: Annotated[str, Option(help="Line as designed: a name in the catalogue or a TOML file.")],
+    pantograph: Annotated[str, Option(help="Pantograph: a name in the catalogue or a TOML file.")],
     free: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="What may differ from the design, of tensions, droppers, supports, damping, pantograph and "
             "unevenness.",
             show_default="tensions,droppers,supports,damping,unevenness",
@@ -44,7 +63,7 @@ def fit(
     ] = None,
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Standard deviation of a kind of values before any record is seen, e.g. droppers=0.01 (m), "
             "tensions=0.03 (of the design's); may be repeated."
         ),
@@ -53,24 +72,16 @@ def fit(
     filtered: Filtered = None,
     unit: Unit = None,
     column: Heading = None,
-    output: Annotated[
-        str | None,
-        typer.Option(help="Write the fitted line to this file (.toml).", callback=writable((".toml",))),
-    ] = None,
+    output: Annotated[str | None, into_file("Write the fitted line to this file", (".toml",))] = None,
     pantograph_output: Annotated[
-        str | None,
-        typer.Option(help="Write the fitted pantograph to this file (.toml).", callback=writable((".toml",))),
+        str | None, into_file("Write the fitted pantograph to this file", (".toml",))
     ] = None,
     values: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Write all values with their intervals to this file ({', '.join(TABLES)}).",
-            callback=writable(TABLES),
-        ),
+        str | None, into_file("Write all values with their intervals to this file", TABLES)
     ] = None,
     keep: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Write the fit itself to this file (.safetensors), for `panto drift`.",
             callback=writable((".safetensors",)),
         ),
@@ -84,14 +95,6 @@ def fit(
     Records of several speeds tell more than as many of one. A fit that is broken off goes on where it was, if
     it is given an --output, --values or --keep.
     """
-    from ..catalog import load_catenary, load_pantograph
-    from ..fitting import fit as fits
-    from ..fitting.fitted_line import check_design
-    from ..fitting.kept import SUFFIX, identity_of, kept
-    from ..fitting.kept import keep as keep_state
-    from ..fitting.values import USUAL
-    from ..records.record_file import read_record
-
     names = USUAL if free is None else tuple(name.strip() for name in free.split(","))
     tolerances = by_kind(tolerance or [])
     given = reading(unit, column, mass, filtered)
@@ -118,49 +121,35 @@ def fit(
         def working(doing: str) -> None:
             progress.update(bar, description=doing)
 
-        found = fits.fit(
-            records,
-            design,
-            riding,
-            free=names,
-            tolerances=tolerances,
-            begin=begin,
-            report=report,
-            working=working,
-        )
+        choices: dict[str, Any] = {"free": names, "tolerances": tolerances, "begin": begin}
+        found = fits.fit(records, design, riding, **choices, report=report, working=working)
     every = ", ".join(file.name for file in files)
     with written_last() as later:
         if output is not None:
-            from ..fitting.fitted_line import write_line
-
             later(lambda: write_line(found, line, output, every))
         if pantograph_output is not None:
-            from ..fitting.fitted_line import write_pantograph
-
             later(lambda: write_pantograph(found, pantograph, pantograph_output, every))
         if values is not None:
-            from ..fitting.tables import rows_of
-
             later(write_rows, rows_of(found.found, found.before), values)
         if keep is not None:
-            from ..fitting.stored import knowledge, store
-
             later(lambda: store(knowledge(found, every), keep))
         if plot is not None:
-            from ..analysis.plots import save
-            from ..fitting.plots import plot_fit
-
             later(save, plot_fit(found, f"{every}: {riding.name} on {design.name}"), plot)
-        _print(found, json)
+        if json:
+            print_json(plain(found))
+        else:
+            summary = summary_table(found.found, found.differing, "the design")
+            for table in (parts_table(found), summary, values_table(found.differing, "the design")):
+                if table.rows:
+                    print_table(table)
+            for sentence in remarks(found):
+                alert("Note:", sentence)
     if place is not None:  # only now: where a file could not be written, the steps are not lost
         place.unlink(missing_ok=True)
 
 
 def by_kind(given: list[str]) -> dict[str, float]:
     """Tolerances by kind. Raises InputError for a kind that is unknown, or no positive number."""
-    from ..base.names import suggest
-    from ..fitting.values import FREE
-
     found = {}
     for name, text in pairs(given).items():
         if name not in FREE:
@@ -175,15 +164,43 @@ def by_kind(given: list[str]) -> dict[str, float]:
     return found
 
 
-def _print(found: Fit, json: bool) -> None:
-    from ..fitting.tables import parts_table, plain, remarks, summary_table, values_table
+def drift(
+    earlier: Annotated[Path, Argument(help="Earlier fit, from `panto fit --keep`.")],
+    later: Annotated[Path, Argument(help="Later fit, of the same line as designed.")],
+    tolerance: Annotated[
+        list[str] | None,
+        Option(
+            help="Standard deviation of a kind of changes before any record is seen, e.g. droppers=0.002 "
+            "(m); may be repeated. Default: half of the fits' tolerance of values."
+        ),
+    ] = None,
+    values: Annotated[
+        str | None, into_file("Write all changes with their intervals to this file", TABLES)
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Find what of a line has changed between records, from the fit to each.
 
-    if json:
-        print_json(plain(found))
-        return
-    summary = summary_table(found.found, found.differing, "the design")
-    for table in (parts_table(found), summary, values_table(found.differing, "the design")):
-        if table.rows:
-            print_table(table)
-    for sentence in remarks(found):
-        alert("Note:", sentence)
+    The 95 % intervals hold the uncertainty of both fits. Changes are named so that one in twenty of them is
+    false.
+    """
+    found = between(stored(earlier), stored(later), by_kind(tolerance or []))
+    named = {each.value.name for each in found.changed}
+    rows = [row | {"changed": row["name"] in named} for row in rows_of(found.found)]
+    with written_last() as afterwards:
+        if values is not None:
+            afterwards(write_rows, rows, values)
+        if plot is not None:
+            afterwards(save, plot_drift(found, f"Changes from {earlier.name} to {later.name}"), plot)
+        if json:
+            print_json({"values": rows, "notes": list(found.notes)})
+            return
+        print_table(summary_table(found.found, found.changed, "before"))
+        if found.changed:
+            print_table(values_table(found.changed, "before"))
+            console.print(f"About {100 * FALSE:g} % of the changes that are named are none.")
+        else:
+            console.print("Nothing has changed that these records would tell.")
+        for note in found.notes:
+            alert("Degraded:", note)

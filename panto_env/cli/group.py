@@ -1,9 +1,8 @@
-"""The command and those of plug-ins below it: each is loaded when it is called, each option given once."""
+"""Commands in the help of ``panto`` by what a person wants to do, those of plug-ins too."""
 
 from __future__ import annotations
 
 from collections import Counter
-from importlib.metadata import EntryPoint
 from typing import Any
 
 import typer
@@ -12,7 +11,18 @@ from typer.main import get_command
 
 from ..base import plugins
 from ..base.errors import InputError
-from .panels import OTHERS, PanelGroup
+
+PANELS = {
+    "Simulate": ("list", "line", "simulate", "sweep", "family", "film"),
+    "Judge": ("report", "record", "compare", "validate", "reproduce", "speed"),
+    "Identify": ("identify", "estimate", "fit", "drift", "diagnose", "rig"),
+    "Control": ("benchmark", "tune", "oracle", "replay", "returns", "submission"),
+    "Learn": ("train", "trainings", "evaluate", "export", "ablation", "dataset"),
+}
+"""Commands of each panel, in the order of the help."""
+OTHERS = "From other packages"
+PANEL_OF = {name: panel for panel, names in PANELS.items() for name in names}
+ORDER = list(PANEL_OF)
 
 
 class _GivenOnce:
@@ -25,10 +35,8 @@ class _GivenOnce:
             for option, times in Counter(given).items():
                 single = option.param_type_name == "option" and not (option.multiple or option.count)
                 if single and times > 1 and not option.is_eager:
-                    flag = max(option.opts, key=len)
-                    raise InputError(
-                        f"{flag} is given {'twice' if times == 2 else f'{times} times'}; give it once."
-                    )
+                    flag, often = max(option.opts, key=len), "twice" if times == 2 else f"{times} times"
+                    raise InputError(f"{flag} is given {often}; give it once.")
         parsed: list[str] = command.parse_args(ctx, args)
         return parsed
 
@@ -53,10 +61,10 @@ def give_options_once(app: typer.Typer) -> None:
             give_options_once(group.typer_instance)
 
 
-class PlugInGroup(PanelGroup, _Group):
-    """Our commands and those of plug-ins: one of these is loaded when it, or its help, is asked for.
+class PlugInGroup(_Group):
+    """Our commands, in the panels above, and those of plug-ins, loaded when they or their help are called.
 
-    The list of commands describes our own; of others it has the name and the package.
+    The list of commands describes our own; of others, which come last, it has the name and the package.
     """
 
     def __init__(self, **attributes: Any) -> None:
@@ -66,16 +74,33 @@ class PlugInGroup(PanelGroup, _Group):
         for name in self._points:
             self.add_command(TyperCommand(name))
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all commands, in the order of the help."""
+        names = super().list_commands(ctx)
+        return sorted(names, key=lambda name: ORDER.index(name) if name in PANEL_OF else len(ORDER))
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of a name, or None."""
+        """A command by its name, or None. Raises InputError for a plug-in's that cannot be loaded."""
         point = self._points.get(cmd_name)
+        if point is not None and self._listing and not plugins.is_own(point):
+            words = f"A plug-in of {plugins.package(point)}."
+            return TyperCommand(cmd_name, help=words, rich_help_panel=OTHERS)
         if point is not None:
-            if self._listing and not plugins.is_own(point):
-                words = f"A plug-in of {plugins.package(point)}."
-                return TyperCommand(cmd_name, help=words, rich_help_panel=OTHERS)
-            self.add_command(_loaded(point), cmd_name)
+            loaded, app = plugins.load(point), typer.Typer(add_completion=False)
+            app.callback()(lambda: None)  # so that it is a group even of one command
+            with plugins.blamed(point):
+                if isinstance(loaded, typer.Typer):
+                    app.add_typer(loaded, name=cmd_name)
+                else:
+                    app.command(cmd_name)(loaded)
+                give_options_once(app)
+                group: Any = get_command(app)
+            self.add_command(group.commands[cmd_name], cmd_name)
             del self._points[cmd_name]
-        return super().get_command(ctx, cmd_name)
+        command: Any = super().get_command(ctx, cmd_name)
+        if command is not None:
+            command.rich_help_panel = PANEL_OF.get(cmd_name, OTHERS)
+        return command
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
@@ -84,18 +109,3 @@ class PlugInGroup(PanelGroup, _Group):
             super().format_help(ctx, formatter)
         finally:
             self._listing = False
-
-
-def _loaded(point: EntryPoint) -> Any:
-    """The command of a plug-in. Raises InputError, which names its package, where that is not possible."""
-    command = plugins.load(point)
-    app = typer.Typer(add_completion=False)
-    app.callback()(lambda: None)  # so that it is a group even of one command
-    with plugins.blamed(point):
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=point.name)
-        else:
-            app.command(point.name)(command)
-        give_options_once(app)
-        group: Any = get_command(app)
-        return group.commands[point.name]

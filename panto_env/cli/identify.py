@@ -7,17 +7,22 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-import typer
+from typer import Argument, Option
 
+from .. import identification
+from ..analysis.plots import save
 from ..base.errors import InputError
-from ..identification.pantograph_file import SUFFIXES, check_possible
+from ..identification import METHODS, Identification, Match
+from ..identification.performance import (
+    SUFFIXES,
+    check_possible,
+    matches_table,
+    parameters_table,
+    plot_matches,
+)
 from ..terminal import Json, Plot, alert, print_json, print_table, progress_console, writable, written_last
-
-if TYPE_CHECKING:
-    from ..base.arrays import Array
-    from ..identification import Identification, Match
 
 T = TypeVar("T")
 Given = tuple[dict[str, str], dict[str, str]]
@@ -33,35 +38,32 @@ class Method(StrEnum):
 
 
 def identify(
-    file: Annotated[Path, typer.Argument(help="CSV: time, y_p1, y_p2, y_p3, and force where measured.")],
-    more: Annotated[list[str] | None, typer.Argument(metavar="[NAME=VALUE]...", hidden=True)] = None,
+    file: Annotated[Path, Argument(help="CSV: time, y_p1, y_p2, y_p3, and force where measured.")],
+    more: Annotated[list[str] | None, Argument(metavar="[NAME=VALUE]...", hidden=True)] = None,
     measured: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Known values in SI units: k1T=32992 m2=5 k2=14544, in one option or several. Any other "
             "parameter may also be given, and is then not identified."
         ),
     ] = None,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Unit of a column whose header has none, e.g. y_p1=mm; may be repeated."),
+        Option(help="Unit of a column whose header has none, e.g. y_p1=mm; may be repeated."),
     ] = None,
     band: Annotated[
-        float | None,
-        typer.Option(help="Maximum frequency of the excitation (Hz), by default found."),
+        float | None, Option(help="Maximum frequency of the excitation (Hz), by default found.")
     ] = None,
     free_offset: Annotated[
-        bool,
-        typer.Option("--free-offset", help="Use only changes: the zero of the displacements is unknown."),
+        bool, Option("--free-offset", help="Use only changes: the zero of the displacements is unknown.")
     ] = False,
-    method: Annotated[Method, typer.Option(help="Method whose parameters are used.")] = Method.output,
+    method: Annotated[Method, Option(help="Method whose parameters are used.")] = Method.output,
     static_force: Annotated[
-        float | None,
-        typer.Option(help="Lifting force to be written (N), by default the mean force."),
+        float | None, Option(help="Lifting force to be written (N), by default the mean force.")
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Write the pantograph to this file (.toml), if the model explains the record.",
             callback=writable(SUFFIXES),
         ),
@@ -77,12 +79,8 @@ def identify(
     with the likely mistake; values that no pantograph can have are marked; a pantograph is written only where
     the model explains the recorded motion.
     """
-    from .. import identification
-
     full_name = dict(zip(Method, identification.METHODS, strict=True))[method]
     known = {name: _value(name, text) for name, text in pairs([*(measured or []), *(more or [])]).items()}
-    if plot is not None:
-        from ..analysis.plots import save
     record = identification.read_record(file, pairs(unit or []))
     with progress_console.status("identifying"):
         identified = identification.identify(record, known, band=band, free_offset=free_offset)
@@ -101,23 +99,23 @@ def identify(
             identified.failures[f"the model by {chosen.method}"] = str(error)
     with written_last() as later:
         if output is not None and chosen is not None:
-            force, source = _static_force(static_force, record.force, file)
-            write = partial(
-                identification.write_pantograph,
-                matches=matches,
-                record=file.name,
-                static_force=force,
-                force_source=source,
-            )
-            later(write, chosen, output)
+            force, source = static_force, "own choice: --static-force"
+            if force is None and record.force is not None:
+                force, source = float(record.force.mean()), f"mean contact force of {file.name}"
+            if force is None:
+                raise InputError(
+                    "The record has no force; give the lifting force of the pantograph: --static-force N."
+                )
+            own: dict[str, Any] = {"static_force": force, "force_source": source, "record": file.name}
+            later(partial(identification.write_pantograph, matches=matches, **own), chosen, output)
         if plot is not None and chosen is not None:
-            from ..identification.plots import plot_matches
-
             title = f"{file.name}, model by {chosen.method}"
             first, last = float(record.time[0]), float(record.time[-1])
             later(save, plot_matches(record.time, matches, title, first, last), plot)
         if json:
-            print_json(_plain(identified, matches, method))
+            fits = {name: fit.as_dict() for name, fit in _by_short_name(identified.fits).items()}
+            facts = {"band": identified.band, "fits": fits, "failures": _by_short_name(identified.failures)}
+            print_json(facts | {"method": method.value, "matches": [match.as_dict() for match in matches]})
             return
         _print(identified, matches, full_name)
 
@@ -152,41 +150,14 @@ def _value(name: str, text: str) -> float:
         raise InputError(f"Measured parameter {name} must be a number, not '{text}'.") from error
 
 
-def _static_force(given: float | None, force: Array | None, file: Path) -> tuple[float, str]:
-    """Lifting force (N) of the written pantograph, and its source."""
-    if given is not None:
-        return given, "own choice: --static-force"
-    if force is None:
-        raise InputError(
-            "The record has no force; give the lifting force of the pantograph: --static-force N."
-        )
-    return float(force.mean()), f"mean contact force of {file.name}"
-
-
-def _plain(identified: Identification, matches: list[Match], method: Method) -> dict[str, Any]:
-    """All results as plain data."""
-    fits, failures = _by_short_name(identified.fits), _by_short_name(identified.failures)
-    return {
-        "band": identified.band,
-        "fits": {name: fit.as_dict() for name, fit in fits.items()},
-        "failures": failures,
-        "method": method.value,
-        "matches": [match.as_dict() for match in matches],
-    }
-
-
 def _by_short_name(by_method: Mapping[str, T]) -> dict[str, T]:
     """Values by short names of methods, from values by full names; other keys are left out."""
-    from ..identification import METHODS
-
     return {
         short.value: by_method[full] for short, full in zip(Method, METHODS, strict=True) if full in by_method
     }
 
 
 def _print(identified: Identification, matches: list[Match], method: str) -> None:
-    from ..identification.tables import matches_table, parameters_table
-
     print_table(parameters_table(_by_short_name(identified.fits), identified.band))
     for fit in identified.fits.values():
         if fit.undetermined:

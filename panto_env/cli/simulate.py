@@ -9,22 +9,35 @@ from typing import Annotated, Any
 
 import typer
 from rich.table import Table
+from typer import Argument, Option
 
-from ..analysis.options import DroppersFile, FiguresFile, Seed, Spans, parse_spans, with_settings
-from ..analysis.requirements import print_criteria
-from ..base.standard_streams import say
-from ..metrics.labels import LABELS
+from ..analysis import simulation
+from ..analysis.options import (
+    RENAMED,
+    DroppersFile,
+    FiguresFile,
+    Seed,
+    Spans,
+    parse_spans,
+    print_criteria,
+    with_settings,
+)
+from ..analysis.plots import plot_run, save
+from ..base.errors import InputError
+from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
-from ..metrics.spans import SpanChoice, in_words
 from ..metrics.trajectory import OUTPUTS, Trajectory
+from ..render.video import FILMS, write_film
 from ..terminal import (
     Json,
     Plot,
     alert,
     bars,
     console,
+    into_file,
     number,
     print_json,
+    say,
     writable,
     written_last,
 )
@@ -37,14 +50,13 @@ LIVE_COLUMNS = 40
 def simulate(
     settings: dict[str, Any],
     policy: Annotated[
-        str | None,
-        typer.Option(help="Policy: a name, name:key=value,..., a model file or file.py:Class."),
+        str | None, Option(help="Policy: a name, name:key=value,..., a model file or file.py:Class.")
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
     output: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Save the run to this file: .parquet, which other commands read, .csv or .xlsx.",
             callback=writable(OUTPUTS),
         ),
@@ -53,18 +65,14 @@ def simulate(
     droppers: DroppersFile = None,
     plot: Plot = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Draw force and heights in the terminal during the run.")
+        bool, Option("--live", help="Draw force and heights in the terminal during the run.")
     ] = False,
     json: Json = False,
 ) -> None:
     """Simulate one pass along a line and print its figures; exit with 1 if it ended early."""
-    from ..analysis.simulation import simulate as run
-
     chosen = parse_spans(spans)
-    if plot is not None:
-        from ..analysis.plots import plot_run, save
     with _shown(live, policy or "passive") as (progress, watch):
-        trajectory = run(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
+        trajectory = simulation.simulate(policy=policy, seed=seed, progress=progress, watch=watch, **settings)
     with written_last() as later:
         if output is not None:
             later(trajectory.save, output, None if trajectory.terminated else chosen)
@@ -129,7 +137,7 @@ def _shown(
     """Progress of a run as a bar or as a live picture: arguments ``progress`` and ``watch`` of the run."""
     drawable = console.is_terminal and not console.is_dumb_terminal and console.width >= LIVE_COLUMNS
     if live and drawable:
-        from ..render.live import live as on_terminal
+        from ..render.strip import live as on_terminal
 
         with on_terminal(console, policy) as watch:
             yield None, watch
@@ -160,3 +168,78 @@ def _facts(run: Trajectory) -> dict[str, Any]:
         "settings",
     )
     return {name: getattr(run, name) for name in names}
+
+
+MOST = 4
+"""Maximum number of passes in one film."""
+
+
+@with_settings(left_out=("observation",))
+def film(
+    settings: dict[str, Any],
+    policies: Annotated[
+        list[str],
+        Argument(
+            help="Passes to show above each other: a policy as a name, name:key=value,..., a model file or "
+            "file.py:Class; or a run saved by panto simulate (.parquet), whose settings then apply to all."
+        ),
+    ],
+    output: Annotated[str, into_file("Film to write", FILMS)],
+    first_span: Annotated[int, Option(min=1, max=1000, help="Span in which the film begins.")] = 10,
+    seconds: Annotated[float, Option(min=0.1, max=600, help="Time of the run that is shown (s).")] = 3.0,
+    slow_motion: Annotated[
+        float, Option(min=0.1, max=100, help="Factor by which the film is slowed down.")
+    ] = 4.0,
+    size: Annotated[
+        tuple[int, int] | None,
+        Option(help="Width and height (px); by default 1280 x 720, for several policies 480 high each."),
+    ] = None,
+    seed: Annotated[
+        int | None, Option(min=0, help="Seed of irregularity and noise; 0, unless a saved run has its own.")
+    ] = None,
+) -> None:
+    """Write a film of a pass along a line: wires, pantograph, actuator and contact force.
+
+    Several policies run on the same line under the same seed, above each other, with their figures.
+    A saved run is repeated from its settings, and refused if its contact force differs.
+    """
+    from ..render.film import Filmed, check_together, excerpt, frames, policy_pass, saved_passes
+
+    if len(policies) > MOST:
+        raise InputError(f"A film shows up to {MOST} passes, not {len(policies)}.")
+    whole = size or (1280, 720 if len(policies) == 1 else 480 * len(policies))
+    even = whole[0] % 2 == 0 and whole[1] % (2 * len(policies)) == 0
+    if not (even and all(64 <= pixels <= 4096 for pixels in whole)):
+        raise InputError(
+            f"The size must be even numbers of pixels from 64 to 4096, and the height for each pass's part, "
+            f"not {whole}."
+        )
+    saved = saved_passes(policies)
+    if saved:
+        check_together(list(saved.values()))  # before any work begins
+        first = next(iter(saved.values()))
+        given = [f"--{RENAMED.get(name, name).replace('_', '-')}" for name in settings]
+        given += [] if seed is None else ["--seed"]
+        if given:
+            raise InputError(f"The film takes all settings from {first.file}; leave out {', '.join(given)}.")
+        settings, seed = first.settings, first.seed
+    with bars() as progress:
+        bar = progress.add_task("simulating all passes", total=len(policies))
+        filmed: list[Filmed] = []
+        for policy in policies:
+            each = saved.get(policy) or policy_pass(policy, settings, seed or 0)
+            each.check()
+            filmed.append(each)
+            progress.advance(bar)
+        what = excerpt(filmed[0], first_span, seconds, slow_motion)
+        bar = progress.add_task("drawing", total=1.0)
+        drawn = frames(filmed, what, whole, lambda share: progress.update(bar, completed=share))
+        write_film(drawn, output, what.rate, whole)
+    for each in filmed:
+        if each.run.terminated:
+            console.print(f"{each.title}: {each.run.ending}", soft_wrap=True)
+    console.print(
+        f"The film is {output}: {what.rate:g} frames per second, {slow_motion:g} times slower than real.",
+        highlight=False,
+        soft_wrap=True,
+    )

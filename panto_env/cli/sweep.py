@@ -8,23 +8,24 @@ from functools import partial
 from math import isfinite
 from typing import Annotated, Any
 
-import typer
 from rich.table import Table
+from typer import Argument, Option
 
 from ..analysis.options import Seed, Spans, parse_spans, with_settings
+from ..analysis.parameters import with_distances
+from ..analysis.plots import save
 from ..analysis.pool import MOST_PASSES
 from ..analysis.sweep import SPEED, labels
 from ..analysis.sweep import save as save_rows
 from ..analysis.sweep import sweep as run
-from ..analysis.sweep_plots import pantographs_of
-from ..analysis.swept_train import with_distances
+from ..analysis.sweep_plots import pantographs_of, plot_sweep
+from ..base.checksums import __version__
 from ..base.errors import InputError
-from ..base.table_file import TABLES
-from ..base.version import __version__
+from ..base.table import TABLES
 from ..control.identity import plain
 from ..control.settings import run_settings
-from ..metrics.labels import LABELS, NUMBER
-from ..terminal import Json, Plot, console, counting, number, print_json, writable, written_last
+from ..metrics.figures import LABELS, NUMBER
+from ..terminal import Json, Plot, console, counting, into_file, number, print_json, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -35,7 +36,7 @@ def sweep(
     settings: dict[str, Any],
     parameters: Annotated[
         list[str],
-        typer.Argument(
+        Argument(
             metavar="NAME=VALUES...",
             help="One to three parameters by dotted name, e.g. pantograph.masses.1, "
             "catenary.contact_wire.tension, catenary.droppers.spacing, actuator.lag, policy.gain, speed_kmh "
@@ -44,27 +45,20 @@ def sweep(
         ),
     ],
     policy: Annotated[
-        list[str] | None,
-        typer.Option(help="Policy: a name, name:key=value,... or a model file; may be repeated."),
+        list[str] | None, Option(help="Policy: a name, name:key=value,... or a model file; may be repeated.")
     ] = None,
     spans: Spans = None,
     seed: Seed = 0,
-    workers: Annotated[int | None, typer.Option(help="Number of threads; by default one per core.")] = None,
-    output: Annotated[
-        str | None,
-        typer.Option(help=f"Save the table to this file ({', '.join(TABLES)}).", callback=writable(TABLES)),
-    ] = None,
+    workers: Annotated[int | None, Option(help="Number of threads; by default one per core.")] = None,
+    output: Annotated[str | None, into_file("Save the table to this file", TABLES)] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Run all combinations of values of one to three parameters, and print figures and verdicts."""
     values = _parse(parameters)
-    if plot is not None:
-        from ..analysis.plots import save
-        from ..analysis.sweep_plots import plot_sweep
-
-        if sum(len({*each}) > 1 for each in values.values()) > 2:  # before hours of passes
-            raise InputError("A plot shows one or two parameters with several values; leave out --plot.")
+    several = sum(len({*each}) > 1 for each in values.values())
+    if plot is not None and several > 2:  # before hours of passes
+        raise InputError("A plot shows one or two parameters with several values; leave out --plot.")
     if SPEED in settings and SPEED in values:
         raise InputError("The speed is swept already; leave out --speed.")
     line_spans = settings.pop("spans", None)

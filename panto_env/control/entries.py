@@ -9,20 +9,66 @@ share a writer.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from ..backend import inlined
+from ..base.arrays import Array
+from ..base.errors import InputError
 from ..plant.actuators import ActuatorSettings
 from ..plant.alignment import mean_over_own_length
-from ..plant.pantograph.schema import PantographData
+from ..plant.catenary.flexible import FlexibleCatenaryData
+from ..plant.catenary.schema import CatenaryData
+from ..plant.functions import cosine_of_turns, sine_of_turns
 from ..plant.sensors import READING
 from ..plant.state import ROW
-from ..plant.trigonometry import cosine_of_turns, sine_of_turns
-from .line_values import LINE_CENTRES, LINE_ENTRIES, SPAN_LENGTH
 from .state import NOW, NOW_ROWS, TASK_ROW
 
-MEASURED, FULL, CENTRED, ESTIMATED = "measured", "full", "centred", "estimated"
-DEVIATIONS = "deviations"
+if TYPE_CHECKING:
+    from .settings import RunSettings
+
+SPAN_LENGTH = ("span length", 50.0, "m")
+"""Name, scale and unit of the length of the span that the train is in."""
+LINE_ENTRIES = (
+    ("wave speed", 150.0, "m/s"),
+    ("contact wire tension", 20e3, "N"),
+    ("messenger wire tension", 20e3, "N"),
+    ("contact wire mass", 1.0, "kg/m"),
+    ("messenger wire mass", 1.0, "kg/m"),
+    ("droppers of a span", 10.0, "-"),
+)
+"""Name, scale and unit of each value of the whole line."""
+
+
+def line_values(line: CatenaryData) -> Array:
+    """The values of a line in the order of ``LINE_ENTRIES``. Raises InputError where it has not got them."""
+    if not isinstance(line, FlexibleCatenaryData):
+        raise InputError(
+            f"Only a flexible catenary has the values that line_values observes, and line '{line.name}' is "
+            "not one; leave out line_values."
+        )
+    contact, messenger = line.contact_wire, line.messenger_wire
+    return np.array(
+        [
+            contact.wave_speed,
+            contact.tension,
+            messenger.tension,
+            contact.mass,
+            messenger.mass,
+            float(len(line.droppers.positions)),
+        ]
+    )
+
+
+OBSERVATIONS = MEASURED, FULL, CENTRED, ESTIMATED, DEVIATIONS = (
+    "measured",
+    "full",
+    "centred",
+    "estimated",
+    "deviations",
+)
 """Kinds of observation: what a train can measure; in addition values that it cannot, without noise and
 delay; measured values and the nominal force, from fixed centres and in fixed scales, by which each has a mean
 near 0 and a spread near 1 in a passive run of Pantograph-v0's own line and pantograph; measured values with
@@ -41,9 +87,16 @@ CENTRES = {
     "nominal force": (120.0, 30.0),
     "front force": (120.0, 30.0),
     "remembered force": (120.0, 30.0),
-    **LINE_CENTRES,
+    "span length": (55.0, 8.0),
+    "wave speed": (140.0, 14.0),
+    "contact wire tension": (22e3, 5e3),
+    "messenger wire tension": (16e3, 3e3),
+    "contact wire mass": (1.15, 0.12),
+    "messenger wire mass": (0.85, 0.15),
+    "droppers of a span": (8.0, 2.0),
 }
-"""Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0."""
+"""Centre and scale in "centred" of entries shared with "measured", from passive runs of Pantograph-v0; those
+of a line's values from the lines of the family high-speed."""
 FORCE_DEVIATION, OF_NOMINAL = 0.3, "of the nominal force"
 """Scale and unit of the force deviation."""
 READING_ENTRIES = (
@@ -54,12 +107,6 @@ READING_ENTRIES = (
     ("contact force", 100.0, "N"),
 )
 """Name, scale and unit of the sensors' readings, in the order of ``Reading``."""
-KINDS: dict[str, tuple[str, ...]] = {
-    MEASURED: (MEASURED, FULL, CENTRED, ESTIMATED, DEVIATIONS),
-    FULL: (FULL,),
-    CENTRED: (CENTRED,),
-}
-"""Kinds of observation that have an entry, by the kind that its decorator names."""
 
 
 class Entry(NamedTuple):
@@ -74,23 +121,9 @@ class Entry(NamedTuple):
     slope: float = 0.0  # in its unit, for each m/s of the train
 
 
-class EntryOptions(NamedTuple):
-    """What determines the entries of an observation, besides its kind."""
-
-    actuator: ActuatorSettings
-    pantograph: PantographData
-    harmonics: int = 1  # of the position within the span
-    history: int = 0  # earlier control steps
-    front: tuple[float, ...] = ()  # places ahead whose contact force the one in front measured (m)
-    memory: tuple[float, ...] = ()  # times until places of which earlier spans are remembered (s)
-    memory_spans: int = 1  # number of these spans
-    line_values: bool = False  # whether the line's are among them
-
-
-Writer = Callable[..., Any]
-Listing = Callable[[EntryOptions], list[tuple[str, float, str, int]]]
+Listing = Callable[["RunSettings"], list[tuple[str, float, str, int]]]
 """Name, scale, unit and number of all entries that share a writer."""
-WRITERS: list[Writer] = []
+WRITERS: list[Callable[..., Any]] = []
 """Writers of all entries; a kernel identifies a writer by its index here."""
 _LISTINGS: list[tuple[str, Listing]] = []
 
@@ -105,10 +138,10 @@ def entry(
     return entries(kind, lambda _: [(name, scale, unit, 0)])
 
 
-def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
-    """Decorator of a writer of several entries, or of entries that depend on ``EntryOptions``."""
+def entries(kind: str, listing: Listing) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorator of a writer of several entries, or of entries that depend on a run's settings."""
 
-    def register(writer: Writer) -> Writer:
+    def register(writer: Callable[..., Any]) -> Callable[..., Any]:
         WRITERS.append(inlined(writer))
         _LISTINGS.append((kind, listing))
         return writer
@@ -116,25 +149,23 @@ def entries(kind: str, listing: Listing) -> Callable[[Writer], Writer]:
     return register
 
 
-def entries_of(kind: str, options: EntryOptions) -> list[Entry]:
+def entries_of(settings: RunSettings) -> list[Entry]:
     """All entries of an observation, in order."""
+    kind = settings.observation
     entries = [
         Entry(name, scale, unit, writer, number)
         for writer, (belongs_to, listing) in enumerate(_LISTINGS)
-        if kind in KINDS[belongs_to]
-        for name, scale, unit, number in listing(options)
+        if belongs_to in (MEASURED, kind)
+        for name, scale, unit, number in listing(settings)
     ]
-    if kind == DEVIATIONS:
-        return [_deviation(entry) for entry in entries]
-    if kind != CENTRED:
-        return entries
-    centred = [entry for entry in entries if present(entry) != "contact force"]  # its deviation stands for it
-    return [
-        entry._replace(centre=CENTRES[present(entry)][0], scale=CENTRES[present(entry)][1])
-        if present(entry) in CENTRES
-        else entry
-        for entry in centred
-    ]
+    if kind == CENTRED:  # the deviation of the contact force stands for it
+        return [_centred(entry) for entry in entries if present(entry) != "contact force"]
+    return [_deviation(entry) for entry in entries] if kind == DEVIATIONS else entries
+
+
+def _centred(entry: Entry) -> Entry:
+    centre, scale = CENTRES.get(present(entry), (entry.centre, entry.scale))
+    return entry._replace(centre=centre, scale=scale)
 
 
 def _deviation(entry: Entry) -> Entry:
@@ -143,9 +174,7 @@ def _deviation(entry: Entry) -> Entry:
     if name in (*(each for each, _, _ in READING_ENTRIES), "remembered force"):
         _, spread = CENTRES["remembered force" if name == "contact force" else name]
         return entry._replace(name=entry.name.replace(name, name + DEVIATION, 1), scale=spread)
-    if name in CENTRES:
-        return entry._replace(centre=CENTRES[name][0], scale=CENTRES[name][1])
-    return entry
+    return _centred(entry)
 
 
 def earlier(name: str, steps: int) -> str:
@@ -173,16 +202,14 @@ def _span_cosine(episode, own, task, now, number):
     return episode.odometer.sight * cosine_of_turns(now[NOW.SPANS])
 
 
-def _harmonics(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    """Sine and cosine of each multiple, from 2 on, of the position within the span."""
-    return [
+@entries(
+    MEASURED,
+    lambda settings: [
         (f"{wave} of span position, harmonic {k}", 1.0, "-", 2 * k + half)
-        for k in range(2, options.harmonics + 1)
+        for k in range(2, settings.harmonics + 1)
         for half, wave in enumerate(("sine", "cosine"))
-    ]
-
-
-@entries(MEASURED, _harmonics)
+    ],
+)
 def _span_harmonic(episode, own, task, now, number):
     turns = float(number // 2) * now[NOW.SPANS]
     return episode.odometer.sight * sine_of_turns(turns + 0.25 * float(number % 2))
@@ -193,27 +220,23 @@ def _speed(episode, own, task, now, number):
     return now[NOW.SPEED]
 
 
-def _front(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    return [
-        (f"front force, {place:g} m ahead", 100.0, "N", number) for number, place in enumerate(options.front)
-    ]
-
-
-@entries(MEASURED, _front)
+@entries(
+    MEASURED,
+    lambda settings: [
+        (f"front force, {place:g} m ahead", 100.0, "N", number) for number, place in enumerate(settings.front)
+    ],
+)
 def _front_force(episode, own, task, now, number):
     return now[NOW_ROWS + number]
 
 
-def _memory(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+def _memory(settings: RunSettings) -> list[tuple[str, float, str, int]]:
     """Force and actions of earlier spans at places ahead; number: row beyond ``Now``'s named ones."""
-    kinds = [
-        ("force", 100.0, "N"),
-        *((f"{name} action", 1.0, "-") for name in _place_names(options.actuator)),
-    ]
-    spans = [f"{k} span{'s' if k > 1 else ''} ago" for k in range(1, options.memory_spans + 1)]
-    places = [(kind, span, time) for kind in kinds for span in spans for time in options.memory]
+    actions = ((f"{name} action", 1.0, "-") for name in _place_names(settings.actuator))
+    spans = [f"{k} span{'s' if k > 1 else ''} ago" for k in range(1, settings.memory_spans + 1)]
+    places = product([("force", 100.0, "N"), *actions], spans, settings.memory)
     return [
-        (f"remembered {name}, {span}, {time:g} s ahead", scale, unit, len(options.front) + number)
+        (f"remembered {name}, {span}, {time:g} s ahead", scale, unit, len(settings.front) + number)
         for number, ((name, scale, unit), span, time) in enumerate(places)
     ]
 
@@ -223,16 +246,15 @@ def _remembered_value(episode, own, task, now, number):
     return now[NOW_ROWS + number]
 
 
-@entries(MEASURED, lambda options: [(*SPAN_LENGTH, 0)] if options.line_values else [])
+@entries(MEASURED, lambda settings: [(*SPAN_LENGTH, 0)] if settings.line_values else [])
 def _span_length(episode, own, task, now, number):
     return episode.alignment.mean_length / mean_over_own_length(episode.alignment, now[NOW.SPANS])
 
 
-def _line_values(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    return [(*each, row) for row, each in enumerate(LINE_ENTRIES)] if options.line_values else []
-
-
-@entries(MEASURED, _line_values)
+@entries(
+    MEASURED,
+    lambda settings: [(*each, row) for row, each in enumerate(LINE_ENTRIES) if settings.line_values],
+)
 def _line_value(episode, own, task, now, number):
     return episode.line_values[number]
 
@@ -247,19 +269,16 @@ def _nominal_force(episode, own, task, now, number):
     return own[ROW.LIFT]
 
 
-def _actions(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    return [(name, 1.0, "-", k) for k, name in enumerate(_action_names(options.actuator))]
-
-
-def _action_names(actuator: ActuatorSettings) -> list[str]:
-    return [f"last {name} action" for name in _place_names(actuator)]
-
-
 def _place_names(actuator: ActuatorSettings) -> list[str]:
     return [place.name.lower() for place in actuator.places]
 
 
-@entries(MEASURED, _actions)
+@entries(
+    MEASURED,
+    lambda settings: [
+        (f"last {name} action", 1.0, "-", k) for k, name in enumerate(_place_names(settings.actuator))
+    ],
+)
 def _last_action(episode, own, task, now, number):
     return task[TASK_ROW.ACTION + number]
 
@@ -269,25 +288,26 @@ def _wire_displacement(episode, own, task, now, number):
     return own[ROW.WIRE_HEIGHT]
 
 
-@entries(FULL, lambda options: [("frame force", options.actuator.force_limit, "N", 0)])
+@entries(FULL, lambda settings: [("frame force", settings.actuator.force_limit, "N", 0)])
 def _frame_force(episode, own, task, now, number):
     return own[ROW.FRAME_FORCE]
 
 
-@entries(FULL, lambda options: [("head force", options.actuator.force_limit, "N", 0)])
+@entries(FULL, lambda settings: [("head force", settings.actuator.force_limit, "N", 0)])
 def _head_force(episode, own, task, now, number):
     return own[ROW.HEAD_FORCE]
 
 
-def _inner_masses(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    """Displacement and velocity of each mass between head and frame."""
-    count = len(options.pantograph.masses)
-    places = [(k, f"mass {k + 1}") for k in range(1, count - 1)]
-    pairs = [
-        ((f"{mass} displacement", 0.1, "m", k), (f"{mass} velocity", 1.0, "m/s", count + k))
-        for k, mass in places
+def _inner_masses(settings: RunSettings) -> list[tuple[str, float, str, int]]:
+    count = len(settings.pantograph.masses)
+    return [
+        listed
+        for k in range(1, count - 1)
+        for listed in (
+            (f"mass {k + 1} displacement", 0.1, "m", k),
+            (f"mass {k + 1} velocity", 1.0, "m/s", count + k),
+        )
     ]
-    return [listed for pair in pairs for listed in pair]
 
 
 @entries(FULL, _inner_masses)
@@ -295,13 +315,13 @@ def _pantograph_state(episode, own, task, now, number):
     return own[ROW.STATE + number]
 
 
-def _remembered(options: EntryOptions) -> list[tuple[str, float, str, int]]:
+def _remembered(settings: RunSettings) -> list[tuple[str, float, str, int]]:
     """Readings and actions of earlier control steps; number: row counted from that of the first action."""
-    actions = _action_names(options.actuator)
-    rows = [*READING_ENTRIES, *((name, 1.0, "-") for name in actions)]
+    actions = [(f"last {name} action", 1.0, "-") for name in _place_names(settings.actuator)]
+    rows = [*READING_ENTRIES, *actions]
     return [
         (earlier(name, k), scale, unit, len(actions) + (k - 1) * len(rows) + row)
-        for k in range(1, options.history + 1)
+        for k in range(1, settings.history + 1)
         for row, (name, scale, unit) in enumerate(rows)
     ]
 
@@ -311,15 +331,13 @@ def _earlier(episode, own, task, now, number):
     return task[TASK_ROW.ACTION + number]
 
 
-def _remembered_deviations(options: EntryOptions) -> list[tuple[str, float, str, int]]:
-    rows = {name: number for name, _, _, number in _remembered(options)}
-    steps = range(1, options.history + 1)
-    return [
-        (earlier("force deviation", k), FORCE_DEVIATION, OF_NOMINAL, rows[earlier("contact force", k)])
-        for k in steps
-    ]
-
-
-@entries(CENTRED, _remembered_deviations)
+@entries(
+    CENTRED,
+    lambda settings: [
+        (name.replace("contact force", "force deviation"), FORCE_DEVIATION, OF_NOMINAL, number)
+        for name, _, _, number in _remembered(settings)
+        if name.startswith("contact force")
+    ],
+)
 def _earlier_deviation(episode, own, task, now, number):
     return task[TASK_ROW.ACTION + number] / own[ROW.LIFT] - 1.0

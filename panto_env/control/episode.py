@@ -14,16 +14,13 @@ from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
-from ..plant.state import PerCollector, per_collector
-from ..plant.valid_range import HEAD_RANGE, LOSS_TIME
-from .entries import AVERAGED, DEVIATIONS
-from .front import FrontArrays, front_arrays
-from .line_values import line_values
-from .memory import MemoryArrays, memory_arrays
+from ..plant.state import HEAD_RANGE, LOSS_TIME, PerCollector, per_collector
+from .entries import AVERAGED, DEVIATIONS, line_values
+from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
-from .state import NOW_ROWS, RESULT_ROWS, Flag, Result, TaskRow
+from .state import NOW_ROWS, RESULT_ROWS, Flag, TaskRow
 
 Flags = NDArray[np.bool_]
 
@@ -87,7 +84,7 @@ def new_episode(
         cost_weights=settings.cost.weights,
         idle=np.zeros(lanes, dtype=np.bool_),
         steps=np.ones(lanes, dtype=np.int64),
-        writers=layout.writers,
+        writers=np.array([(entry.writer, entry.number) for entry in layout.entries]),
         history=layout.history,
         averages=np.zeros((rows, READINGS if layout.kind == DEVIATIONS else 0)),
         average_share=_share(settings.control_interval, AVERAGED),
@@ -141,11 +138,6 @@ class Results(NamedTuple):
     def truncated(self) -> Flags:
         """(rows,): whether the end of the run is reached within the valid range, a view."""
         return self.flags[:, Flag.TRUNCATED]
-
-    @property
-    def reward_and_terms(self) -> Array:
-        """(1 + terms, rows): the reward and its unweighted terms, a view."""
-        return self.values[:, Result.REWARD : Result.CONTACT_FORCE].T
 
     def copy(self) -> Results:
         """A copy of the arrays."""

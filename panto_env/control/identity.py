@@ -7,8 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ..base.checksums import __version__
 from ..base.files import finite
-from ..base.version import __version__
 from ..plant.catenary import CATENARIES
 from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant

@@ -1,9 +1,11 @@
-"""What a pantograph read and did at the places just ahead of it, one span ago and more.
+"""What was measured earlier at the places ahead of a pantograph, by the one in front of it and by itself.
 
-Droppers, supports and sag repeat from span to span, and so does much of the contact force: what was felt at
-the same share of earlier spans, and what was done there, foretells what comes. Place and contact force, as
-read, and actions are kept for each control step and looked up by the place. Before a line's start the force
-is that at rest and there are no actions.
+The contact force that the sensors of the one in front read, with their delay and noise, is kept for each
+control step until the one behind has come to the place, as a train's data bus tells it.
+
+Droppers, supports and sag repeat from span to span, and so does much of the contact force: what was felt and
+done at the same share of earlier spans foretells what comes. It is kept for each control step and looked up
+by the place. Before a line's start the force is that at rest and there are no actions.
 """
 
 from __future__ import annotations
@@ -13,13 +15,80 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..backend import inlined
+from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.alignment import Alignment
-from ..plant.sensors import READING
-from ..plant.state import ROW
+from ..plant.sensors import READING, Reading
+from ..plant.state import ROW, PerCollector, per_collector
+from ..plant.train import Train
 from .state import NOW, NOW_ROWS, TASK_ROW
+
+
+class FrontArrays(NamedTuple):
+    """Readings of the pantographs in front; arrays without columns where nothing of them is observed."""
+
+    ahead: Array  # (places,): distances ahead of a controlled pantograph (m)
+    behind: Array  # (agents,): its distance behind the one in front (m); 0 where there is none
+    collector: PerCollector  # that in front of each agent; its own where there is none
+    reading: Array  # (rows, readings): of the one in front, where it is not controlled itself
+    kept: Array  # (rows, times): its contact force after each control step (N), time n in column n % times
+
+
+def front_arrays(places: tuple[float, ...], train: Train, lanes: int, slowest: float) -> FrontArrays:
+    """Arrays for the agents of all lanes; slowest: distance that a train covers in a control step (m).
+
+    Raises InputError where a place lies beyond the pantograph in front, or no controlled one has any.
+    """
+    collectors, driven = train.collectors, train.driven
+    behind = np.array(
+        [
+            collectors[number].distance - collectors[number - 1].distance if number else 0.0
+            for number in driven
+        ]
+    )
+    if places and not behind.any():
+        raise InputError(
+            "front is what a pantograph in front measured, and no controlled one has any in front of it; "
+            "leave out front, or control another one."
+        )
+    if places and places[-1] > behind[behind > 0].min():
+        raise InputError(
+            f"front must be at most the {behind[behind > 0].min():g} m to the pantograph in front, not "
+            f"{places[-1]:g} m."
+        )
+    rows = lanes * len(driven)
+    times = math.ceil(behind.max() / slowest) + 2 if places else 0
+    return FrontArrays(
+        ahead=np.array(places, dtype=float),
+        behind=behind,
+        collector=per_collector((max(number - 1, 0) for number in driven), int, len(collectors)),
+        reading=np.zeros((rows, len(Reading) if places else 0)),
+        kept=np.zeros((rows, times)),
+    )
+
+
+@inlined
+def keep_front(episode, sensors, run, reading, agent, lane, row):
+    """Keep the contact force that the one in front has read in a control step; reading: its readings."""
+    c, kept = episode.front.collector[agent], episode.front.kept[row]
+    force = reading[READING.CONTACT_FORCE]
+    if sensors.noise.shape[2] > 0:
+        force += sensors.noise[lane, c, sensors.noise_used[lane] & NOT_NEGATIVE, READING.CONTACT_FORCE]
+    kept[int(run.table[c, lane, ROW.STEP]) // episode.control_steps % kept.size] = force
+
+
+@inlined
+def force_in_front(episode, own, agent, row, place):
+    """Contact force (N) that the one in front measured at a place ahead: between the nearest two readings."""
+    front, kept = episode.front, episode.front.kept[row]
+    stride = own[ROW.STRIDE] * episode.control_steps
+    ago = max(front.behind[agent] - front.ahead[place], 0.0) / stride
+    time, times, whole = int(own[ROW.STEP]) // episode.control_steps, kept.size, int(ago)
+    later = kept[(time - whole + times * times) % times]
+    earlier = kept[(time - whole - 1 + times * times) % times]
+    return later + (ago - whole) * (earlier - later)
+
 
 BEFORE = -1e9
 """Place (spans) of what has not been kept yet: before every place that is looked up."""

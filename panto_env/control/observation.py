@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
-from ..base.errors import InputError
-from ..base.names import suggest
-from ..plant.alignment import in_spans
+from ..base.errors import InputError, suggest
+from ..plant.alignment import Alignment, in_spans
+from ..plant.catenary.schema import CatenaryData
+from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
-from ..plant.train import place_on_line, stride
-from .entries import (
-    CENTRED,
-    DEVIATIONS,
-    ESTIMATED,
-    FULL,
-    MEASURED,
-    WRITERS,
-    Entry,
-    EntryOptions,
-    earlier,
-    entries_of,
-)
-from .front import force_in_front
-from .memory import keep_and_recall
+from ..plant.train import Train, place_on_line, stride
+from .entries import CENTRED, WRITERS, Entry, earlier, entries_of
+from .memory import force_in_front, keep_and_recall
 from .state import NOW, NOW_ROWS, TASK_ROW
+
+if TYPE_CHECKING:
+    from .settings import RunSettings
 
 READINGS = len(Reading)
 BOUND = 10.0
@@ -40,7 +32,7 @@ BOUND = 10.0
 
 @dataclass(frozen=True)
 class Layout:
-    """The entries of an observation, in order."""
+    """The entries of an observation, in order; what follows them are the settings that ask for them."""
 
     kind: str
     entries: tuple[Entry, ...]
@@ -51,6 +43,12 @@ class Layout:
     memory_spans: int = 1  # number of these spans
     line_values: bool = False  # whether the line's are among the entries
     normalise: tuple[float, float] | None = None  # speeds (km/h) of the passive runs that normalise readings
+
+    @classmethod
+    def of(cls, settings: RunSettings) -> Layout:
+        """Layout of the observation that settings ask for, not normalised."""
+        asked = {name: getattr(settings, name) for name in OBSERVATION_SETTINGS[1:-1]}
+        return cls(settings.observation, tuple(entries_of(settings)), **asked)
 
     @property
     def scale(self) -> Array:
@@ -76,11 +74,6 @@ class Layout:
         past, now = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
         return past, now
 
-    @property
-    def writers(self) -> Index:
-        """Writer and number of each entry, (entries, 2)."""
-        return np.array([(entry.writer, entry.number) for entry in self.entries])
-
     def index(self, name: str) -> int:
         """Index of an entry. Raises InputError where none has this name."""
         names = [entry.name for entry in self.entries]
@@ -103,25 +96,8 @@ class Layout:
         return entry.centre + shift + float(observation[place]) * entry.scale
 
 
-OBSERVATION_SETTINGS = (
-    "observation",
-    "harmonics",
-    "history",
-    "front",
-    "memory",
-    "memory_spans",
-    "line_values",
-    "normalise",
-)
+OBSERVATION_SETTINGS = ("observation", *(field.name for field in fields(Layout)[2:]))
 """Settings of a run that determine only the observation."""
-OBSERVATIONS = (MEASURED, FULL, CENTRED, ESTIMATED, DEVIATIONS)
-"""Kinds of observation."""
-
-
-def layout(kind: str, options: EntryOptions) -> Layout:
-    """Layout of an observation; kind: one of OBSERVATIONS."""
-    entries = tuple(entries_of(kind, options))
-    return Layout(kind, entries, *options[2:])
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
@@ -226,3 +202,22 @@ def entry_of(episode, own, task, now, k):
     value = _write(episode.writers[k, 0], episode, own, task, now, episode.writers[k, 1])
     centre = episode.centre[k] + episode.slope[k] * now[NOW.STRIDE]
     return min(BOUND, max(-BOUND, (value - centre) * episode.per_unit[k]))
+
+
+@dataclass(frozen=True)
+class Context:
+    """Information about an episode that a policy may use, known at its start."""
+
+    layout: Layout  # of the observation
+    actions: int  # length of an action, each in -1..1
+    channels: tuple[int, ...]  # place where each action acts: 0 frame, 1 head
+    force_limit: float  # force of an action of 1 (N)
+    control_interval: float  # s
+    washout: float  # time constant (s) of what is subtracted from the actions, 0 for nothing
+    speed: float  # of the train, its mean where it drifts (m/s)
+    alignment: Alignment  # of the line
+    nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
+    catenary: CatenaryData
+    pantograph: PantographData
+    train: Train  # of which this is the pantograph ``collector``
+    collector: int  # counted from 0 in front

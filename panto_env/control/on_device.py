@@ -13,10 +13,10 @@ import numpy as np
 import torch
 
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
-from ..backend.columns import Columns, map_arrays
+from ..backend.cuda import Columns, map_arrays
 from ..base.arrays import Array
-from .context import Context
 from .episode import Flags, Results
+from .observation import Context
 from .settings import RunSettings
 from .step import control_lane, control_steps
 from .task import Task
@@ -124,7 +124,6 @@ def _tile(lanes: int, device: torch.device) -> int:
 
 
 def _bound(columns: Columns) -> Callable[[], Any]:
-    """A control step of all lanes that are not idle."""
     if columns.device.type == "cuda":
         from ..backend.cuda import bind_on_gpu  # needs numba-cuda, an extra
 

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..catalog.values import by_value
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
-from ..plant.pantograph.schema import PantographData
-from ..plant.plant import Plant
-from ..plant.state import Row
-from ..plant.valid_range import LARGEST_HEIGHT, LARGEST_SPEED, Ending, reason
+from ..plant.state import LARGEST_HEIGHT, LARGEST_SPEED, Ending, Row, reason
 from .identity import identity
-from .mean_force import named
+from .passive_run import named, target_mean
 from .state import TaskRow
-from .task_state import TaskState
+
+if TYPE_CHECKING:
+    from .task import Task
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force from its static value (N), ten times any real one: it has diverged."""
 
 
-def diverged(task: TaskState, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
+def diverged(task: Any, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
     """Whether rows, (n,), have diverged, as their ending or an impossible value shows.
 
     deviation: mean, from what springs leave of the nominal force (N). height: of the wire (m).
@@ -38,17 +36,23 @@ def diverged(task: TaskState, rows: Any, deviation: Array, height: Array) -> NDA
     return np.asarray(~possible | (endings == Ending.DIVERGED))
 
 
-def divergence(task: TaskState, lane: int) -> str:
+def divergence(task: Task, lane: int) -> str:
     """Message that a lane's computation diverged, and what to do."""
     plant = task.plant
+    way_out = (
+        "the loop of the rig may be unstable, see panto rig --stability"
+        if plant.catenary.kind == "rig"
+        else f"use a time_step below {1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less "
+        "damped contact"
+    )
     return (
         f"The computation of {named(task.settings.riding)} on '{plant.catenary.name}' at "
         f"{to_kmh(task.speed[lane]):g} km/h diverged, so it has no result: "
-        f"{_bound(task, lane)}; {_way_out(plant)}."
+        f"{_bound(task, lane)}; {way_out}."
     )
 
 
-def _bound(task: TaskState, lane: int) -> str:
+def _bound(task: Task, lane: int) -> str:
     """Which bound a lane's computation passed that nothing passes but what diverges, as a clause."""
     rows = task.plant.run.table[:, lane]
     for what, row in (("the collector head", Row.STATE), ("the contact wire", Row.WIRE_HEIGHT)):
@@ -60,33 +64,20 @@ def _bound(task: TaskState, lane: int) -> str:
     return f"the contact force was over {LARGEST_DEVIATION:,g} N from its static value in the mean"
 
 
-def _way_out(plant: Plant) -> str:
-    """What to do where a computation diverged."""
-    if plant.catenary.kind == "rig":
-        return "the loop of the rig may be unstable, see panto rig --stability"
-    return (
-        f"use a time_step below {1e3 * plant.time_step:g} ms, a finer spacing, or a softer or less damped "
-        "contact"
-    )
-
-
 def trajectory(
-    task: TaskState, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
+    task: Task, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
 ) -> Trajectory:
     """Record of a lane's run so far, of the first collector with those of the others as its followers.
 
-    last: the task does not run any more, so large arrays need no copy. Raises InputError where its
-    computation diverged.
+    last: the task does not run any more, so the record may take over its arrays. Raises InputError where
+    the computation diverged.
     """
     collectors = range(len(task.plant.train.collectors))
     first, *followers = (_of_collector(task, lane, number, policy, seed, last) for number in collectors)
     return replace(first, followers=tuple(followers)) if followers else first
 
 
-def _of_collector(
-    task: TaskState, lane: int, collector: int, policy: str, seed: int, last: bool
-) -> Trajectory:
-    """Record of one collector, from where it comes onto the line."""
+def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int, last: bool) -> Trajectory:
     plant, nominal_force = task.plant, task.plant.of(lane, Row.NOMINAL_FORCE, collector)
     steps, pantograph = int(plant.of(lane, Row.STEP)), task.settings.riding[collector]
     position = plant.position(lane, np.arange(steps) + 0.5, collector)
@@ -101,7 +92,11 @@ def _of_collector(
     uplift, tension = (
         each[lane, 1 : steps + 1][on_line] for each in (task.samples.uplift, task.samples.tension)
     )
-    controlled = collector in task.episode.controlled
+    controlled, several = collector in task.episode.controlled, task.settings.pantographs
+    design: dict[str, Any] = {"catenary": by_value(plant.catenary), "pantograph": by_value(pantograph)}
+    target = target_mean(task.settings, float(task.speed[lane]), collector)
+    if several:
+        design["pantographs"] = [by_value(own) for own in several]
     return Trajectory(
         time=(np.arange(steps) + 0.5)[on_line] * plant.time_step,
         position=position[on_line],
@@ -123,26 +118,19 @@ def _of_collector(
         alignment=plant.alignment,
         time_step=plant.time_step,
         nominal_force=nominal_force,
-        target_mean=task.target_mean(lane, collector),
+        target_mean=math.nan if target is None else target,
         settings=identity(task.settings, plant, task.length.own_distance),
         policy=policy if controlled else "passive",
         seed=seed,
         terminated=_ending(task, lane) is not Ending.NONE,
         ending=ending(task, lane),
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
-        design=_design(task, pantograph),
+        design=design,
         reached=float(plant.position(lane, steps, collector)[0]) if collector else math.nan,
     )
 
 
-def _design(task: TaskState, pantograph: PantographData) -> dict[str, Any]:
-    """Line and pantographs by value, with which a run can be repeated; pantograph: the collector's own."""
-    design = {"catenary": by_value(task.plant.catenary), "pantograph": by_value(pantograph)}
-    several = task.settings.pantographs
-    return design | ({"pantographs": [by_value(own) for own in several]} if several else {})
-
-
-def ending(task: TaskState, lane: int) -> str:
+def ending(task: Task, lane: int) -> str:
     """Where and why a lane's run ended early, as a sentence; empty if it did not."""
     which = _ending(task, lane)
     if which is Ending.NONE:
@@ -155,5 +143,5 @@ def ending(task: TaskState, lane: int) -> str:
     return f"The run ended early at {position:.1f} m (span {span}, {time:.2f} s): {why}."
 
 
-def _ending(task: TaskState, lane: int) -> Ending:
+def _ending(task: Task, lane: int) -> Ending:
     return Ending(int(task.episode.table[lane * task.agents, TaskRow.ENDING]))

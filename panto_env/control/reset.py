@@ -1,66 +1,95 @@
-"""Start of episodes: lanes are put at the line's start, run in, and observed."""
+"""Random values of an episode, drawn at its start."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
-from ..plant.state import SAMPLE_ROWS, Row
-from ..plant.valid_range import Ending
+from ..plant.line_condition import DrawnLine, draw
+from ..plant.pantograph.schema import PantographData, with_scatter
+from ..plant.state import SAMPLE_ROWS, Ending, Row
+from ..plant.train import draw_drift
+from ..plant.wind import draw_side_wind, draw_wind
 from .episode import Results
 from .memory import forget
-from .record import ending
-from .running_figures import no_figures
-from .safety import limits
-from .start import LaneGenerators, draw_starts
+from .reward import limits
 from .state import Result, TaskRow
-from .task_state import TaskState
+from .step import no_figures
+
+if TYPE_CHECKING:
+    from .task import Task
+
+LaneGenerators = np.random.Generator | Callable[[int], np.random.Generator]
+"""One random generator for all lanes, or a function from a lane's number to its generator."""
 
 
-def reset(
-    task: TaskState,
-    lanes: Any,
-    random: LaneGenerators,
-    static_forces: Callable[[Array], Array | None],
-    results: Results,
-) -> None:
-    """Start episodes in lanes, (n,), and make their run-in; see ``Task.reset``.
+class Starts(NamedTuple):
+    """Values that were drawn for some lanes."""
 
-    static_forces: of lanes (N), (n,), as a function of their speeds (m/s); None where none is trimmed.
-    """
-    plant = task.plant
+    speed: Array  # (lanes,): m/s
+    line: Sequence[DrawnLine]  # of each lane
+    pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
+    way: Array  # (lanes,): distance of the run-in (m)
+    drift: Array | None  # (lanes, DRIFT_ROWS): of the speeds; None where these are constant
+
+
+def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
+    """Draw the starts of lanes, (n,), each from its own generator, which is only made where it is needed."""
+    settings, plant, (low, high) = task.settings, task.plant, task.length.speed_range
+    conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
+    parts = len(plant.model.droppers), len(plant.model.supports)
+    lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
+    speed, way, rms = np.full(len(lanes), low), np.zeros(len(lanes)), settings.drift
+    if not (low < high or lines_differ or scatter or run_in or rms):
+        unused = np.random.default_rng(0)
+        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, None)
+    windy = any(condition.wind for condition in conditions)
+    windy_across = any(condition.side_wind for condition in conditions)
+    line, pantographs, drift = [], [], []
+    for k, lane in enumerate(lanes.tolist()):
+        own = random(lane)
+        if low < high:
+            speed[k] = own.uniform(low, high)
+        line.append(draw(conditions, own, *parts))
+        if scatter:
+            pantographs.append([with_scatter(designed, scatter, own) for designed in settings.riding])
+        if run_in > 0:
+            way[k] = plant.alignment.support(own.uniform(0, run_in))
+        if rms > 0:
+            drift.append(draw_drift(rms, plant.time_step, own))
+        if windy:  # drawn last: all else is as in still air
+            line[k] = replace(line[k], wind=draw_wind(line[k].condition.weather, plant.time_step, own))
+        if windy_across:
+            side_wind = draw_side_wind(line[k].condition.across, plant.time_step, own)
+            line[k] = replace(line[k], side_wind=side_wind)
+    return Starts(speed, line, pantographs, way, np.array(drift) if drift else None)
+
+
+def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
+    """Start episodes in lanes, (n,), and make their run-in; see ``Task.reset``."""
+    plant, length = task.plant, task.length
     of_lane = random if callable(random) else lambda _: random
-    droppers, supports = len(plant.model.droppers), len(plant.model.supports)
-    drawn = draw_starts(
-        task.settings,
-        task.length.speed_range,
-        droppers,
-        supports,
-        lanes,
-        of_lane,
-        plant.time_step,
-        plant.alignment,
-    )
-    forces = static_forces(drawn.speed)
+    drawn = _draw(task, lanes, of_lane)
+    forces = task.static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantographs, forces, drawn.drift)
-    run_in = np.round(drawn.way / (drawn.speed * task.length.control_interval))
-    end = task.length.plant_steps(drawn.speed, run_in, drawn.drift)
+    run_in = np.round(drawn.way / (drawn.speed * length.control_interval))
+    end = length.plant_steps(drawn.speed, run_in, drawn.drift)
     # A collector behind the first comes onto the line later: its episode begins there.
     distances = [plant.train.collectors[number].distance for number in task.episode.controlled]
     if distances[0] > 0:
-        steps = task.length.plant_steps(drawn.speed, run_in, drawn.drift, distances[0])
-        run_in = steps // task.length.control_steps
-    run_in = np.minimum(run_in, end // task.length.control_steps - 1).astype(np.int64)
+        steps = length.plant_steps(drawn.speed, run_in, drawn.drift, distances[0])
+        run_in = steps // length.control_steps
+    run_in = np.minimum(run_in, end // length.control_steps - 1).astype(np.int64)
     counted_from = np.zeros((len(distances), len(lanes)))
     for agent, distance in enumerate(distances):
-        uncounted = distance - distances[0] + task.length.settling
+        uncounted = distance - distances[0] + length.settling
         if uncounted:
-            counted_from[agent] = task.length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
+            counted_from[agent] = length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
     at_start = [_at_start(task, agent, lanes) for agent in range(task.agents)]
     _begin(task, lanes, at_start, end, counted_from)
     plant.clear(task.samples, lanes)
@@ -81,12 +110,11 @@ def reset(
         _run_in(task, lanes[ran], run_in[ran], [own[ran] for own in at_start], results)
 
 
-def _rows(task: TaskState, lanes: Any) -> Any:
-    """Rows of lanes, (agents, n)."""
-    return task.agents * lanes + np.arange(task.agents)[:, None]
+def _rows(task: Task, lanes: Any) -> Any:
+    return task.agents * lanes + np.arange(task.agents)[:, None]  # (agents, n)
 
 
-def _at_start(task: TaskState, agent: int, lanes: Any) -> Array:
+def _at_start(task: Task, agent: int, lanes: Any) -> Array:
     """Rows of a controlled collector in lanes, (n, rows of ``TaskRow``), wherever their episodes begin."""
     collector = task.episode.controlled[agent]
     start, pantograph = task.plant.run.table[collector, lanes], task.settings.riding[collector]
@@ -107,44 +135,38 @@ def _at_start(task: TaskState, agent: int, lanes: Any) -> Array:
     return values
 
 
-def _begin(task: TaskState, lanes: Any, at_start: Sequence[Array], end: Array, counted_from: Array) -> None:
+def _begin(task: Task, lanes: Any, at_start: Sequence[Array], end: Array, counted_from: Array) -> None:
     """Begin episodes in lanes, (n,), at their present positions.
 
     at_start: of each agent, from ``_at_start``. end, counted_from: plant steps from the line's start at which
     they end, (n,), and after which they count, (agents, n). Raises InputError where nothing of an episode
     would count.
     """
+    episode, run = task.episode, task.plant.run.table
     for agent, rows in enumerate(_rows(task, lanes)):
-        _begin_agent(task, agent, lanes, rows, at_start[agent], end, counted_from[agent])
+        start, values = run[episode.controlled[agent], lanes], at_start[agent]
+        counted = np.maximum(counted_from[agent], start[:, Row.STEP])
+        if (counted >= end).any():
+            raise InputError(
+                f"After the {task.settings.settle:g} spans of settle nothing of the episode is left to "
+                "count; set a distance, more spans, or a smaller settle."
+            )
+        values[:, TaskRow.END], values[:, TaskRow.COUNTED_FROM] = end, counted
+        shifted = task.plant.ahead(lanes, np.stack([counted, end], axis=1))
+        steady = (end - counted) * start[:, Row.STRIDE]
+        values[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
+        episode.table[rows] = values
+        at_line_start = not start[:, Row.STEP].any()
+        if episode.front.ahead.size and at_line_start:
+            in_front = run[episode.front.collector[agent], lanes]
+            episode.front.kept[rows] = in_front[:, Row.CONTACT_FORCE, None]  # at rest
+        if episode.memory.ahead.size and at_line_start:
+            deviates = episode.averages.shape[1] > 0  # at rest from its average by nothing
+            forget(episode.memory, rows, start[:, Row.CONTACT_FORCE] * (not deviates))
+        task.running.peak[rows] = -np.inf
 
 
-def _begin_agent(
-    task: TaskState, agent: int, lanes: Any, rows: Any, values: Array, end: Array, counted_from: Array
-) -> None:
-    """As ``_begin``, for one of the controlled collectors; rows: its own, (n,)."""
-    start, table = task.plant.run.table[task.episode.controlled[agent], lanes], task.episode.table
-    values[:, TaskRow.END] = end
-    counted_from = np.maximum(counted_from, start[:, Row.STEP])
-    if (counted_from >= end).any():
-        raise InputError(
-            f"After the {task.settings.settle:g} spans of settle nothing of the episode is left to count; "
-            "set a distance, more spans, or a smaller settle."
-        )
-    values[:, TaskRow.COUNTED_FROM] = counted_from
-    shifted = task.plant.ahead(lanes, np.stack([counted_from, end], axis=1))
-    steady = (end - counted_from) * start[:, Row.STRIDE]
-    values[:, TaskRow.DISTANCE] = steady + (shifted[:, 1] - shifted[:, 0])
-    table[rows] = values
-    if task.episode.front.ahead.size and not start[:, Row.STEP].any():
-        in_front = task.plant.run.table[task.episode.front.collector[agent], lanes]
-        task.episode.front.kept[rows] = in_front[:, Row.CONTACT_FORCE, None]  # at rest
-    if task.episode.memory.ahead.size and not start[:, Row.STEP].any():
-        deviates = task.episode.averages.shape[1] > 0  # at rest from its average by nothing
-        forget(task.episode.memory, rows, start[:, Row.CONTACT_FORCE] * (not deviates))
-    task.running.peak[rows] = -np.inf
-
-
-def _run_in(task: TaskState, lanes: Any, steps: Any, at_start: Sequence[Array], results: Results) -> None:
+def _run_in(task: Task, lanes: Any, steps: Any, at_start: Sequence[Array], results: Results) -> None:
     """Run lanes, just reset, for ``steps`` control steps each without control, and begin episodes there.
 
     at_start: of these lanes and each agent, from ``_at_start``.
@@ -155,23 +177,15 @@ def _run_in(task: TaskState, lanes: Any, steps: Any, at_start: Sequence[Array], 
     rows = _rows(task, lanes)
     before = task.episode.table[rows]
     for lane in lanes[before[0, :, TaskRow.ENDING] != Ending.NONE].tolist():
-        raise InputError(ending(task, lane))
+        raise InputError(task.ending(lane))
     _begin(task, lanes, at_start, before[0, :, TaskRow.END], before[..., TaskRow.COUNTED_FROM])
     # What the run-in would have earned and cost does not count.
     results.values[rows, : Result.CONTACT_FORCE] = results.values[rows, Result.COST] = 0.0
-    if task.layout.history:
+    if task.layout.history:  # filled after the run-in with its last readings
+        first = TaskRow.ACTION + len(task.actuator.places)
+        past, now = task.layout.earlier
         for own, values in zip(rows, before, strict=True):
-            _forget(task, own, values, results)
-
-
-def _forget(task: TaskState, rows: Any, values: Array, results: Results) -> None:
-    """Fill the history of rows, (n,), after a run-in with their last readings.
-
-    values: of ``TaskRow``, (n, rows of the table), from before their episodes began.
-    """
-    first = TaskRow.ACTION + len(task.actuator.places)
-    history = values[:, first:]
-    latest = history[:, : history.shape[1] // task.layout.history]
-    task.episode.table[rows, first:] = np.tile(latest, task.layout.history)
-    past, now = task.layout.earlier
-    results.observation[np.ix_(rows, past)] = results.observation[np.ix_(rows, now)]
+            history = values[:, first:]
+            latest = history[:, : history.shape[1] // task.layout.history]
+            task.episode.table[own, first:] = np.tile(latest, task.layout.history)
+            results.observation[np.ix_(own, past)] = results.observation[np.ix_(own, now)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any, Self, TypeVar
 
@@ -14,29 +15,23 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-from ..base.errors import InputError
-from ..base.explanation import sentence
-from ..base.names import suggest
-from ..base.ranges import Between
-from ..base.settings import parse, plain
-from ..base.shown import shown
-from ..base.units import from_kmh, to_kmh
+from ..base.arrays import from_kmh, to_kmh
+from ..base.errors import InputError, shown, suggest
+from ..base.settings import Between, parse, plain, sentence
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
-from ..estimation.settings import ESTIMATORS, EstimatorSettings
-from ..metrics.spans import LAST_USUAL
+from ..estimation.model import ESTIMATORS, EstimatorSettings
+from ..metrics.figures import LAST_USUAL
 from ..plant.actuators import ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count
-from ..plant.drift import largest_drift
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
-from ..plant.train import MOST_COLLECTORS, Train
-from .observation import OBSERVATIONS
-from .reward import REWARDS, Reward
-from .safety import CostWeights
+from ..plant.train import MOST_COLLECTORS, Train, largest_drift
+from .entries import OBSERVATIONS
+from .reward import REWARDS, CostWeights, Reward
 
 R = TypeVar("R", bound="RunSettings")
 FARTHEST = 1e9
@@ -59,26 +54,21 @@ def _one_or_more_conditions(value: Any) -> tuple[LineCondition, ...]:
     return tuple(parse(LineCondition, each, "line_condition", LINE_CONDITIONS) for each in several)
 
 
-def _weights(value: Any) -> Reward:
-    return parse(Reward, {} if value is None else value, "reward", REWARDS)
-
-
-def _cost(value: Any) -> CostWeights:
-    return parse(CostWeights, {} if value is None else value, "cost")
-
-
 def _observation(value: Any) -> str:
     if value not in OBSERVATIONS:
         raise InputError(f"observation must be one of {', '.join(OBSERVATIONS)}, not {shown(value)}.")
     return str(value)
 
 
-def _estimator(value: Any) -> EstimatorSettings:
-    return parse(EstimatorSettings, value, "estimator", ESTIMATORS)
+_estimator = partial(parse, EstimatorSettings, name="estimator", presets=ESTIMATORS)
 
 
-def _known_pantograph(value: Any) -> PantographData | None:
-    return None if value is None else load_pantograph(value)
+def _parsed(kind: Any, name: str, presets: Mapping[str, Any] | None = None) -> BeforeValidator:
+    return BeforeValidator(lambda value: parse(kind, {} if value is None else value, name, presets or {}))
+
+
+def _unless_none(read: Callable[[Any], Any]) -> BeforeValidator:
+    return BeforeValidator(lambda value: None if value is None else read(value))
 
 
 def _pantographs(value: Any) -> tuple[PantographData, ...]:
@@ -107,21 +97,17 @@ def _distances(value: Any) -> tuple[float, ...]:
     return tuple(float(each) for each in numbers)
 
 
-def _front(value: Any) -> tuple[float, ...]:
-    return _increasing(value, FARTHEST, "front must be increasing distances from 0 m up")
+def _increasing(most: float, rule: str) -> BeforeValidator:
+    """Increasing numbers from 0 to ``most``; InputError, which begins with the rule, for others."""
 
+    def check(value: Any) -> tuple[float, ...]:
+        numbers = _several(value, int | float)
+        rising = numbers is not None and all(before < after for before, after in pairwise(numbers))
+        if numbers is None or not rising or not all(0 <= each <= most for each in numbers):
+            raise InputError(f"{rule}, not {shown(value)}.")
+        return tuple(float(each) for each in numbers)
 
-def _memory(value: Any) -> tuple[float, ...]:
-    return _increasing(value, LATEST, f"memory must be increasing times from 0 to {LATEST:g} s")
-
-
-def _increasing(value: Any, most: float, rule: str) -> tuple[float, ...]:
-    """Increasing numbers from 0 to ``most``. Raises InputError, which begins with the rule, for others."""
-    numbers = _several(value, int | float)
-    rising = numbers is not None and all(before < after for before, after in pairwise(numbers))
-    if numbers is None or not rising or not all(0 <= each <= most for each in numbers):
-        raise InputError(f"{rule}, not {shown(value)}.")
-    return tuple(float(each) for each in numbers)
+    return BeforeValidator(check)
 
 
 def controlled_numbers(value: Any) -> tuple[int, ...]:
@@ -135,28 +121,16 @@ def controlled_numbers(value: Any) -> tuple[int, ...]:
     return tuple(sorted(numbers))
 
 
-def _spans(value: Any) -> int | None:
-    return None if value is None else check_span_count(value)
-
-
-def _distance(value: Any) -> float | None:
-    if value is not None and not (isinstance(value, int | float) and 0 < value <= FARTHEST):
+def _distance(value: Any) -> float:
+    if not (isinstance(value, int | float) and 0 < value <= FARTHEST):
         raise InputError(f"distance must be a positive number (m), not {shown(value)}.")
     return value
 
 
-def _none_is_zero(value: Any) -> Any:
-    return 0.0 if value is None else value
-
-
-def _mean_force(value: Any) -> float | str | tuple[float, ...] | None:
+def _mean_force(value: Any) -> float | str | tuple[float, ...]:
     if isinstance(value, list | tuple) and len(value):
         return tuple(_force(each) for each in value)
-    if value is None:
-        return None
-    if isinstance(value, str) and value == "en50367":
-        return "en50367"
-    return _force(value)
+    return "en50367" if isinstance(value, str) and value == "en50367" else _force(value)
 
 
 def _force(value: Any) -> float:
@@ -183,10 +157,6 @@ def speed_range(speed_kmh: Any, name: str = "speed_kmh") -> tuple[float, float]:
     if low > high:
         raise InputError(f"The range {name} must not fall, as {shown(speed_kmh)} does.")
     return low, high
-
-
-def _normalise(value: Any) -> tuple[float, float] | None:
-    return None if value is None else speed_range(value, "normalise")
 
 
 class RunSettings(Numerics):
@@ -246,13 +216,15 @@ class RunSettings(Numerics):
         'defects and weather such as "worn:broken_droppers=[(4, 5)],wind=15,ice=0.3", or a table; from a '
         "list one is drawn per run",
     )
-    mean_force: Annotated[str | float | tuple[float, ...] | None, BeforeValidator(_mean_force)] = Field(
+    mean_force: Annotated[str | float | tuple[float, ...] | None, _unless_none(_mean_force)] = Field(
         None,
         description='mean contact force (N) to be met by trimming the static force, or "en50367" for that '
         "standard's maximum; in Python a list has one for each pantograph of a train; by default as the "
         "pantograph's data say: its force applied, or met by the mean",
     )
-    washout: Annotated[float, Between(0, 100, "s"), BeforeValidator(_none_is_zero)] = Field(
+    washout: Annotated[
+        float, Between(0, 100, "s"), BeforeValidator(lambda value: 0.0 if value is None else value)
+    ] = Field(
         0.0,
         description="time constant (s) of the slow average of the actuator's force that is subtracted from "
         "the action, so that it can't move the mean contact force; 0 or None: nothing is subtracted",
@@ -277,12 +249,16 @@ class RunSettings(Numerics):
     history: Annotated[int, Between(0, 8)] = Field(
         0, description="earlier control steps whose readings and actions are also observed (-)"
     )
-    front: Annotated[tuple[float, ...], BeforeValidator(_front)] = Field(
+    front: Annotated[
+        tuple[float, ...], _increasing(FARTHEST, "front must be increasing distances from 0 m up")
+    ] = Field(
         (),
         description="distances ahead (m) at which a controlled pantograph also observes the contact force "
         "that the one in front of it measured there",
     )
-    memory: Annotated[tuple[float, ...], BeforeValidator(_memory)] = Field(
+    memory: Annotated[
+        tuple[float, ...], _increasing(LATEST, f"memory must be increasing times from 0 to {LATEST:g} s")
+    ] = Field(
         (),
         description="times (s) until places ahead; a policy also observes the contact force that its "
         "pantograph measured, and the actions, at the same share of earlier spans",
@@ -293,7 +269,9 @@ class RunSettings(Numerics):
         description="whether a policy also observes what the line is: span, wave speed, tensions and masses "
         "of both wires, number of droppers",
     )
-    normalise: Annotated[tuple[_Speed, _Speed] | None, BeforeValidator(_normalise)] = Field(
+    normalise: Annotated[
+        tuple[_Speed, _Speed] | None, _unless_none(partial(speed_range, name="normalise"))
+    ] = Field(
         None,
         description="speed or range of speeds (km/h) of passive runs, with line and pantograph as designed, "
         "by which readings are normalised to a mean near 0 and a spread near 1; by default the scales of the "
@@ -305,18 +283,18 @@ class RunSettings(Numerics):
         description='estimator of the observation "estimated": "usual", "displacements", one with values '
         'such as "usual:suspension_drift=0", or a table',
     )
-    known_pantograph: Annotated[PantographData | None, BeforeValidator(_known_pantograph)] = Field(
+    known_pantograph: Annotated[PantographData | None, _unless_none(load_pantograph)] = Field(
         None,
         description="pantograph that estimator and policies assume: a name of the catalogue or a TOML "
         "file; by default the true one",
     )
-    reward: Annotated[Reward, BeforeValidator(_weights)] = Field(
+    reward: Annotated[Reward, _parsed(Reward, "reward", REWARDS)] = Field(
         None,
         validate_default=True,
         description='weights of the reward\'s terms: "paper1", "benchmark", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
     )
-    cost: Annotated[CostWeights, BeforeValidator(_cost)] = Field(
+    cost: Annotated[CostWeights, _parsed(CostWeights, "cost")] = Field(
         None,
         validate_default=True,
         description='weights of the terms of `info["cost"]`, for safe learning: a table of contact_loss, '
@@ -327,12 +305,12 @@ class RunSettings(Numerics):
         description="spans in which a policy acts before the reward and the figures of an episode count; the "
         "episode and the line are longer by them",
     )
-    distance: Annotated[float | None, BeforeValidator(_distance)] = Field(
+    distance: Annotated[float | None, _unless_none(_distance)] = Field(
         None,
         description="distance that the last pantograph is to run (m); by default to the end of the line, "
         f"and outside an environment at least to the end of span {LAST_USUAL}; a short line gets more spans",
     )
-    spans: Annotated[int | None, BeforeValidator(_spans)] = Field(
+    spans: Annotated[int | None, _unless_none(check_span_count)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
     )
     control_interval: ControlInterval = Field(0.01, description="time between two actions (s)")

@@ -2,40 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
-from ..base.errors import InputError
-from ..base.shown import shown
-from ..metrics.figures import Figures
-from ..metrics.spans import SpanChoice, settled_spans
+from ..base.errors import InputError, shown
+from ..metrics.figures import Figures, SpanChoice, settled_spans
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
-from .context import Context
-from .cost import Cost, arrays_of, run_cost
-from .entries import DEVIATIONS, ESTIMATED, EntryOptions
-from .episode import Flags, Results, new_episode
-from .extent import new_plant
-from .length import EpisodeLength
-from .mean_force import Forces, PassiveMean, Trim, TrimAsDesigned, named, target_mean, trimmed, warn_of_spring
-from .normalise import normalised
-from .observation import layout
-from .passive_run import ADVICE, PassiveRun
+from .arguments import not_finite
+from .entries import DEVIATIONS, ESTIMATED
+from .episode import Flags, Results, new_episode, new_results
+from .length import Cost, EpisodeLength, arrays_of, new_plant
+from .observation import Context, Layout
+from .passive_run import (
+    ADVICE,
+    LOW_PASSED,
+    SPREADS,
+    Forces,
+    PassiveMean,
+    PassiveRun,
+    Trim,
+    TrimAsDesigned,
+    named,
+    normalised,
+    target_mean,
+    trimmed,
+    warn_of_spring,
+)
 from .record import diverged, divergence, ending, trajectory
-from .reset import reset
-from .running_figures import figures_so_far, running_figures
+from .reset import LaneGenerators, reset
 from .settings import RunSettings
-from .start import LaneGenerators
 from .state import TaskRow
-from .task_state import TaskState
+from .step import control_steps, figures_so_far, observe_start, running_figures
+
+COASTED = 100
+"""Control steps without a policy per call."""
+BOUND_ANEW = ("_threads", "_plain_step", "_observe_start")
+"""Attributes that ``Task._bind`` makes from the others."""
 
 
-class Task(TaskState):
+class Task:
     """Lanes with one line, pantograph and controller; each lane is reset and evaluated on its own."""
 
     def __init__(
@@ -65,7 +78,7 @@ class Task(TaskState):
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
         self.cost = self._cost(plant, lanes)
-        self.layout = layout(settings.observation, _entry_options(settings))
+        self.layout = Layout.of(settings)
         self.known_pantograph = settings.known_pantograph or settings.controlled_pantograph
         if settings.normalise is not None and settings.observation == DEVIATIONS:
             raise InputError(
@@ -74,33 +87,33 @@ class Task(TaskState):
             )
         if settings.normalise is not None:
             known = settings.with_pantograph(plant.train.driven[0], self.known_pantograph)
-            speeds = self._speeds_of_passive_runs(settings.normalise)
-            run = PassiveRun(known, speeds, passive_pass)
+            run = PassiveRun(known, self._speeds_of_passive_runs(settings.normalise), passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
-        self.passive = ()
-        if settings.reward.target == "passive":
-            each = [settings.model_copy(update={"controlled": (number,)}) for number in settings.controlled]
-            self.passive = tuple(PassiveRun(own, length.speed_range, passive_pass) for own in each)
+        targets = settings.controlled if settings.reward.target == "passive" else ()
+        self.passive = tuple(  # that each agent's reward counts from, or none
+            PassiveRun(settings.model_copy(update={"controlled": (n,)}), length.speed_range, passive_pass)
+            for n in targets
+        )
         self.speed = plant.speed
         agents = len(plant.train.driven)
         odometers = Odometers(settings.sensors.odometer, lanes * agents, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
-        super().__init__(
-            plant,
-            lanes,
-            episode=new_episode(settings, plant, self.layout, length.control_steps, odometers.arrays()),
-            sensors=sensors,
-            samples=plant.samples(rows, tension=record_droppers),
-            running=running_figures(lanes * agents, len(plant.model.supports), plant.time_step),
-            noise=None if rms is None else Noise(rms, lanes),
-            odometers=odometers,
-            entries=len(self.layout.entries),
-            threads=threads,
-        )
+        self.plant, self.lanes, self.agents = plant, lanes, agents  # agents: rows of results for each lane
+        arrays = odometers.arrays()
+        self.episode: Any = new_episode(settings, plant, self.layout, length.control_steps, arrays)
+        self.sensors: Any = sensors
+        self.samples: Any = plant.samples(rows, tension=record_droppers)
+        self.running: Any = running_figures(lanes * agents, len(plant.model.supports), plant.time_step)
+        self.noise, self.odometers = None if rms is None else Noise(rms, lanes), odometers
+        self._most_threads = threads
+        self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
+        self._any_over = True
+        self.results = self.new_results()
+        copy_whole(*self._arrays)
+        self._bind()
 
     def _speeds_of_passive_runs(self, normalise: tuple[float, float]) -> tuple[float, float]:
-        """Lowest and highest speed (m/s); InputError, which says what they are for, if not valid here."""
         try:
             return self.length.check_speeds(normalise)
         except InputError as error:
@@ -111,19 +124,14 @@ class Task(TaskState):
             ) from error
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
-        """Cost of the longest episode.
-
-        Raises InputError where it exceeds the machine's memory or the maximum computing time.
-        """
         steps, supports = self.length.most_plant_steps, len(plant.model.supports)
         droppers = len(plant.model.droppers) if self.record_droppers else 0
         moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
-        cost = run_cost(lanes, steps, supports, droppers, moving, self.keep_samples)
+        cost = Cost.of(lanes, steps, supports, droppers, moving, self.keep_samples)
         cost.check(f"{steps:,.0f} time steps with {supports} supports")
         return cost
 
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
-        """Sensors of all lanes, and the rms of their noise."""
         settings = self.settings
         form = plant.time_step, self.length.control_steps, lanes, len(plant.train.collectors)
         if settings.observation != ESTIMATED:
@@ -143,7 +151,19 @@ class Task(TaskState):
         """
         lanes = np.atleast_1d(lanes)
         self.begin(lanes)
-        reset(self, lanes, random, self.static_forces, results or self.results)
+        reset(self, lanes, random, results or self.results)
+
+    def targets(self, agent: int, speeds: Array, nominal: Array) -> tuple[Array, Array]:
+        """Contact force (N) that the reward counts from, and the deviation from it that counts as 1 (N).
+
+        Of a controlled collector in lanes, (n,), with these speeds (m/s) and nominal forces (N).
+        """
+        if self.passive:
+            own = self.passive[agent]
+            return own.at(speeds, LOW_PASSED), own.at(speeds, SPREADS + LOW_PASSED)
+        collector = self.episode.controlled[agent]
+        required = [target_mean(self.settings, speed, collector) for speed in speeds.tolist()]
+        return nominal if None in required else np.array(required, dtype=float), nominal
 
     def static_forces(self, speeds: Array) -> Array | None:
         """Static forces (N) at speeds (m/s) where a mean force is required, else None."""
@@ -155,6 +175,125 @@ class Task(TaskState):
         return np.array(
             [[self.trim.static_force(speed, number) for speed in speeds.tolist()] for number in collectors]
         )
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """The named tuples that the kernels take after those of the plant."""
+        return self.sensors, self.samples, self.episode, self.running
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """All named tuples that the kernels take, in their order."""
+        return *self.plant.arrays, *self._arrays
+
+    def _bind(self) -> None:
+        packed = pack(*self.arrays)
+        run = bind(control_steps, packed, *self.results, 0, self.lanes)
+        self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
+        alone = partial(run, *self.results, 0, 1)
+        self._plain_step = alone if self.lanes == 1 else partial(threads.step, *self.results)
+        self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without the bound kernels: a copy has arrays of its own, and binds them again."""
+        return {name: value for name, value in vars(self).items() if name not in BOUND_ANEW}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        copy_whole(*self._arrays)
+        self._bind()
+
+    def new_results(self) -> Results:
+        """Empty arrays for the results of a step."""
+        return new_results(self.lanes * self.agents, len(self.layout.entries))
+
+    def begin(self, lanes: Any) -> None:
+        """Mark that episodes begin in lanes, (n,)."""
+        self._over[lanes] = False
+        self._any_over = bool(self._over.any())
+
+    def observe_start(self, lanes: Any, results: Results) -> None:
+        """Write the results of lanes, (n,), at their start."""
+        idle = self.episode.idle
+        idle[:] = True
+        idle[lanes] = False
+        self._observe_start(*results, int(lanes.min()), int(lanes.max()) + 1)
+        idle[:] = False
+
+    def step(
+        self,
+        action: Array,
+        skip: Flags | None = None,
+        results: Results | None = None,
+    ) -> bool:
+        """Make one control step in all lanes, except those to skip, under actions, (rows, actions).
+
+        Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
+        default the task's own. Skipped lanes do not change. Raises InputError, and changes nothing, for an
+        action that is not finite, or a lane whose episode has ended or not begun.
+        """
+        if self._any_over:
+            self._refuse_over(skip)
+        self.episode.action[...] = action
+        if self.noise is not None:
+            self.noise.prepare(self.sensors, skip)
+        if self.odometers.drawn:
+            rows = None if skip is None else np.repeat(skip, self.agents)
+            self.odometers.prepare(self.episode.odometer, rows)
+        if skip is None and results is None:
+            return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible
+        results = results or self.results
+        if skip is None:
+            return self._evaluate(self._threads.step(*results), results)
+        self.episode.idle[:] = skip
+        answer = self._threads.step(*results)
+        self.episode.idle[:] = False
+        return self._evaluate(answer, results, skip)
+
+    def _refuse_over(self, skip: Flags | None) -> None:
+        over = self._over if skip is None else self._over & ~skip
+        if over.any():
+            raise InputError(
+                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
+            )
+
+    def _evaluate(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
+        """Whether an episode has ended, from a kernel's answer. Raises InputError for an invalid action."""
+        if answer > 0:
+            ended = self._ended(results)
+            self._over |= ended if skip is None else ended & ~skip
+            self._any_over = bool(self._over.any())
+        if answer < 0:
+            action = self.episode.action
+            lane = int(np.flatnonzero(~np.isfinite(action).all(axis=1))[0])
+            raise not_finite(action, lane, several=len(action) > 1)
+        return answer > 0
+
+    def _ended(self, results: Results) -> Flags:
+        """Whether the episodes of lanes have ended, (lanes,): those of a lane's rows end together."""
+        ended: Flags = (results.terminated | results.truncated)[:: self.agents]
+        return ended
+
+    def run_passively(self, watch: Callable[[Self], None] | None = None) -> None:
+        """Run all lanes, just reset, to their ends without actuators.
+
+        watch: called with this object after every ``COASTED`` control steps; it must change nothing.
+        """
+        ended = np.zeros(self.lanes, dtype=np.bool_)
+        while not ended.all():
+            self.coast(np.where(ended, 0, COASTED), self.results)
+            ended = self._ended(self.results)
+            if watch is not None:
+                watch(self)
+
+    def coast(self, steps: Any, results: Results) -> None:
+        """Make ``steps``, (lanes,), control steps without control, none beyond an episode's end.
+
+        Noise is drawn only for the observation after the last step.
+        """
+        self.episode.steps[:] = steps
+        self.step(np.zeros_like(self.episode.action), steps == 0, results)
+        self.episode.steps[:] = 1
 
     def end(self, lane: int) -> int:
         """Number of plant steps of a lane's episode."""
@@ -187,7 +326,7 @@ class Task(TaskState):
         """
         values, without = self.figures_of(np.array([row]))
         if without.any():
-            raise InputError(divergence(self, row // self.agents))
+            raise InputError(self.divergence(row // self.agents))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
     def figures_of(self, rows: Any) -> tuple[dict[str, Array], Flags]:
@@ -211,27 +350,7 @@ class Task(TaskState):
         deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
         return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
 
-    def divergence(self, lane: int) -> str:
-        """Message that a lane's computation diverged, and what to do."""
-        return divergence(self, lane)
-
-    def trajectory(
-        self, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
-    ) -> Trajectory:
-        """Record of a lane's run so far.
-
-        last: the task does not run any more, so the record may take over its arrays. Raises InputError where
-        the computation diverged.
-        """
-        return trajectory(self, lane, policy, seed, last=last)
-
-    def ending(self, lane: int) -> str:
-        """Where and why a lane's run ended early, as a sentence; empty if it did not."""
-        return ending(self, lane)
-
-
-def _entry_options(settings: RunSettings) -> EntryOptions:
-    return EntryOptions(**{name: getattr(settings, name) for name in EntryOptions._fields})
+    divergence, ending, trajectory = divergence, ending, trajectory
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:
@@ -275,7 +394,6 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
 
 
 def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice, collector: int = 0) -> float:
-    """By how much the mean force required over the spans exceeds that at the run's mean speed (N)."""
     required = target_mean(settings, run.speed, collector)
     if required is None or not run.drifts:
         return 0.0

@@ -6,23 +6,38 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base import plotting as marks
 from ..base.arrays import Array
-from ..base.shown import beside
+from ..base.errors import beside
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.table import Table
 from ..catalog import load_pantograph
 from ..fitting.stored import Stored
 from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
-from .features import Sort
+from .features import (
+    ENOUGH,
+    FALSE_ALARMS,
+    Answer,
+    Classifier,
+    Evidence,
+    Sort,
+    cautious_threshold,
+    regions,
+    trained,
+)
 from .healthy import Healthy
-from .kinds import Answer, Classifier, trained
 from .measured_passes import measured_passes
 from .passes import Passes, side_by_side
-from .places import Evidence, regions
-from .threshold import ENOUGH, FALSE_ALARMS, cautious_threshold
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 ENOUGH_PASSES = 10
 """Healthy passes from which on how they differ is well known: with fewer, what a pantograph unlike all of
@@ -155,7 +170,6 @@ def _finding(evidence: Evidence, answer: Answer, score: float) -> Finding:
 
 
 def _whole_line(levels: Array, healthy: Array) -> tuple[float, bool]:
-    """Level of passes over that of healthy ones, and whether that is more than chance."""
     from scipy.stats import t  # slow to import
 
     usual = np.log(healthy)
@@ -166,7 +180,6 @@ def _whole_line(levels: Array, healthy: Array) -> tuple[float, bool]:
 
 
 def _notes(healthy: Healthy, per_span: int) -> list[str]:
-    """Why the answer is less good than it could be."""
     notes = []
     count, spans = len(healthy.scores), healthy.scores.size // per_span
     if count < ENOUGH_PASSES:
@@ -186,3 +199,83 @@ def _notes(healthy: Healthy, per_span: int) -> list[str]:
             "passes over one line: if they are over other lines of its design, much less is found."
         )
     return notes
+
+
+def place(finding: Finding) -> str:
+    """Where a finding is, in words."""
+    if finding.dropper is not None:
+        return f"dropper {finding.dropper}"
+    # A support has the number of the span before it, as in a line condition.
+    return f"support {finding.span - 1}" if finding.offset < 1e-6 else f"interval {finding.interval}"
+
+
+def findings_table(diagnosis: Diagnosis) -> Table:
+    """A row for each finding."""
+
+    def next_kind(finding: Finding) -> str:
+        others = [kind for kind in finding.shares if kind != finding.kind]
+        second = max(others, key=lambda kind: finding.shares[kind])
+        return f"{second} ({100 * finding.shares[second]:.0f})"
+
+    columns = {
+        "what": lambda finding: finding.kind,
+        "%": lambda finding: f"{100 * finding.shares[finding.kind]:.0f}",
+        "or (%)": next_kind,
+        "where": place,
+        "span": lambda finding: diagnosis.evidence.alignment.span_name(finding.span),
+        "from its support (m)": lambda finding: f"{finding.offset:.1f}",
+        "position (m)": lambda finding: f"{finding.position:.0f}",
+        "score/threshold": lambda finding: f"{finding.score:.1f}",
+    }
+    return Table.of("Defects found", diagnosis.findings, columns, text_columns=4)
+
+
+def verdict(diagnosis: Diagnosis) -> list[str]:
+    """What passes say, in sentences."""
+    stretch = f"{diagnosis.begin:.0f} to {diagnosis.end:.0f} m"
+    expected = diagnosis.false_alarms * (diagnosis.end - diagnosis.begin) / 1e3
+    sentences = []
+    if diagnosis.changed:
+        sentences.append(
+            f"The whole line differs from its healthy state, {diagnosis.level:.1f} times as much as healthy "
+            "passes do from one another: lost tension, a pantograph unlike theirs, or, of a measured record, "
+            "noisier sensors or an odometer that is off."
+        )
+    if diagnosis.findings:
+        count = len(diagnosis.findings)
+        sentences.append(f"{count} defect{'s' if count > 1 else ''} from {stretch}.")
+    elif not diagnosis.changed:
+        sentences.append(f"Healthy from {stretch}.")
+    sentences.append(f"A healthy line would show {expected:.2g} false ones along this way.")
+    return sentences
+
+
+def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
+    """Force beside healthy passes, and the score with its threshold, findings, supports and droppers."""
+    from matplotlib.figure import Figure
+
+    evidence = diagnosis.evidence
+    shown = (evidence.position >= diagnosis.begin) & (evidence.position <= diagnosis.end)
+    x = evidence.position[shown]
+    figure = Figure(figsize=(12, 6), layout="constrained")
+    force, score = figure.subplots(2, 1, sharex=True)
+    force.plot(x, evidence.rest[shown], color=BLUE, linewidth=0.9)
+    force.set(ylabel="force beside healthy passes (N)")
+    score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
+    words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"
+    score.axhline(evidence.threshold, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
+    inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
+    score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
+    for axis in (force, score):
+        supports = evidence.alignment.supports_within(diagnosis.begin, diagnosis.end)
+        marks.mark_supports(axis, map(evidence.alignment.support, supports))
+        for finding in diagnosis.findings:
+            axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
+    for finding in diagnosis.findings:
+        words = f"{finding.kind}, span {evidence.alignment.span_name(finding.span)}, {place(finding)}"
+        above = force.get_xaxis_transform()
+        force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
+    score.set(ylabel="score (-)", xlabel=marks.POSITION, xlim=(diagnosis.begin, diagnosis.end))
+    legend_above(score, 3)
+    figure.suptitle(title)
+    return figure

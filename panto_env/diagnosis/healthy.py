@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 
 from ..base.arrays import Array
+from .features import Evidence
 from .passes import Passes
-from .places import Evidence
 
 WINDOW = 8.0
 """Length (m) over which the energy of the whitened remainder is taken: about a dropper interval."""
@@ -148,7 +148,6 @@ def _predictor(unit: Array, memory: int) -> Array:
 
 
 def _whiten(unit: Array, predictor: Array) -> Array:
-    """What the past does not predict."""
     from scipy.ndimage import convolve1d  # slow to import
 
     kernel = np.concatenate([np.zeros(len(predictor)), [1.0], -predictor])
@@ -163,5 +162,4 @@ def _windowed(values: Array, window: int) -> Array:
 
 
 def _level(rest: Array, window: int) -> float:
-    """Size of a remainder where the pass is quiet."""
     return float(np.sqrt(np.quantile(_windowed(rest, window), QUIET)))

@@ -14,9 +14,8 @@ from dataclasses import replace
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.arrays import Array
+from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
 from ..fitting.misfit import OWN, Part
 from ..fitting.problem import Problem, problem
 from ..fitting.stored import Stored, turned
@@ -24,7 +23,7 @@ from ..fitting.values import FREE
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
-from ..records.record import Piece, Record
+from ..records.record import Record
 from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
 
 HEALTHY = 24
@@ -91,7 +90,8 @@ def _one_piece_each(
     found, notes = [], []
     for record in records:
         if len(record.pieces) > 1:
-            ways = [_within(piece, stretch) for piece in record.pieces]
+            begin, end = stretch
+            ways = [min(piece.position[-1], end) - max(piece.position[0], begin) for piece in record.pieces]
             longest = record.pieces[int(np.argmax(ways))]
             notes.append(
                 f"{record.name} has {len(ways)} pieces, and a diagnosis takes one of each record: that from "
@@ -100,11 +100,6 @@ def _one_piece_each(
             record = replace(record, pieces=(longest,))
         found.append(record)
     return found, notes
-
-
-def _within(piece: Piece, stretch: tuple[float, float]) -> float:
-    """How much of a stretch a piece covers (m)."""
-    return float(min(piece.position[-1], stretch[1]) - max(piece.position[0], stretch[0]))
 
 
 def _places(

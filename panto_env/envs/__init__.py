@@ -6,7 +6,7 @@ import gymnasium
 
 from ..base.errors import InputError
 from .driven import DrivenByPolicies
-from .ids import BARE, IDS
+from .settings import BARE, IDS
 from .single import PantographEnv
 from .vector import PantographVectorEnv
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..analysis.simulation import let_act
 from ..base.errors import InputError
-from ..control.action import checked
+from ..control.arguments import checked
 from ..control.observation import BOUND
 from ..policies import errors_name, find_fitting_policy
-from .infos import REWARD
+from .lanes import REWARD
 from .single import PantographEnv
 
 Observation = NDArray[np.float32]
@@ -92,6 +92,5 @@ class DrivenByPolicies(
         return self._seen(), reward, terminated, truncated, info
 
     def _seen(self) -> Observation:
-        """Observations of the agent's pantographs, one after the other."""
         seen: Observation = self._train.task.results.observation[self._rows].reshape(-1)
         return seen

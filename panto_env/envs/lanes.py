@@ -1,4 +1,4 @@
-"""Lanes of a vector environment: each runs the usual task, or another one for an episode.
+"""Lanes of a vector environment: each runs the usual task, or another one for an episode; and infos.
 
 A lane here is what one action controls: a pantograph. Where several pantographs of a train are controlled,
 they are as many lanes, one behind the other, that a task computes as one, and whose episodes begin and end
@@ -7,19 +7,39 @@ together.
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Index
-from ..base.errors import AccuracyWarning
-from ..base.units import to_kmh
+from ..backend import LaneThreads
+from ..base.arrays import Array, Index, to_kmh
+from ..base.errors import AccuracyWarning, InputError
+from ..base.machine import cores
 from ..control import Task
+from ..control.arguments import not_finite
 from ..control.episode import Flags, Results
+from ..control.lines import draws_line
+from ..control.state import TERMS, Result
 from .episodes import Episodes
+from .settings import VectorSettings
+
+# Rows of results as plain integers: members of an enum would take longer.
+REWARD, COST = int(Result.REWARD), int(Result.COST)
+CONTACT_FORCE, POSITION = int(Result.CONTACT_FORCE), int(Result.POSITION)
+INFOS = tuple(
+    zip(
+        ("contact_force", "head", "wire", "frame_force", "head_force", "position", "cost"),
+        range(CONTACT_FORCE, COST + 1),
+        strict=True,
+    )
+)
+"""Keys of infos, and the rows of results that they have."""
+REWARD_TERMS = tuple(zip(TERMS, range(Result.TERM, CONTACT_FORCE), strict=True))
 
 OfLane = Callable[[int], np.random.Generator]
 """Function from a lane's number to its generator."""
@@ -82,7 +102,8 @@ class VectorLanes:
             if self._others:
                 idle = ~its if waiting is None else ~its | waiting
             own = results if task is self.usual else task.results
-            ended = task.step(action, self._trains(idle), results=own) or ended
+            skip = None if idle is None else idle[:: self.agents]
+            ended = task.step(action, skip, results=own) or ended
             self._results = results
             self._take(own, its)
         if waiting is not None:
@@ -107,12 +128,7 @@ class VectorLanes:
         self._take(own, lanes)
         self._speed_kmh[lanes] = np.repeat(to_kmh(task.speed[trains]), self.agents)
 
-    def _trains(self, lanes: Flags | None) -> Flags | None:
-        """Which trains have these lanes."""
-        return None if lanes is None else lanes[:: self.agents]
-
     def _next_line(self, lanes: Flags, random: Callable[[], np.random.Generator], anew: bool) -> None:
-        """Draw the line on which lanes, and those after them, begin, if the present one has had enough."""
         if anew or self._left <= 0:
             going_on = self._on_usual & ~lanes
             if going_on.any():
@@ -121,7 +137,6 @@ class VectorLanes:
         self._left -= int(lanes.sum())
 
     def _take(self, results: Results, lanes: Flags) -> None:
-        """Copy the results of some lanes."""
         if results is not self._results:
             own = np.flatnonzero(lanes)
             for taken, given in zip(self._results, results, strict=True):
@@ -156,7 +171,6 @@ class VectorLanes:
 
     @property
     def _on_usual(self) -> Flags:
-        """Which lanes run the usual task."""
         usual = np.ones(self.count, dtype=np.bool_)
         for _, its in self._others:
             usual &= ~its
@@ -173,3 +187,159 @@ def ended_figures(task: Task, lanes: Index) -> dict[str, Array]:
     for lane in lanes[without].tolist():
         warnings.warn(task.divergence(lane // task.agents), AccuracyWarning, stacklevel=2)
     return {name: np.where(without, np.nan, value) for name, value in figures.items()}
+
+
+class LaneGroups:
+    """Lanes in groups, as ``VectorLanes``; the groups are divided among one pool of threads."""
+
+    def __init__(self, groups: Sequence[VectorLanes]) -> None:
+        """groups: in the order of their lanes."""
+        self._groups = groups
+        ends = np.cumsum([0, *(group.count for group in groups)]).tolist()
+        self._lanes = [slice(first, end) for first, end in pairwise(ends)]
+        self._threads = LaneThreads(self._step_groups, len(groups))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without the threads."""
+        return {name: value for name, value in vars(self).items() if name != "_threads"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._threads = LaneThreads(self._step_groups, len(self._groups))
+
+    def episodes_with(self, options: Mapping[str, Any]) -> list[Episodes]:
+        """Episodes with options, of each group, for ``begin``; InputError where these are not valid."""
+        return [group.episodes_with(options) for group in self._groups]
+
+    def begin(self, lanes: Flags, episodes: Sequence[Episodes], random: OfLane, anew: bool = False) -> None:
+        """As ``VectorLanes.begin``; episodes: of each group."""
+        for group, its, own in zip(self._groups, self._lanes, episodes, strict=True):
+            if lanes[its].any():
+                group.begin(lanes[its], own, partial(_of_group, random, its.start), anew)
+
+    def step(self, action: Array, waiting: Flags | None, random: OfLane) -> bool:
+        """As ``VectorLanes.step``."""
+        wrong = ~np.isfinite(action).all(axis=1)
+        if wrong.any():  # before any group has moved
+            raise not_finite(action, int(wrong.argmax()), several=True)
+        return self._threads.step(action, waiting, random) > 0
+
+    def _step_groups(
+        self, action: Array, waiting: Flags | None, random: OfLane, first: int, last: int
+    ) -> int:
+        """Step the groups from first to before last; whether an episode has ended."""
+        ended = False
+        for group, its in zip(self._groups[first:last], self._lanes[first:last], strict=True):
+            idle = None if waiting is None or not waiting[its].any() else waiting[its]
+            ended = group.step(action[its], idle, partial(_of_group, random, its.start)) or ended
+        return int(ended)
+
+    def answer(self) -> Answer:
+        """Results of all lanes."""
+        answers = [group.answer() for group in self._groups]
+        results = zip(*(each.results for each in answers), strict=True)
+        return Answer(
+            Results(*(np.concatenate(parts) for parts in results)),
+            np.concatenate([each.speed_kmh for each in answers]),
+            np.concatenate([each.lanes for each in answers]),
+        )
+
+    def task_of(self, lane: int) -> tuple[Task, int]:
+        """The task that a lane runs, and its number there."""
+        its, group = next(
+            (its, group) for its, group in zip(self._lanes, self._groups, strict=True) if lane < its.stop
+        )
+        return group.task_of(lane - its.start)
+
+    def figures(self, lanes: Flags) -> dict[str, Array]:
+        """As ``VectorLanes.figures``."""
+        values: dict[str, Array] = {}
+        for group, its in zip(self._groups, self._lanes, strict=True):
+            for name, value in group.figures(lanes[its]).items():
+                values.setdefault(name, np.zeros(len(lanes)))[its] = value
+        return values
+
+
+def _of_group(random: OfLane, first: int, lane: int) -> np.random.Generator:
+    """The generator of a lane of the group whose lanes begin with ``first``."""
+    return random(first + lane)
+
+
+def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | LaneGroups:
+    """The lanes of a vector environment, in a group for each line. Raises InputError for bad settings."""
+    count = settings.groups
+    if settings.lines is not None and not draws_line(settings):
+        raise InputError(
+            "lines are drawn from a list, a family or a section: give one as catenary, or no lines."
+        )
+    if count == 1:
+        usual = Episodes(settings, lanes=settings.trains, keep_samples=keep_samples)
+        return VectorLanes(usual, settings.episodes_per_line)
+    sizes = [len(trains) for trains in np.array_split(np.arange(settings.trains), count)]
+    threads = max(1, cores() // count)
+    usual_of = {
+        size: Episodes(settings, lanes=size, keep_samples=keep_samples, threads=threads)
+        for size in set(sizes)
+    }
+    return LaneGroups([VectorLanes(usual_of[size], settings.episodes_per_line) for size in sizes])
+
+
+def final_figures(task: Task, row: int = 0) -> dict[str, float]:
+    """Figures of the ended episode of a task's only lane, for infos, without those that it does not have.
+
+    row: of one of the controlled pantographs. Neither nan nor infinity stands for what is missing: strict
+    JSON refuses both, and nan makes two infos unequal.
+    """
+    figures = {name: float(value[0]) for name, value in ended_figures(task, np.array([row])).items()}
+    return {name: value for name, value in figures.items() if math.isfinite(value)}
+
+
+def own_info(values: Array) -> dict[str, Any]:
+    """Info of one of several controlled pantographs; values: its rows of ``Result``."""
+    own = {"reward": REWARD, "cost": COST, "contact_force": CONTACT_FORCE, "position": POSITION}
+    return {name: float(values[row]) for name, row in own.items()}
+
+
+def lane_infos(answer: Answer) -> dict[str, Any]:
+    """Infos of lanes in the form of Gymnasium's vector environments.
+
+    Each key holds an array with a value per lane, or a dictionary of such arrays; "_key" marks the lanes
+    that have a value.
+    """
+    (_, values, _), speed_kmh, lanes = answer
+    rows = values.T
+    infos: dict[str, Any] = {}
+    for name, row in INFOS:
+        infos[name], infos[f"_{name}"] = rows[row], lanes
+    infos["speed_kmh"], infos["_speed_kmh"] = speed_kmh, lanes
+    infos["reward_terms"], infos["_reward_terms"] = {}, lanes
+    for name, row in REWARD_TERMS:
+        infos["reward_terms"][name], infos["reward_terms"][f"_{name}"] = rows[row], lanes
+    return infos
+
+
+def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
+    """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended.
+
+    A figure that a lane does not have is 0 there, and not marked under "_name"; one that none has is left
+    out.
+    """
+    values: dict[str, Any] = {}
+    for name, value in figures.items():
+        marked = lanes & np.isfinite(value)
+        if marked.any():
+            values[name], values[f"_{name}"] = np.where(marked, value, 0.0), marked
+    return {"figures": values, "_figures": lanes.copy()}
+
+
+def first_info(task: Task) -> dict[str, Any]:
+    """Info of the only lane of a task at the start of its episode, of its first controlled pantograph."""
+
+    def of_lane(infos: dict[str, Any]) -> dict[str, Any]:
+        plain = {key: value for key, value in infos.items() if not key.startswith("_")}
+        return {k: of_lane(each) if isinstance(each, dict) else each.item() for k, each in plain.items()}
+
+    observation, values, flags = task.results
+    first = Results(observation[:1], values[:1], flags[:1])
+    answer = Answer(first, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
+    return of_lane(lane_infos(answer))

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
-from ..control.action import checked
+from ..control.arguments import checked
 from ..control.observation import BOUND
-from .infos import REWARD
-from .reset_arguments import checked_options
+from .episodes import checked_options
+from .lanes import REWARD
 from .settings import Whole
 from .single import PantographEnv
 

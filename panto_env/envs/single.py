@@ -6,23 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
+from ..base.arrays import to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from ..control import Context, Task
-from ..control.action import checked
-from ..control.arguments import takes
+from ..control.arguments import checked, takes
 from ..control.observation import BOUND
 from ..control.settings import read_settings
 from ..metrics.trajectory import Trajectory
-from .description import described
-from .episodes import Episodes, with_longest_episode
-from .infos import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
-from .one_thread import CopiedAlone, InUse, one_at_a_time, refuse
-from .reset_arguments import checked_options, checked_seed
-from .settings import OF_VECTORS, EnvironmentSettings, Whole, render_metadata
+from .episodes import (
+    CopiedAlone,
+    Episodes,
+    InUse,
+    checked_options,
+    checked_seed,
+    one_at_a_time,
+    refuse,
+)
+from .lanes import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
+from .settings import OF_VECTORS, EnvironmentSettings, described, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
@@ -31,7 +34,7 @@ SEEN = ("_shape", "_observation", "_values", "_flags")
 """Attributes that ``PantographEnv._watch`` sets from the task."""
 
 
-class PantographEnv(Whole, CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A pantograph under a catenary, with an actuator that reduces variations of the contact force.
 
     ## Description
@@ -139,21 +142,12 @@ class PantographEnv(Whole, CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArr
         self._in_use = InUse()
         self._viewer: Viewer | None = None
         self._reward_so_far = 0.0  # shown in pictures
-        self._spec: EnvSpec | None = None
         self._usual = Episodes(settings)
         self._watch(self._usual.task)
+        self._longest = None if self._usual.draws_line else self.task.length.most_control_steps
         self._running = False
         self.observation_space = gymnasium.spaces.Box(-BOUND, BOUND, self._observation.shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self._shape, np.float32)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The spec from `gymnasium.make`, with the maximum steps of an episode without options."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._usual.most_control_steps)
 
     @property
     @one_at_a_time

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 import torch
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 
-from ..base.errors import InputError
-from ..base.shown import shown
-from ..base.units import to_kmh
+from ..base.arrays import to_kmh
+from ..base.errors import InputError, shown
 from ..control import Context
 from ..control.arguments import takes
 from ..control.lines import draws_line
-from ..control.observation import BOUND
 from ..control.on_device import TensorLanes
 from ..control.settings import read_settings
-from .episodes import with_longest_episode
-from .infos import REWARD, lane_figures, lane_infos
-from .lanes import Answer
-from .one_thread import CopiedAlone, InUse, one_at_a_time
-from .reset_arguments import check_whole_trains, checked_options, checked_seed
-from .settings import TensorSettings, render_metadata
+from .episodes import (
+    check_whole_trains,
+    checked_options,
+    checked_seed,
+    one_at_a_time,
+)
+from .lanes import REWARD, Answer, lane_figures, lane_infos
+from .settings import TensorSettings
 from .vector import SharedByLanes
 
 
@@ -47,7 +44,7 @@ class CopiedLanes(TensorLanes):
                 columns.blocks[block].copy_(numbers)
 
 
-class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, torch.Tensor, torch.Tensor]):
+class PantographTensorEnv(SharedByLanes):
     """Many pantographs stepped together on a GPU; actions, observations, rewards and flags are tensors there.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=65536, device="cuda")`; other arguments as for
@@ -74,41 +71,17 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
                 "On a device all lanes share one line, and a list, a family or a section gives several; "
                 "name one line as catenary, or leave out device."
             )
-        self.autoreset_mode = settings.autoreset_mode
-        self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
-        self.num_envs, self.render_mode = settings.num_envs, None
-        self._limit, self._with_figures = settings.max_episode_steps, settings.figures
         try:
             self._lanes = CopiedLanes(settings, settings.trains, settings.used_starts, self.device)
         except torch.OutOfMemoryError as error:
             raise InputError(
-                f"{self.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."
+                f"{settings.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."
             ) from error
-        self.task = task = self._lanes.task
-        """The task of all lanes, on the processor; its own lanes are the starts."""
-        self._agents = self._lanes.agents
-        self.single_observation_space = gymnasium.spaces.Box(
-            -BOUND, BOUND, task.results.observation[0].shape, np.float32
-        )
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(task.actuator.places),), np.float32)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._shape = (self.num_envs, *self.single_action_space.shape)
+        self._set_up(settings, self._lanes.task)  # on the processor, whose own lanes are the starts
+        self._with_figures, self._agents = settings.figures, self._lanes.agents
         self._random = torch.Generator(self.device)
-        self._in_use = InUse()
-        self._spec: EnvSpec | None = None
-        self._running = False
         self._ended = self._none
         self._steps = torch.zeros(self.num_envs, dtype=torch.int64, device=self.device)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The spec from `gymnasium.make_vec`, with the maximum steps of an episode."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._limit or self.task.length.most_control_steps)
 
     @one_at_a_time
     def reset(
@@ -190,7 +163,6 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
 
     @property
     def _none(self) -> torch.Tensor:
-        """No lane: (num_envs,) of False."""
         return torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
 
     def _draw(self, seed: int | None) -> None:
@@ -217,7 +189,6 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
         return answer if bool(lanes.all()) else self._of(answer, lanes)
 
     def _of(self, answer: Any, lanes: torch.Tensor) -> Any:
-        """An answer with the results of these lanes only."""
         values = answer.results.values * lanes[:, None]
         return Answer(answer.results._replace(values=values), answer.speed_kmh * lanes, lanes)
 
@@ -242,7 +213,6 @@ class PantographTensorEnv(SharedByLanes, CopiedAlone, VectorEnv[torch.Tensor, to
         }
 
     def _check(self, actions: Any) -> None:
-        """Raise InputError unless these are actions."""
         if not (isinstance(actions, torch.Tensor) and actions.device == self.device):
             raise InputError(
                 f"Actions must be a tensor of shape {self._shape} on {self.device}, not {shown(actions)}."

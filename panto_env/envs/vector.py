@@ -1,13 +1,13 @@
-"""The native vector environment: many lanes in one kernel call."""
+"""The vector environment."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -15,28 +15,61 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..control import Context
-from ..control.action import checked
-from ..control.arguments import takes
+from ..control import Context, Task
+from ..control.arguments import checked, takes
 from ..control.episode import Flags
 from ..control.lines import draws_line
 from ..control.observation import BOUND
 from ..control.settings import read_settings
-from .episodes import with_longest_episode
-from .groups import lanes_of
-from .infos import REWARD, lane_figures, lane_infos
-from .lanes import Answer
-from .one_thread import CopiedAlone, InUse, one_at_a_time
-from .reset_arguments import check_whole_trains, checked_options, checked_seeds
-from .settings import VectorSettings, Whole, render_metadata
-from .stable_baselines import NamedToStableBaselines
+from .episodes import (
+    CopiedAlone,
+    InUse,
+    check_whole_trains,
+    checked_options,
+    checked_seeds,
+    one_at_a_time,
+)
+from .lanes import REWARD, Answer, lane_figures, lane_infos, lanes_of
+from .settings import VectorSettings, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
 
 
-class SharedByLanes(Whole):
+class NamedToStableBaselines(type):
+    """Class of the vector environment.
+
+    Stable-Baselines3 has its own kind of vector environment and refuses all others with a message about
+    OpenAI Gym. Before that it only prints the environment's class.
+    """
+
+    def __repr__(cls) -> str:
+        if sys._getframe(1).f_globals.get("__name__", "").startswith("stable_baselines3."):
+            raise InputError(
+                "Stable-Baselines3 takes a vector environment of Gymnasium inside a VecEnv: "
+                "from panto_agents.lanes import PantographVecEnv, and give it "
+                "PantographVecEnv(gymnasium.make_vec(...))."
+            )
+        return super().__repr__()
+
+
+class SharedByLanes(CopiedAlone, VectorEnv[Any, Any, Any]):
     """Base of a vector environment whose lanes have no environments of their own."""
+
+    def _set_up(self: Any, settings: VectorSettings, task: Task) -> None:
+        """Attributes of any such environment, with the task of all lanes on one line, or on an example."""
+        self.autoreset_mode, self.num_envs = settings.autoreset_mode, settings.num_envs
+        self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
+        self.render_mode, self.task = settings.render_mode, task
+        self._limit = settings.max_episode_steps
+        self._longest = self._limit or (None if draws_line(settings) else task.length.most_control_steps)
+        shape, actions = task.results.observation[0].shape, len(task.actuator.places)
+        self.single_observation_space = gymnasium.spaces.Box(-BOUND, BOUND, shape, np.float32)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (actions,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._shape = (self.num_envs, actions)
+        self._in_use, self._running = InUse(), False
 
     def call(self: Any, name: str, *arguments: Any, **named: Any) -> tuple[Any, ...]:
         """Each lane's context, or what all share, once per lane. Raises InputError for reset and step."""
@@ -59,12 +92,7 @@ class SharedByLanes(Whole):
         )
 
 
-class PantographVectorEnv(
-    SharedByLanes,
-    CopiedAlone,
-    VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]],
-    metaclass=NamedToStableBaselines,
-):
+class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
     """Many pantographs, each on a line of its own, stepped together on all cores.
 
     `gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=N)`; arguments as for `PantographEnv`, one
@@ -85,7 +113,7 @@ class PantographVectorEnv(
     "figures", each with its own mask, since a run may lack one; with "SameStep" these and all other final
     values are in "final_info", next to "final_obs".
 
-    For Stable-Baselines3, wrap it in `panto_agents.vec_env.PantographVecEnv`.
+    For Stable-Baselines3, wrap it in `panto_agents.lanes.PantographVecEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as Gymnasium declares it
@@ -94,46 +122,18 @@ class PantographVectorEnv(
     def __init__(self, given: dict[str, Any]) -> None:
         """See the class. Raises InputError for a value that is not valid, TypeError for an unknown name."""
         settings = read_settings(given, VectorSettings)
-        self.autoreset_mode = settings.autoreset_mode
-        self.metadata = render_metadata(self.metadata, settings) | {"autoreset_mode": self.autoreset_mode}
-        self.num_envs = settings.num_envs
-        self.render_mode = settings.render_mode
-        self._lanes = lanes_of(settings, keep_samples=self.render_mode is not None)
+        self._lanes = lanes_of(settings, keep_samples=settings.render_mode is not None)
         self._usual: Any = self._lanes.episodes_with({})
-        self.task, _ = self._lanes.task_of(0)
-        """The task of all lanes on one line; where lines are drawn, that of an example."""
-        self._longest = None if draws_line(settings) else self.task.length.most_control_steps
+        self._set_up(settings, self._lanes.task_of(0)[0])
         drawn = range(self.num_envs) if settings.render_lanes is None else settings.render_lanes
         self._drawn, self._render_size = tuple(drawn), settings.render_size
-        self._in_use = InUse()
         self._viewer: Viewer | None = None
         self._reward_so_far = np.zeros(self.num_envs)  # shown in pictures
-        self.single_observation_space = gymnasium.spaces.Box(
-            -BOUND, BOUND, self.task.results.observation[0].shape, np.float32
-        )
-        self.single_action_space = gymnasium.spaces.Box(
-            -1.0, 1.0, (len(self.task.actuator.places),), np.float32
-        )
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._shape = (self.num_envs, *self.single_action_space.shape)
-        self._spec: EnvSpec | None = None
-        self._limit = settings.max_episode_steps
         self._random: dict[int, np.random.Generator] = {}  # by lane, made when first needed
         self._seeds: dict[int, int | None] = {}  # seed of each lane's generator; None: any
-        self._running = False
         self._steps = np.zeros(self.num_envs, dtype=np.int64)  # of each lane's episode so far
         self._ended: Flags = np.zeros(self.num_envs, dtype=np.bool_)
         self._any_ended = False
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The spec from `gymnasium.make_vec`, with the maximum steps of an episode."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = with_longest_episode(spec, self._limit or self._longest)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -143,11 +143,7 @@ class PantographVectorEnv(
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """Seed of each lane's generator."""
-        seeds = []
-        for lane in range(self.num_envs):
-            self._generator(lane)
-            seeds.append(self._seeds[lane])
-        return tuple(seeds)  # type: ignore[arg-type]
+        return tuple(self._seeds[lane] for lane, _ in enumerate(self.np_random))  # type: ignore[misc]
 
     @one_at_a_time
     def reset(
@@ -163,7 +159,7 @@ class PantographVectorEnv(
         """
         seeds, options = checked_seeds(seed, self.num_envs), checked_options(options)
         mask = self._mask(options.pop("reset_mask", None))
-        lanes = self._all if mask is None else mask
+        lanes = np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask
         episodes = self._lanes.episodes_with(options)
         self._seed(lanes, seeds)
         self._begin(lanes, episodes, anew=mask is None or seed is not None)
@@ -259,10 +255,6 @@ class PantographVectorEnv(
         self._begin(ended, self._usual)
         begun = self._lanes.answer()
         return begun.results.observation, lane_infos(begun) | final
-
-    @property
-    def _all(self) -> Flags:
-        return np.ones(self.num_envs, dtype=np.bool_)
 
     def _begin(self, lanes: Flags, episodes: Any, anew: bool = False) -> None:
         self._lanes.begin(lanes, episodes, self._generator, anew)

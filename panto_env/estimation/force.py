@@ -13,8 +13,7 @@ from pydantic import Field
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.settings import Settings, parse_kind
+from ..base.settings import Between, Settings, parse_kind
 
 START_DEVIATION = 100.0
 """How far the contact force may be from the lift when a record begins, rms (N)."""
@@ -105,7 +104,6 @@ FORCE_MODELS: dict[str, type[ForceModel]] = {
     "shaped": Shaped,
     "periodic": Periodic,
 }
-"""By name."""
 
 
 def as_force_model(value: Any) -> ForceModel:

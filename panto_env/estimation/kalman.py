@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array, Index, one_thread
 from ..base.errors import InputError
-from ..base.linear_algebra import one_thread
 from .model import Model
 
 SETTLED = 1e-10
@@ -128,15 +127,15 @@ def run_filter(model: Model, gains: Gains, measured: Array, inputs: Array, start
     return Filtered(predicted, state, innovations, gains)
 
 
-def force_variance(model: Model, gains: Gains) -> float:
-    """Variance (N^2) of the filtered contact force by the model, after the last of the gains.
+def force_variance(model: Model, gains: Gains, lag: int = 0) -> float:
+    """Variance (N^2) of the contact force by the model, from ``lag`` later samples too, with the last gains.
 
     It knows of noise, not of wrong parameters.
     """
-    ahead = gains.force[-1]
-    seen = model.observed @ ahead
-    known = seen @ np.linalg.solve(gains.innovation[-1], seen)
-    return float(model.force @ ahead - known)
+    variance = float(model.force @ gains.force[-1])
+    for seen in _seen_later(model, gains, lag):
+        variance -= float(seen @ np.linalg.solve(gains.innovation[-1], seen))
+    return variance
 
 
 def _gains(model: Model, covariance: Array) -> Gains:
@@ -166,3 +165,44 @@ def corrected(covariance: Array, gain: Array, observed: Array, measurement_noise
     """
     kept = np.eye(len(covariance)) - gain @ observed
     return np.asarray(kept @ covariance @ kept.T + gain @ measurement_noise @ gain.T)
+
+
+def smooth_force(model: Model, filtered: Filtered, lag: int) -> Array:
+    """Contact force (N), (n,), at each sample from that and ``lag`` later ones, or as many as there are.
+
+    Bryson and Frazier's form of the smoother (recalled): the prediction is corrected by later innovations,
+    each through what is left of the error when it is measured. Once gains have settled, that is the same sum
+    at every sample.
+    """
+    n, settled = len(filtered.innovations), len(filtered.gains.gain) - 1
+    force = filtered.predicted @ model.force
+    for begin in range(0, min(n, settled), BLOCK):
+        block = np.arange(begin, min(begin + BLOCK, n, settled))
+        adjoint = np.zeros((len(block), len(model.force)))
+        for later in range(lag, -1, -1):
+            samples = block + later
+            innovation = np.where(
+                (samples < n)[:, None], filtered.innovations[np.minimum(samples, n - 1)], 0.0
+            )
+            gains = filtered.gains.of(samples)
+            back = adjoint @ model.transition
+            news = np.linalg.solve(gains.innovation, innovation[:, :, None])[:, :, 0]
+            adjoint = back + (news - np.einsum("ki,kij->kj", back, gains.gain)) @ model.observed
+        force[block] += np.einsum("ki,ki->k", filtered.gains.of(block).force, adjoint)
+    if n > settled:
+        news = np.vstack([filtered.innovations[settled:], np.zeros((lag, len(model.observed)))])
+        innovation, seen = filtered.gains.innovation[-1], _seen_later(model, filtered.gains, lag)
+        each_weight = np.array([np.linalg.solve(innovation, each) for each in seen])  # of an innovation (N)
+        for own, weights in zip(news.T, each_weight.T, strict=True):
+            force[settled:] += np.correlate(own, weights, "valid")
+    return np.asarray(force)
+
+
+def _seen_later(model: Model, gains: Gains, lag: int) -> Array:
+    """What each of the next samples sees of a force's error, (lag + 1, m), with the last of the gains."""
+    left = model.transition @ (np.eye(len(model.force)) - gains.gain[-1] @ model.observed)
+    ahead, seen = gains.force[-1], []
+    for _ in range(lag + 1):
+        seen.append(model.observed @ ahead)
+        ahead = left @ ahead
+    return np.array(seen)

@@ -1,16 +1,63 @@
-"""The linear model behind an estimator: a pantograph's chain of masses, and an unknown contact force."""
+"""What a user may choose of an estimator, and the model that it filters with."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import BeforeValidator, Field
 
 from ..base.arrays import Array
-from ..plant.pantograph.build import exponential, matrices
-from ..plant.pantograph.schema import PantographData
-from .force import ForceProcess
-from .settings import EstimatorSettings
+from ..base.settings import Between, Settings
+from ..plant.pantograph.schema import PantographData, exponential, matrices
+from .force import ForceModel, ForceProcess, RandomWalk, as_force_model
+from .motion import DISPLACEMENT_NOISE, VELOCITY_NOISE
+
+
+class EstimatorSettings(Settings):
+    """A Kalman filter of paper 2's kind: what it observes, believes of the force, and trusts of its model."""
+
+    observation: Literal["displacements and velocities", "displacements"] = Field(
+        "displacements and velocities",
+        description="of collector head and articulated frame: displacements and velocities, or displacements",
+    )
+    force_model: Annotated[ForceModel, BeforeValidator(as_force_model)] = Field(
+        default_factory=RandomWalk,
+        description="what is believed of the contact force: random-walk, shaped, periodic, with values where "
+        "needed, as 'shaped:wavelength=5'",
+    )
+    displacement_noise: Annotated[float, Between(1e-8, 0.1, "m")] = Field(
+        DISPLACEMENT_NOISE, description="white noise of a sample of displacement, rms (m)"
+    )
+    velocity_noise: Annotated[float, Between(1e-8, 10, "m/s")] = Field(
+        VELOCITY_NOISE, description="white noise of a sample of velocity, rms (m/s)"
+    )
+    frame_intensity: Annotated[float, Between(0, 100, "N s^0.5")] = Field(
+        0.1,
+        description="white force on the frame that the model leaves out, friction or wrong parameters: its "
+        "impulse over a second, rms (N s^0.5)",
+    )
+    suspension_drift: Annotated[float, Between(0, 100, "N/s^0.5")] = Field(
+        0.5,
+        description="change over a second, rms, of the error of the head suspension's force, from a wrong "
+        "spring or zero; 0: no such error, which is paper 2's filter (N/s^0.5)",
+    )
+    gain: Literal["time-varying", "steady"] = Field(
+        "time-varying",
+        description="time-varying, which learns from the start of a record, or steady, the limit of it",
+    )
+    lag: Annotated[float, Between(0, 5, "s")] = Field(
+        0.0, description="how long the estimate may wait for later samples; 0: a filter (s)"
+    )
+
+
+PAPER2: dict[str, Any] = {"suspension_drift": 0.0}
+"""Settings with which a two-mass pantograph has exactly the state of paper 2's Eq. 7."""
+ESTIMATORS: dict[str, EstimatorSettings] = {
+    "usual": EstimatorSettings(),
+    "displacements": EstimatorSettings(observation="displacements"),
+}
+
 
 START_HEIGHT, START_VELOCITY, START_SUSPENSION = 1.0, 1.0, 10.0
 """How far a state may be from its mean when a record begins, rms: m, m/s, N of the suspension's error."""
@@ -76,9 +123,11 @@ def build_model(
     known = np.zeros((total, 2))
     known[:size] = forces[:, 1:]
     transition, inputs, process_noise = _discretise(drift, known, noise, time_step)
-    rows = _observed(size, settings)
-    rms = [settings.displacement_noise] * 2 + [settings.velocity_noise] * 2
     masses = size // 2
+    rows = [0, masses - 1, masses, size - 1]  # of the first and the last mass
+    if settings.observation == "displacements":
+        rows = rows[:2]
+    rms = [settings.displacement_noise] * 2 + [settings.velocity_noise] * 2
     start = block_diag(
         START_HEIGHT**2 * np.eye(masses),
         START_VELOCITY**2 * np.eye(masses),
@@ -95,14 +144,6 @@ def build_model(
         force=np.concatenate([np.zeros(size), force.output, np.zeros(suspension)]),
         start_covariance=start,
     )
-
-
-def _observed(size: int, settings: EstimatorSettings) -> list[int]:
-    """Places in the state of what is measured: of the first and the last mass."""
-    masses = size // 2
-    if settings.observation == "displacements":
-        return [0, masses - 1]
-    return [0, masses - 1, masses, size - 1]
 
 
 def _discretise(drift: Array, inputs: Array, noise: Array, step: float) -> tuple[Array, Array, Array]:

@@ -14,15 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Array
-from ..base.errors import InputError
-from ..base.names import suggest
+from ..base.errors import InputError, suggest
 from ..plant.pantograph.schema import PantographData
 from .estimate import filter_motion, first_settled, model_of
 from .kalman import corrected, correction, steady_gains
-from .model import Model
-from .motion import Motion
-from .plausibility import check_motion
-from .settings import PAPER2, EstimatorSettings
+from .model import PAPER2, EstimatorSettings, Model
+from .motion import Motion, check_motion
 
 HEAD_MASS = "masses.1"
 LIFT = "lift"

@@ -12,14 +12,12 @@ import numpy as np
 
 from ..backend import NOT_NEGATIVE, aligned_zeros, implements, inlined
 from ..base.arrays import Array, Index, Lanes
-from ..plant.pantograph.build import matrices
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import PantographData, matrices
 from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
-from ..plant.sensors.noise import AHEAD
+from ..plant.sensors.base import AHEAD
 from ..plant.state import ROW, Row
 from .kalman import steady_gain
-from .model import build_model
-from .settings import EstimatorSettings
+from .model import EstimatorSettings, build_model
 
 LONGEST_INTERVAL = 1.25e-3
 """Between two samples of the filter (s)."""
@@ -74,7 +72,8 @@ def estimating(
     pantograph: that the estimator knows. speed (m/s), span (m): for force models that need them;
     time_step: of the plant (s). Raises InputError where the filter has no steady gain.
     """
-    every = max(n for n in range(1, control_steps + 1) if _fits(n, control_steps, time_step))
+    divisors = [n for n in range(1, control_steps + 1) if control_steps % n == 0]
+    every = max(n for n in divisors if n == 1 or n * time_step <= LONGEST_INTERVAL)
     process = estimator.force_model.process(speed, span)
     model = build_model(pantograph, process, estimator, every * time_step)
     gain = steady_gain(*model.linear)
@@ -99,11 +98,6 @@ def estimating(
         shape=_rest_shape(pantograph),
     )
     return arrays, rms
-
-
-def _fits(steps: int, control_steps: int, time_step: float) -> bool:
-    whole = control_steps % steps == 0
-    return whole and (steps == 1 or steps * time_step <= LONGEST_INTERVAL)
 
 
 def _rest_shape(pantograph: PantographData) -> Array:

@@ -17,7 +17,6 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from .fit import Found
 from .stored import Stored
-from .values import Value
 
 SMALLER = 0.5
 """Standard deviations of changes, before any record is seen, as a share of the tolerances of a line as built.
@@ -110,31 +109,21 @@ def _check_alike(earlier: Stored, later: Stored) -> None:
             f"The fits to {earlier.name} and {later.name} count from different lines or pantographs; fit "
             "both with the same --line and --pantograph."
         )
-    if _tolerances(earlier.values) != _tolerances(later.values):
+    kinds = [{(value.kind, value.tolerance) for value in known.values} for known in (earlier, later)]
+    if kinds[0] != kinds[1]:
         raise InputError(
             f"The fits to {earlier.name} and {later.name} free different values, or with different "
             "tolerances; fit both with the same --free and --tolerance."
         )
     begin, end = _common(earlier, later)
     if not begin < end:
+        first, second = ("{:,.0f} to {:,.0f} m".format(*known.compared) for known in (earlier, later))
         raise InputError(
-            f"The fit to {earlier.name} is of {_stretch(earlier)}, that to {later.name} of "
-            f"{_stretch(later)}; give fits of one stretch."
+            f"The fit to {earlier.name} is of {first}, that to {later.name} of {second}; give fits of one "
+            "stretch."
         )
 
 
 def _common(earlier: Stored, later: Stored) -> tuple[float, float]:
-    """Stretch that both fits compared (m)."""
     pairs = earlier.compared, later.compared
     return max(begin for begin, _ in pairs), min(end for _, end in pairs)
-
-
-def _stretch(known: Stored) -> str:
-    return "{:,.0f} to {:,.0f} m".format(*known.compared)
-
-
-def _tolerances(values: Sequence[Value]) -> dict[str, set[float]]:
-    found: dict[str, set[float]] = {}
-    for value in values:
-        found.setdefault(value.kind, set()).add(value.tolerance)
-    return found

@@ -8,8 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.linear_algebra import one_thread
+from ..base.arrays import Array, one_thread
 from ..estimation.innovations import Whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData

@@ -19,8 +19,7 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..base.machine import cores
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
-from .measured import BANDS, Measured, between
-from .passes import Passes, Variant
+from .passes import BANDS, Measured, Passes, Variant, between
 from .values import Values
 
 OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0}
@@ -78,13 +77,9 @@ class Misfit:
 
     def as_designed(self) -> list[Array]:
         """Force of the line as designed at the places of each part (N)."""
-        state = self.start()
-        count = len(self.values)
-        found = []
-        for k, part in enumerate(self.parts):
-            variant = self.values.variant(state.x[:count], float(state.static_forces[k]))
-            found.append(self.sampled(part, [variant])[0])
-        return found
+        static = self.values.design.pantograph.static_force
+        variant = self.values.variant(np.zeros(len(self.values)), static)
+        return [self.sampled(part, [variant])[0] for part in self.parts]
 
     def derivatives(
         self, state: State, differences: Array, grid: Grid, working: Callable[[str], None]

@@ -1,31 +1,128 @@
-"""What a fit begins with: which spans are simulated, and what of each record is compared."""
+"""What a fit begins with: the line's condition with room for what is freed, and where simulated passes begin.
+
+A simulated pass begins pressed to the wire at rest, and 20 spans on, its force is still 2.4 N off what it
+settles to, 0.5 N after 40 (``en50318-2002``, ``dsa380``, 220 km/h). A measured train comes from elsewhere:
+its pass has settled where the record begins. A record of a simulated pass has the start in it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..metrics.spans import FIRST_SETTLED
+from ..metrics.figures import FIRST_SETTLED
 from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
-from ..plant.line_condition import DrawnLine, LineCondition
+from ..plant.line_condition import DrawnLine, LineCondition, together
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
-from ..records.record import Piece, Record
-from ..records.samples import is_low_passed
-from .condition import condition_of
-from .measured import Measured, measured
+from ..records.record import Piece, Record, is_low_passed
 from .misfit import Part, forces_at
-from .passes import Passes, Variant
+from .passes import Measured, Passes, Variant, measured
 from .solve import Fitting
-from .start import rough_shift, spans_before
-from .values import USUAL, Design, Values
+from .values import AS_BUILT, TOLERANCES, USUAL, Design, Values
+
+MOST_LOOSE = 0.1
+"""Largest tolerance of tensions, relative: beyond it a grid for all of them would be coarse."""
+
+
+def condition_of(
+    line: FlexibleCatenaryData,
+    free: Sequence[str],
+    tolerances: Mapping[str, float] | None,
+    first_span: int,
+    spans: int,
+) -> LineCondition:
+    """The condition in which each lane draws a line of its own: the plant makes room for what is freed.
+
+    first_span: spans of the line before so many simulated ones. Raises InputError for tensions that are freed
+    too far.
+    """
+    known = TOLERANCES | dict(tolerances or {})
+    if known["tensions"] > MOST_LOOSE:
+        raise InputError(
+            f"The tolerance of tensions must be at most {MOST_LOOSE:g} of the design's, not "
+            f"{known['tensions']:g}; name a line whose design is nearer."
+        )
+    room = LineCondition(
+        irregularity=1.0 if "unevenness" in free else 0.0,
+        wear_depth=AS_BUILT.wear_depth if "unevenness" in free else 0.0,
+        wear_wavelength=AS_BUILT.wear_wavelength,
+        dropper_scatter=TOLERANCES["droppers"],
+        support_scatter=TOLERANCES["supports"],
+        tension_scatter=known["tensions"] if "tensions" in free else 0.0,
+    )
+    return room if line.as_found is None else together(_within(line.as_found, first_span, spans), room)
+
+
+def _within(condition: LineCondition, first_span: int, spans: int) -> LineCondition:
+    """A condition of a line, of which so many spans behind some first ones are simulated."""
+    moved: dict[str, Any] = {}
+    for name in LineCondition.model_fields:
+        rows = getattr(condition, name)
+        if isinstance(rows, tuple):  # all begin with the number of a span, or of the support at its end
+            most = spans - 1 if name == "raised_supports" else spans
+            numbers = [(row[0] - first_span, *row[1:]) for row in rows]
+            moved[name] = tuple(row for row in numbers if 1 <= row[0] <= most)
+    return condition.model_copy(update=moved)
+
+
+LEAD = 48
+"""Spans of the line as designed that a train has run where a record begins, if it has settled there."""
+TELLING = 10
+"""Spans from the line's first support on whose force tells whether a pass began there."""
+GRID = 0.25
+"""Distance of the places (m) that are tried for a record."""
+
+
+def spans_before(
+    pieces: Sequence[Piece],
+    line: FlexibleCatenaryData,
+    force_of: Callable[[Piece, Measured], Array],
+) -> int:
+    """Spans of the line before the simulated ones; below 0 where these begin before its first support.
+
+    line: one that goes on as it is, before and behind its spans.
+    force_of: of a train that begins at rest at the first support of the simulated line, as designed, at the
+    places of a piece (N). Only pieces that begin in the line's first span can hold such a start: these are
+    asked which of both they are more like. All others have settled.
+    """
+    span = line.span_length
+    settled = math.floor(min(float(piece.position[0]) for piece in pieces) / span) - LEAD
+    near = [piece for piece in pieces if piece.position[0] < span]
+    alike = {0: 0.0, settled: 0.0}
+    for piece in near:
+        for before in alike:
+            begin = max(float(piece.position[0]) - before * span, 0.0)
+            try:
+                own = measured(piece, before * span, (begin, begin + TELLING * span), span)
+            except InputError:
+                continue  # such a piece cannot be compared, and whoever asks says why
+            alike[before] += rough_shift(own, force_of(piece, own), 0.5 * span)[1]
+    return 0 if alike[0] > alike[settled] else settled
+
+
+def rough_shift(own: Measured, force: Array, reach: float) -> tuple[float, float]:
+    """By how much positions are short, roughly (m), and how measured and simulated force correlate there.
+
+    force: simulated (N), at the places of ``own``; reach: how far to look (m).
+    """
+    trials = GRID * np.arange(-math.floor(reach / GRID), math.floor(reach / GRID) + 1)
+    expected = own.coefficients(force)
+    scores = []
+    for trial in trials:
+        seen = own.coefficients(own.force(float(trial)))
+        scores.append(float(seen @ expected / np.linalg.norm(seen)))
+    best = int(np.argmax(scores))
+    return float(trials[best]), scores[best] / float(np.linalg.norm(expected))
+
 
 END = 20.0
 """Way (m) at both ends of a record that is not compared: a low-pass without delay does not know how it goes
@@ -145,7 +242,6 @@ def problem(
 
 
 def _refuse_twice(records: Sequence[Record]) -> None:
-    """Refuse a pass that is there twice: it would count as two, and intervals would be too narrow."""
     known: dict[bytes, str] = {}
     for record in records:
         for piece in record.pieces:

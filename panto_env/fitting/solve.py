@@ -1,4 +1,4 @@
-"""Gauss-Newton with tolerances as priors, and the noise of each band of frequencies found on the way.
+"""The iteration of a fit: Gauss-Newton with tolerances as priors, and the noise of each band of frequencies.
 
 Noise is found with the values: from what is left over, counted with as many degrees of freedom as the values
 leave (MacKay, 1992, "Bayesian interpolation"). At first that is nearly everything that a record has, so that
@@ -15,7 +15,74 @@ import numpy as np
 from ..base.arrays import Array, Index
 from ..estimation.innovations import Whiteness, whiteness
 from .misfit import Grid, Misfit, Near, State
-from .normal import CLOSE, noise_of, normal, pull_of
+from .passes import BANDS
+
+FREEDOM = 0.1
+"""Least share of a band's coefficients that counts as not used up by the values."""
+QUIET = 0.15
+"""Least standard deviation of a coefficient (N): what grid and time step leave is 0.1 to 0.3 N."""
+REFINEMENTS, CLOSE = 50, 0.01
+"""Most rounds of ``noise_of``, and the relative change with which they end."""
+
+
+def normal(
+    blocks: Sequence[Array], left: Sequence[Array], weights: Sequence[Array], prior: Array, x: Array
+) -> tuple[Array, Array]:
+    """Precision matrix, (n, n), and right side, (n,), of a Gauss-Newton step.
+
+    blocks: derivatives of coefficients, (coefficients, n), of each part; left: measured less simulated
+    coefficients; weights: 1 / variance of each. prior: standard deviations of x, (n,), about 0.
+    """
+    precision = np.diag(1 / prior**2)
+    for block, weight in zip(blocks, weights, strict=True):
+        precision += (block * weight[:, None]).T @ block
+    return precision, pull_of(blocks, weights, prior, left, x)
+
+
+def pull_of(
+    blocks: Sequence[Array], weights: Sequence[Array], prior: Array, left: Sequence[Array], x: Array
+) -> Array:
+    """Right side, (n,), of a Gauss-Newton step, as ``normal`` takes its arguments."""
+    pull = -x / prior**2
+    for block, own, weight in zip(blocks, left, weights, strict=True):
+        pull += block.T @ (weight * own)
+    return pull
+
+
+def noise_of(
+    noise: Array,
+    blocks: Sequence[Array],
+    left: Sequence[Array],
+    bands: Sequence[Index],
+    prior: Array,
+    x: Array,
+) -> Array:
+    """Standard deviation (N) of each band's coefficients, (parts, bands), after the step that it implies.
+
+    noise: to begin with; nan: from all that is left. bands: number of each coefficient's band.
+    """
+    if np.isnan(noise).any():
+        each = zip(left, bands, strict=True)
+        noise = np.array([[own[band == b].std() for b in range(BANDS)] for own, band in each])
+    for _ in range(REFINEMENTS):
+        weights = [1 / own[band] ** 2 for own, band in zip(noise, bands, strict=True)]
+        precision, pull = normal(blocks, left, weights, prior, x)
+        covariance = np.linalg.inv(precision)
+        step = covariance @ pull
+        new = np.empty_like(noise)
+        for k, (block, own, band) in enumerate(zip(blocks, left, bands, strict=True)):
+            rest = own - block @ step
+            used = np.sum((block @ covariance) * block, axis=1) * weights[k]  # degrees of freedom
+            for b in range(BANDS):
+                there = band == b
+                free = max(there.sum() - used[there].sum(), FREEDOM * there.sum())
+                new[k, b] = np.sqrt(np.sum(rest[there] ** 2) / free)
+        new = np.maximum(new, QUIET)
+        if np.abs(np.log(new / noise)).max() < CLOSE:
+            return new
+        noise = new
+    return noise
+
 
 STEPS, SETS, ROUNDS = 80, 6, 10
 """Most steps, and sets of derivatives once noise is no longer held, until single droppers are looked at; and
@@ -95,7 +162,9 @@ class Fitting(Misfit):
             if best.settled and jumped is None:
                 break
             found = settle(jumped or best.state, best.covariance)
-            if jumped and not self._sum(found, best) < self._sum(best, best) - BETTER:
+            noise = best.state.noise  # for both: of what each has left, they would not compare
+            sums = [self.sum_of(each.left, noise, each.state.x) for each in (found, best)]
+            if jumped and not sums[0] < sums[1] - BETTER:
                 break
             best = found
         return settle(best.state, best.covariance, fine=True)
@@ -145,10 +214,6 @@ class Fitting(Misfit):
                     coarse = coarse and (cooling or bool(np.isnan(held).any()))
                     sets += sure
                     break
-
-    def _sum(self, solution: Solution, usual: Solution) -> float:
-        """What is minimised, at a solution, with the noise of another one."""
-        return self.sum_of(solution.left, usual.state.noise, solution.state.x)
 
     def _jumped(self, solution: Solution, working: Callable[[str], None]) -> State | None:
         """The state after single droppers have jumped; None where that makes nothing better.

@@ -1,7 +1,8 @@
-"""What a fit knows, in a file: its values and how uncertain they are, singly and together."""
+"""What a fit knows, in a file: where it was broken off, or its end with its covariance and doubts."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -11,16 +12,78 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
-from ..base.array_file import read_arrays, write_arrays
 from ..base.arrays import Array
+from ..base.checksums import read_arrays, write_arrays
 from ..base.errors import InputError
-from ..base.explanation import explain
-from ..base.ranges import Between
-from ..base.settings import Settings
-from .doubts import doubts
-from .fit import Fit
-from .measured import BANDS
+from ..base.settings import Between, Settings, explain
+from ..records.record import Record
+from .fit import WHITE, Fit
+from .misfit import OWN, State
+from .passes import BANDS
 from .values import FREE, WAVES, Value
+
+STRANGE = 0.3
+"""Share of a force that is left, by standard deviation, from which on the fit is called wrong. Own choice."""
+
+
+def doubts(fit: Fit) -> list[str]:
+    """Sentences on what makes the values of a fit, or their intervals, wrong or less reliable."""
+    found = [*fit.problem.of_records, *fit.problem.notes]
+    strange = [
+        part.name
+        for part, (before, after) in zip(fit.parts, fit.left, strict=True)
+        if after > STRANGE * before
+    ]
+    if strange:
+        found.append(
+            f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or "
+            "its positions may be wrong by half a span or more; the values mean nothing then."
+        )
+    unlike = [
+        part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
+    ]
+    if unlike:
+        found.append(
+            f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
+            "intervals are too narrow."
+        )
+    if not fit.solution.settled:
+        found.append("The fit has not settled; intervals are not to be relied on.")
+    return found
+
+
+KEPT_ARRAYS = ("x", "static_forces", "noise")
+SUFFIX = ".fit"
+"""Of the file, behind the name of the output."""
+
+
+def identity_of(records: Sequence[Record], settings: dict[str, Any]) -> dict[str, Any]:
+    """What a fit is of: records by their samples, and settings as plain data."""
+    digest = hashlib.sha256()
+    for record in records:
+        for piece in record.pieces:
+            for series in (piece.position, piece.force):
+                digest.update(np.ascontiguousarray(series).tobytes())
+    return {"records": digest.hexdigest(), "own": list(OWN), **settings}
+
+
+def keep(path: Path, state: State, identity: dict[str, Any]) -> None:
+    """Write where a fit is. Raises InputError where that cannot be written."""
+    arrays = {name: np.ascontiguousarray(getattr(state, name)) for name in KEPT_ARRAYS}
+    write_arrays(path, identity | {"steps": state.steps}, arrays)
+
+
+def kept(path: Path, identity: dict[str, Any]) -> State | None:
+    """Where the same fit was broken off; None where no file, or another fit's, is there."""
+    try:
+        table, arrays = read_arrays(path)
+    except (OSError, ValueError):
+        return None
+    steps = table.pop("steps", None)
+    if table != identity or set(arrays) != set(KEPT_ARRAYS) or not isinstance(steps, int):
+        return None
+    return State(**arrays, steps=steps)
+
 
 ARRAYS = ("difference", "covariance", "noise")
 Place = Annotated[float, Between(-1e7, 1e7, "m")]
@@ -64,7 +127,10 @@ def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
     fitting, before = fit.problem.fitting, fit.before
     design, count = fitting.values.design, len(fitting.values)
-    values = tuple(along(each, before) for each in fitting.values.all)
+    values = tuple(
+        value if value.place is None else replace(value, place=value.place + before)
+        for value in fitting.values.all
+    )
     difference, covariance = fit.solution.state.x[:count], fit.solution.covariance[:count, :count]
     if before:
         turn = turned(values, -before)
@@ -85,16 +151,10 @@ def knowledge(fit: Fit, records: str) -> Stored:
 
 def store(known: Stored, path: str | Path) -> None:
     """Write what a fit knows, whole or not at all. Raises InputError where it cannot be written."""
-    table = {
-        "name": known.name,
-        "line": known.line,
-        "pantograph": known.pantograph,
-        "values": [asdict(value) for value in known.values],
-        "compared": list(known.compared),
-        "notes": list(known.notes),
-    }
-    arrays = {name: getattr(known, name) for name in ARRAYS}
-    write_arrays(path, table, {name: np.ascontiguousarray(array) for name, array in arrays.items()})
+    table = {name: getattr(known, name) for name in ("name", "line", "pantograph")}
+    table["values"] = [asdict(value) for value in known.values]
+    table |= {"compared": list(known.compared), "notes": list(known.notes)}
+    write_arrays(path, table, {name: np.ascontiguousarray(getattr(known, name)) for name in ARRAYS})
 
 
 def stored(path: str | Path) -> Stored:
@@ -116,7 +176,6 @@ def stored(path: str | Path) -> Stored:
 
 
 def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
-    """Raise ValueError, with a clause, for arrays that are not those of a fit of these values."""
     count, tolerances = len(values), np.array([value.tolerance for value in values])
     if len({value.name for value in values}) < count:
         raise ValueError("two values have one name")
@@ -130,11 +189,6 @@ def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
     usable = np.abs(relative).max() < 2 and np.allclose(relative, relative.T, rtol=0.0, atol=1e-6)
     if not (usable and (sizes := np.linalg.eigvalsh(relative))[0] > 1e-14 and sizes[-1] < 1.001):
         raise ValueError("its covariance is not symmetric and positive, or wider than its tolerances")
-
-
-def along(value: Value, before: float) -> Value:
-    """A value with its place on the line, of which some way lies before what was simulated (m)."""
-    return value if value.place is None else replace(value, place=value.place + before)
 
 
 def turned(values: Sequence[Value], further: float) -> Array:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array, Index
-from ..base.errors import InputError
-from ..base.names import suggest
+from ..base.errors import InputError, suggest
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import IRREGULARITY, LINE_CONDITIONS, DrawnLine, LineCondition
 from ..plant.pantograph.schema import PantographData

@@ -1,16 +1,29 @@
-"""How well a model's displacements match the recorded ones (paper 1, Eqs 9 and 10)."""
+"""How a model's displacements match the recorded ones (paper 1, Eqs 9 and 10): tables, pictures, a file."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .model import HEAD, PLATE, SUPPORT, Parameters, matrices
+from ..base.files import check_output, write_whole
+from ..base.plotting import BLUE, ORANGE
+from ..base.settings import ranges_of
+from ..base.table import Alarm, Table
+from ..plant.pantograph.schema import PantographData
+from ..terminal import number
+from .model import HEAD, PLATE, SUPPORT, UNITS, Fit, Parameters, matrices
 from .record import Record
 from .response import contact_force, fitted_response, force_matrices
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -24,13 +37,8 @@ class Match:
 
     def as_dict(self) -> dict[str, str | float]:
         """What was compared and how well it matches, without the series."""
-        return {
-            "channel": self.channel,
-            "driven_by": self.driven_by,
-            "performance": self.performance,
-            "mean_error": self.mean_error,
-            "squared_error": self.squared_error,
-        }
+        names = ("channel", "driven_by", "performance", "mean_error", "squared_error")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def performance(self) -> float:
@@ -66,9 +74,7 @@ def matches(record: Record, parameters: Parameters) -> list[Match]:
         return under_plate
     force = contact_force(parameters, record.plate, states, step)
     under_plate.append(Match("force", "plate", record.force, force))
-    if parameters["c1T"] > 0:
-        return under_plate + force_matches(record, parameters)
-    return under_plate
+    return under_plate + (force_matches(record, parameters) if parameters["c1T"] > 0 else [])
 
 
 def force_matches(record: Record, parameters: Parameters) -> list[Match]:
@@ -86,3 +92,187 @@ def force_matches(record: Record, parameters: Parameters) -> list[Match]:
         Match("y_p2", "force", record.head, states[:, HEAD]),
         Match("y_p3", "force", record.support, states[:, SUPPORT]),
     ]
+
+
+def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
+    """What was identified, a column for each method; band: of the excitation (Hz).
+
+    Values that no pantograph can have are marked.
+    """
+    names = next(iter(fits.values())).names
+    rows = []
+    for k, name in enumerate(names):
+        cells = []
+        for fit in fits.values():
+            low, high = fit.interval[k]
+            half = (high - low) / 2
+            found = f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %"
+            cells.append(Alarm(f"impossible: {found}") if name in fit.impossible else found)
+        rows.append((f"{name} ({UNITS[name]})", *cells))
+    rows.append(("condition number", *(f"{fit.condition:.5g}" for fit in fits.values())))
+    title = f"Identified, ± 95 %, relative standard deviation; excitation up to {band:.4g} Hz"
+    return Table(title, ("", *fits), rows)
+
+
+def matches_table(matches: Sequence[Match], method: str) -> Table:
+    """The model that a method identified, beside the record."""
+
+    def error(match: Match) -> str:
+        force = match.channel == "force"
+        return f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
+
+    columns = {
+        "series": lambda match: match.channel,
+        "driven by": lambda match: match.driven_by,
+        "fitting performance (%)": lambda match: number(match.performance),
+        "mean error": error,
+    }
+    return Table.of(f"Model by {method} beside the record", matches, columns, text_columns=4)
+
+
+EXPLAINS = 50.0
+"""Fitting performance (%) of a displacement from which a model explains it."""
+(_FORCE,) = set(ranges_of(PantographData.model_fields["static_force"].rebuild_annotation()))
+MOST_FORCE = _FORCE.high
+"""Maximum lifting force (N) of a pantograph."""
+SUFFIXES = (".toml",)
+
+
+def check_possible(fit: Fit) -> None:
+    """Raise InputError for parameters that no pantograph can have."""
+    p = fit.parameters
+    if fit.impossible:
+        shown = ", ".join(f"{name} = {p[name]:.4g} {UNITS[name]}" for name in fit.impossible)
+        raise InputError(
+            f"The {fit.method} found {shown}: no pantograph has that, so none is written; take a record that "
+            "determines it, another --method, or give its value with --measured."
+        )
+
+
+def write_pantograph(
+    fit: Fit,
+    path: str | Path,
+    *,
+    matches: Sequence[Match],
+    record: str,
+    static_force: float,
+    force_source: str,
+) -> None:
+    """Write what ``panto simulate --pantograph`` takes, whole or not at all.
+
+    matches: of the model beside the record. record: its name, for the sources. static_force: lifting force
+    (N), and where it is from.
+    Raises InputError for a file that is not .toml, for parameters that no pantograph can have, and for a
+    model that does not explain the motion that it was identified from.
+    """
+    check_output(path, SUFFIXES)
+    check_possible(fit)
+    for match in matches:
+        if match.driven_by == "plate" and match.channel != "force" and not match.performance >= EXPLAINS:
+            raise InputError(
+                f"The model by {fit.method} does not explain the motion of {match.channel} (fitting "
+                f"performance {match.performance:.3g} %, {EXPLAINS:g} % is required), so none is written; "
+                "check units and signs, or take a record with more motion, another --method, or known values "
+                "by --measured."
+            )
+    if not 0 <= static_force <= MOST_FORCE:
+        raise InputError(
+            f"The static force must be a number from 0 to {MOST_FORCE:g} N, not {static_force:g}; give it "
+            "with --static-force."
+        )
+
+    p = fit.parameters
+
+    rsd = dict(zip(fit.names, fit.rsd, strict=True))
+
+    def source(*names: str) -> str:
+        return "; ".join(
+            f"{name} identified from {record} (RSD {rsd[name]:.3g} %)" if name in rsd else f"{name} measured"
+            for name in names
+        )
+
+    description = f"Identified from {record} by {fit.method}; two masses, no aerodynamic uplift."
+    lines = [
+        'kind = "pantograph"',
+        f"description = {_text(description)}",
+        _entry("masses", [p["m2"], p["m3"]], source("m2", "m3")),
+        _entry("stiffnesses", [p["k2"], p["k3"]], source("k2", "k3")),
+        _entry("dampings", [p["c2"], p["c3"]], source("c2", "c3")),
+        _entry("static_force", static_force, force_source),
+        _entry("aerodynamic_coefficient", 0.0, "own choice: a rig in a laboratory has no wind"),
+        _entry("contact_stiffness", p["k1T"], source("k1T")),
+        _entry("contact_damping", p["c1T"], source("c1T")),
+    ]
+    with write_whole(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _entry(key: str, value: float | list[float], source: str) -> str:
+    return f"{key} = {{ value = {json.dumps(value)}, source = {_text(source)} }}"
+
+
+def _text(text: str) -> str:
+    """A TOML string: JSON's escapes are TOML's."""
+    return json.dumps(text, ensure_ascii=False)
+
+
+SHOWN = 2000
+"""Points drawn of a series at most: more cannot be seen and make files large."""
+
+
+def plot_record(record: Record, title: str, seconds: float) -> Figure:
+    """Contact force and displacements over the first ``seconds``, as paper 1's Figs 6 to 8."""
+    from matplotlib.figure import Figure
+
+    inside = record.time <= record.start + seconds
+    step = max(1, int(inside.sum()) // SHOWN)
+    time = record.time[inside][::step]
+    series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
+    if record.force is not None:
+        series = {"force": record.force} | series
+    figure = Figure(figsize=(7, 6.2), layout="constrained")
+    axes = figure.subplots(len(series), 1, sharex=True)
+    for axis, (name, values) in zip(axes, series.items(), strict=True):
+        symbol, unit, scale = _axis_of(name)
+        axis.plot(time, scale * values[inside][::step], color=BLUE, linewidth=1)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
+        axis.grid(color="0.9")
+    axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
+    figure.suptitle(title)
+    return figure
+
+
+def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float, last: float) -> Figure:
+    """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
+    from matplotlib.figure import Figure
+
+    inside = (time >= first) & (time <= last)
+    step = max(1, int(inside.sum()) // SHOWN)
+    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(matches)), layout="constrained")
+    axes = figure.subplots(len(matches), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, match in zip(axes, matches, strict=True):
+        symbol, unit, scale = _axis_of(match.channel)
+        recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))
+        axis.plot(time[inside][::step], recorded, color=ORANGE, linewidth=3)
+        axis.plot(time[inside][::step], modelled, color="black", linewidth=0.8)
+        axis.set(ylabel=f"${symbol}$ ({unit})")
+        axis.set_title(
+            f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
+            f"mean error {scale * match.mean_error:.3g} {unit}",
+            loc="right",
+            fontsize="small",
+        )
+        axis.grid(color="0.9")
+    axes[0].plot([], [], color=ORANGE, linewidth=3, label="record")
+    axes[0].plot([], [], color="black", linewidth=0.8, label="model")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
+    axes[-1].set(xlabel="time (s)", xlim=(first, last))
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _axis_of(channel: str) -> tuple[str, str, float]:
+    """Symbol and unit of a record's channel, and the scale from SI to this unit."""
+    if channel == "force":
+        return "f_1", "N", 1.0
+    return f"y_{{{channel.removeprefix('y_')}}}", "mm", 1e3

@@ -1,12 +1,23 @@
-"""A record of the rig: what its sensors saw, at equal time steps."""
+"""A record of the rig: what its sensors saw, at equal time steps; and whether it can be that of a rig.
+
+Displacements count in the direction in which the plate pushes the head, from where the unloaded pantograph
+rests; the contact force is positive where the plate pushes. The bounds are far from any rig's, and a factor
+of a thousand between units is beyond them.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.errors import InputError
+from ..base.record_columns import LENGTHS, TIME, Column, read_series, write_series
+from .model import Parameters
 
 SHORTEST = 20
 """Samples that a record must have at least; a method that needs more raises its own error."""
@@ -27,3 +38,160 @@ class Record:
     def time(self) -> Array:
         """(n,): s."""
         return self.start + self.time_step * np.arange(len(self.plate))
+
+
+COLUMNS = {
+    "time": TIME,
+    "force": Column(("force", "contactforce", "f", "f1"), {"N": 1.0, "kN": 1e3}, example="N", required=False),
+    "y_p1": Column(("yp1", "y1", "plate"), LENGTHS, example="mm"),
+    "y_p2": Column(("yp2", "y2", "head"), LENGTHS, example="mm"),
+    "y_p3": Column(("yp3", "y3", "support"), LENGTHS, example="mm"),
+}
+
+
+def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Record:
+    """Read a record: columns time, y_p1, y_p2, y_p3 and, where measured, force.
+
+    units: of columns whose header has none, or another one. The file is read as ``read_columns`` does.
+    Raises InputError, naming the line and the column, for anything missing or not a number.
+    """
+    step, values = read_series(path, COLUMNS, units, SHORTEST, "to identify anything")
+    for name in DISPLACEMENTS:
+        if np.ptp(values[name]) == 0:
+            raise InputError(f"{path}: column {name} never changes; check the sensor and its wiring.")
+    plate, head, support = (values[name] for name in DISPLACEMENTS)
+    return Record(step, plate, head, support, values.get("force"), float(values["time"][0]))
+
+
+def write_record(record: Record, path: str | Path) -> None:
+    """Write a CSV file that ``read_record`` reads, in s, N and mm, whole or not at all."""
+    columns = {"time (s)": record.time}
+    if record.force is not None:
+        columns["force (N)"] = record.force
+    for name, values in (("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support)):
+        columns[f"{name} (mm)"] = 1e3 * values
+    write_series(path, columns)
+
+
+SAMPLING = (10.0, 50e3)  # 1/s
+DURATION = (0.5, 3600.0)  # s
+MOST_SAMPLES = 2_000_000
+FARTHEST = 3.0  # m, of any displacement from the rest: no pantograph reaches higher
+MOTION = (20e-6, 0.5)  # m from end to end, of plate and head; laser sensors see some µm
+FORCE = (0.01, 3000.0)  # N: minimum from end to end, maximum of any
+ALIKE = 30.0
+"""How many times as far one may move as another, or as large a force be as the spring makes it."""
+HEAVIEST = 50.0  # kg, of a frame: it follows the head up to its own frequency on k2
+TOGETHER = 0.5  # correlation from which two series count as moving together, or against each other
+DISPLACEMENTS = ("y_p1", "y_p2", "y_p3")
+PUSH = (
+    "displacements count in the direction in which the plate pushes the head, which is down under a wire, "
+    "and the force is positive where it pushes"
+)
+
+
+def check_record(record: Record, known: Parameters) -> None:
+    """Raise InputError, with the likely mistake, for a record that can't be a rig's; known: k1T and k2."""
+    _check_time(record)
+    _check_sizes(record)
+    _check_signs(record, known)
+    if record.force is not None:
+        _check_force(record, record.force, known["k1T"])
+
+
+def _check_time(record: Record) -> None:
+    samples, rate = len(record.plate), 1 / record.time_step
+    duration = samples * record.time_step
+    fast, slow = rate > SAMPLING[1] or duration < DURATION[0], rate < SAMPLING[0] or duration > DURATION[1]
+    if fast or slow:
+        units = "seconds in a column of ms" if fast else "milliseconds in a column of s"
+        raise InputError(
+            f"The record has {samples:,} samples in {duration:.4g} s, {rate:,.6g} a second, which is no "
+            f"record of a rig: {units}?"
+        )
+    if samples > MOST_SAMPLES:
+        raise InputError(
+            f"The record has {samples:,} samples; {MOST_SAMPLES:,} at most can be identified: give a part of "
+            "it, or resample it to some thousand a second."
+        )
+
+
+def _check_sizes(record: Record) -> None:
+    for name, values in zip(DISPLACEMENTS, (record.plate, record.head, record.support), strict=True):
+        farthest, motion = float(np.abs(values).max()), float(np.ptp(values))
+        if farthest > FARTHEST or motion > MOTION[1]:
+            what = (
+                f"displacements of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {motion:.3g} m"
+            )
+            raise InputError(
+                f"Column {name} holds {what}, which no pantograph makes on a rig: mm in a column of m, or µm "
+                "in a column of mm?"
+            )
+        if motion < MOTION[0] and name != DISPLACEMENTS[2]:
+            raise InputError(
+                f"Column {name} moves by {1e6 * motion:.3g} µm only, too little to identify anything: metres "
+                "in a column of mm, or mm in a column of µm?"
+            )
+    plate = float(record.plate.std())
+    for name, values, minimum in (
+        (DISPLACEMENTS[1], record.head, 1 / ALIKE),
+        (DISPLACEMENTS[2], record.support, 1 / ALIKE**1.5),  # it stays behind where the plate is quick
+    ):
+        ratio = float(values.std()) / plate
+        if not minimum <= ratio <= ALIKE:
+            far = f"{ratio:,.3g} times as far" if ratio > 1 else f"1/{1 / ratio:,.3g} as far"
+            raise InputError(
+                f"Column {name} moves {far} as {DISPLACEMENTS[0]}: are both in the units that are said?"
+            )
+
+
+def _check_signs(record: Record, known: Parameters) -> None:
+    pairs = [(DISPLACEMENTS[1], record.head, DISPLACEMENTS[0], record.plate)]
+    if frequency_below(record, 0.5) < math.sqrt(known["k2"] / HEAVIEST) / (2 * math.pi):
+        pairs.append((DISPLACEMENTS[2], record.support, DISPLACEMENTS[1], record.head))
+    for name, values, other, reference in pairs:
+        if _correlation(values, reference) < -TOGETHER:
+            raise InputError(
+                f"Column {name} falls as {other} rises, though they hang together: one of them seems to "
+                f"point the other way; {PUSH}."
+            )
+
+
+def _check_force(record: Record, force: Array, stiffness: float) -> None:
+    maximum, swing = float(np.abs(force).max()), float(np.ptp(force))
+    if maximum > FORCE[1]:
+        raise InputError(
+            f"Column force holds {maximum:,.4g} N, which no pantograph bears: newtons in a column of kN?"
+        )
+    if swing < FORCE[0]:
+        raise InputError(f"Column force changes by {swing:.2g} N only: kilonewtons in a column of N?")
+    spring = stiffness * (record.plate - record.head)
+    together = _correlation(force, spring)
+    if together < -TOGETHER:
+        raise InputError(
+            "The force falls as the plate presses further in: heights seem to point up, or the force to be a "
+            f"pull; {PUSH}."
+        )
+    ratio = float(force.std() / spring.std()) if spring.std() > 0 else math.inf
+    if together > TOGETHER and not 1 / ALIKE <= ratio <= ALIKE:
+        raise InputError(
+            f"The force swings {ratio:,.3g} times as far as k1T = {stiffness:g} N/m times the compression of "
+            "the contact spring does: is k1T in N/m, and are force and displacements in the units said?"
+        )
+
+
+def frequency_below(record: Record, share: float, first: int = 0) -> float:
+    """Frequency (Hz) below which lies a share of the power of the plate's motion about its mean.
+
+    first: number of the lowest frequency that counts.
+    """
+    plate = (record.plate - record.plate.mean()) * np.hanning(len(record.plate))
+    power = np.cumsum(np.abs(np.fft.rfft(plate)) ** 2)
+    place = int(np.searchsorted(power, share * power[-1]))
+    return float(np.fft.rfftfreq(len(plate), record.time_step)[max(place, first)])
+
+
+def _correlation(a: Array, b: Array) -> float:
+    if a.std() == 0 or b.std() == 0:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])

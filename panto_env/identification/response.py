@@ -1,4 +1,8 @@
-"""What the model does under a recorded plate motion or contact force, discretised exactly."""
+"""The band of the excitation, and records limited to it by a linear-phase low-pass; the model's response.
+
+Noise outside the band carries no information, but ruins derivatives and excites the model's resonance. The
+same linear filter on all channels commutes with a linear model. Both ends are cut off, not padded.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,63 @@ from ..backend import kernel
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .model import HEAD, HEAD_SPEED, Parameters, matrices
+from .record import Record, frequency_below
+
+ATTENUATION = 60.0
+"""Of noise above twice the band (dB)."""
+
+POWER = 0.999
+"""Share of the plate's motion that lies in the band."""
+
+ROWS = 10
+"""Independent samples that must be left."""
+
+
+def excited_band(record: Record) -> float:
+    """Highest frequency (Hz) of the plate's motion: below it lies 99.9 % of the power about the mean."""
+    return frequency_below(record, POWER, first=1)
+
+
+def band_limited(record: Record, band: float) -> tuple[Record, int]:
+    """The record below ``band`` (Hz), its ends cut off, and how many samples apart noise is independent.
+
+    Passes to ``band``, stops above twice of it. Raises InputError where the record is too short for
+    this, or sampled too slowly.
+    """
+    from scipy.signal import firwin, kaiserord, oaconvolve  # slow to import
+
+    rate = 1 / record.time_step
+    if not 0 < 4 * band <= rate:
+        raise InputError(
+            f"A band to {band:.4g} Hz does not fit a record sampled at {rate:.4g} Hz; it must lie above 0 "
+            "and below a quarter of the sampling rate (is the record mostly noise?)."
+        )
+    duration = len(record.plate) * record.time_step
+    if band * duration < 1:
+        raise InputError(
+            f"The record of {duration:.4g} s is too short for motion up to {band:.4g} Hz; record "
+            f"{1 / band:.3g} s or longer."
+        )
+    taps, shape = kaiserord(ATTENUATION, band / (rate / 2))
+    taps |= 1  # odd: the delay is whole samples
+    stride = max(1, int(rate / (3 * band)))  # noise is left to 1.5 of the band
+    left = len(record.plate) - taps + 1
+    if left < ROWS * stride:
+        needed = (taps + ROWS * stride) * record.time_step
+        raise InputError(
+            f"The record of {len(record.plate) * record.time_step:.4g} s is too short for motion up to "
+            f"{band:.4g} Hz; record {needed:.3g} s or longer."
+        )
+    window = firwin(taps, 1.5 * band, window=("kaiser", shape), fs=rate)
+
+    def smooth(values: Array) -> Array:
+        mean = values.mean()
+        return np.asarray(mean + oaconvolve(values - mean, window, mode="valid"))
+
+    force = None if record.force is None else smooth(record.force)
+    plate, head, support = (smooth(each) for each in (record.plate, record.head, record.support))
+    start = record.start + taps // 2 * record.time_step
+    return Record(record.time_step, plate, head, support, force, start), stride
 
 
 @kernel
@@ -47,18 +108,6 @@ def respond(a: Array, b: Array, inputs: Array, time_step: float, initial: Array)
     states[0] = initial
     recur(whole[:size, :size].copy(), inputs @ whole[:size, size:].T, states)
     return states
-
-
-def rest_on_plate(parameters: Parameters, plate: float) -> Array:
-    """State, (4,), at rest on a plate that stands at ``plate`` (m)."""
-    a, b = matrices(parameters)
-    return np.asarray(np.linalg.solve(a, -b[:, 0] * plate))
-
-
-def under_plate(parameters: Parameters, plate: Array, time_step: float, initial: Array) -> Array:
-    """States [y_p2, y_p3, y_p2', y_p3'], (n, 4), while the plate moves as recorded (m)."""
-    a, b = matrices(parameters)
-    return respond(a, b, polynomials(plate, time_step), time_step, initial)
 
 
 def contact_force(parameters: Parameters, plate: Array, states: Array, time_step: float) -> Array:

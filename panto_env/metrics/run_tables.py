@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..base.checksums import __version__
 from ..base.errors import InputError
-from ..base.table_file import WORKBOOKS, Sheet, write_table, write_workbook
-from ..base.version import __version__
+from ..base.table import WORKBOOKS, Sheet, write_table, write_workbook
 from ..plant.catenary import CATENARIES
-from ..plant.catenary.flexible.dropper_table import HEADINGS as AT_REST
-from ..plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
-from .by_span import HEADINGS as BY_SPAN
-from .by_span import by_span
-from .droppers import HEADINGS as MOVING
-from .droppers import moving_droppers
-from .labels import HEADINGS, LABELS, NUMBER
+from ..plant.catenary.flexible.static import HEADINGS as AT_REST
+from ..plant.catenary.flexible.static import as_rows, droppers_at_rest
+from .by_span import DROPPER_HEADINGS as MOVING
+from .by_span import SPAN_HEADINGS as BY_SPAN
+from .by_span import STRETCH_HEADINGS as BY_STRETCH
+from .by_span import by_span, by_stretch, moving_droppers
+from .compliance import Criterion
+from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
-from .spans import SpanChoice, in_words
-from .stretches import HEADINGS as BY_STRETCH
-from .stretches import by_stretch
 from .trajectory import SERIES, Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"
@@ -49,7 +47,9 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     headings: dict[str, str] = {}
     for number, own in enumerate(run.train, start=1):
         behind = number > 1
-        series = follower_columns(own, number, len(run.time)) if behind else _series(run)
+        series = (
+            follower_columns(own, number, len(run.time)) if behind else {n: getattr(run, n) for n in SERIES}
+        )
         whose = f" of pantograph {number}" if behind else ""
         force = low_pass(own.contact_force, own.time_step)
         filtered = np.concatenate([np.full(len(run.time) - len(force), np.nan), force])
@@ -69,10 +69,6 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     return Sheet("run", columns, headings)
 
 
-def _series(run: Trajectory) -> dict[str, Any]:
-    return {name: getattr(run, name) for name in SERIES}
-
-
 def figures(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     """Figures and requirements of runs, a row for each, in the units in which they are printed.
 
@@ -84,9 +80,11 @@ def figures(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
         found, criteria = run.summary(covered), {each.key: each for each in run.compliance(covered)}
         for key, label in LABELS.items():
             value = label.scale * getattr(found, key)
-            rows.append(of_run | _figure(key, label.name, label.unit, value, criteria.pop(key, None)))
-        for key, criterion in criteria.items():
-            rows.append(of_run | _figure(key, criterion.name, criterion.unit, criterion.value, criterion))
+            row = {"key": key, "figure": label.name, "value": value, "unit": label.unit}
+            rows.append(of_run | row | _limits(criteria.pop(key, None)))
+        for key, each in criteria.items():
+            row = {"key": key, "figure": each.name, "value": each.value, "unit": each.unit}
+            rows.append(of_run | row | _limits(each))
     return Sheet.of_rows("figures", rows, {"speed_kmh": HEADINGS["speed_kmh"]})
 
 
@@ -98,7 +96,12 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     """
     rows: list[dict[str, Any]] = []
     for run, covered, of_run in _each(runs, spans):
-        at_rest = {(each.get("span"), round(each["position"], 5)): each for each in _at_rest(run.design)}
+        try:
+            data = run.design["catenary"]
+            resting = as_rows(droppers_at_rest(CATENARIES[data["kind"]].schema.model_validate(data)))
+        except (KeyError, TypeError, ValueError):  # files of other versions may not hold it as this one does
+            resting = []
+        at_rest = {(each.get("span"), round(each["position"], 5)): each for each in resting}
         for moving in moving_droppers(run, covered):
             unknown = dict.fromkeys(("number", *AT_REST))
             known = at_rest.get((moving.span, round(moving.position, 5)), unknown)
@@ -177,17 +180,14 @@ def save_figures(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice
 
     Raises InputError where no run has figures.
     """
-    write_table(figures(_with_figures(runs, spans), spans), path)
+    whole = [run for run in runs if not run.terminated or spans is not None]
+    write_table(figures(whole or runs, spans), path)
 
 
 def save_droppers(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice = None) -> None:
     """Write ``droppers`` of runs as CSV, Excel or Parquet, as ``save_figures`` does."""
-    write_table(droppers(_with_figures(runs, spans), spans), path)
-
-
-def _with_figures(runs: Sequence[Trajectory], spans: SpanChoice) -> Sequence[Trajectory]:
-    """Runs that did not end early; all of them where every one did, so that the error says why."""
-    return [run for run in runs if not run.terminated or spans is not None] or runs
+    whole = [run for run in runs if not run.terminated or spans is not None]
+    write_table(droppers(whole or runs, spans), path)
 
 
 def _each(
@@ -206,37 +206,14 @@ def _each(
             yield own, covered, cells | {"spans": in_words(own.spans(covered))}
 
 
+def _limits(criterion: Criterion | None) -> dict[str, Any]:
+    """Cells of a figure's row; criterion: that of the figure, if it has one."""
+    numbers = {name: getattr(criterion, name, None) for name in ("lowest", "highest", "margin")}
+    return numbers | {name: getattr(criterion, name, None) or "" for name in ("verdict", "source", "note")}
+
+
 def _masts(run: Trajectory, span: int) -> dict[str, Any]:
     """Name and chainage (m) of the mast where a span begins, where the line names its masts."""
     masts = run.alignment.masts
     name, chainage = masts[span - 1] if 0 < span <= len(masts) else ("", None)
     return {"mast": name, "chainage": chainage} if masts else {}
-
-
-def _figure(key: str, name: str, unit: str, value: float, criterion: Any) -> dict[str, Any]:
-    """A row; criterion: that of the figure, if it has one."""
-    limits = ("lowest", "highest", "margin", "verdict", "source", "note")
-    lowest, highest, margin, verdict, source, note = (
-        getattr(criterion, each) if criterion is not None else None for each in limits
-    )
-    return {
-        "key": key,
-        "figure": name,
-        "value": value,
-        "unit": unit,
-        "lowest": lowest,
-        "highest": highest,
-        "margin": margin,
-        "verdict": verdict or "",
-        "source": source or "",
-        "note": note or "",
-    }
-
-
-def _at_rest(design: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Droppers at rest of the line of a run, which files of other versions may not hold as this one does."""
-    try:
-        line = CATENARIES[design["catenary"]["kind"]].schema.model_validate(design["catenary"])
-        return as_rows(droppers_at_rest(line))
-    except (KeyError, TypeError, ValueError):
-        return []

@@ -9,9 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..base.arrays import Array
-from ..base.explanation import explain
-from ..base.ranges import Between
-from ..base.settings import Settings
+from ..base.settings import Between, Settings, explain
 from ..plant.catenary.schema import PowerSystem
 
 LARGEST = 1e9

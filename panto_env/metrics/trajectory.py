@@ -14,66 +14,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import machine
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.checksums import with_checksum, without_checksum
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from ..base.units import to_kmh
 from ..plant.alignment import Alignment, Spans
 from ..plant.pantograph.schema import PantographData
-from .compliance import LineFacts, compliance
-from .criterion import Criterion
-from .droppers import evaluated, near_train
-from .en50367 import SLOW
-from .figures import Figures, arcing, contact_loss, cost_function
+from .by_span import evaluated, near_train
+from .compliance import SLOW, Criterion, LineFacts, compliance
+from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function
 from .low_pass import low_pass
-from .spans import SpanChoice, chosen_spans
 from .stored_run import check_stored
 
 FORMAT = 3
-OF_FOLLOWERS = (
-    "pantograph",
-    "nominal_force",
-    "target_mean",
-    "policy",
-    "design",
-    "reached",
-)
+OF_FOLLOWERS = ("pantograph", "nominal_force", "target_mean", "policy", "design", "reached")
 """Facts that a collector behind the first has of its own; the others are those of the first."""
 FEWEST = 3
 """Samples that a speed is found from, by differences of second order."""
 KEY = b"panto_env"
 """Key of the file's metadata that holds the facts as JSON, with a checksum of them and of all columns."""
-LARGEST = 0.5
-"""Maximum unpacked size of a file, as a share of the machine's memory."""
-DAMAGED = (
-    OSError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    ValueError,
-    ArithmeticError,
-    RecursionError,
-    MemoryError,
-)
-"""Errors that reading a damaged or forged file can raise, besides Arrow's own."""
+DAMAGED: tuple[type[Exception], ...] = (OSError, LookupError, TypeError, AttributeError, ValueError)
+DAMAGED += (ArithmeticError, RecursionError, MemoryError)
+"""Errors that reading a damaged file can raise, besides Arrow's own."""
 SUFFIXES = (".parquet",)
 """Suffixes of the file of a saved run, which can be read again."""
 OUTPUTS = (*SUFFIXES, ".csv", ".xlsx")
 """Suffixes of files that a run can be written to."""
-SERIES = (
-    "time",
-    "position",
-    "contact_force",
-    "head",
-    "frame",
-    "wire",
-    "head_velocity",
-    "frame_velocity",
-    "frame_force",
-    "head_force",
-)
+SERIES: tuple[str, ...] = ("time", "position", "contact_force", "head", "frame", "wire")
+SERIES += ("head_velocity", "frame_velocity", "frame_force", "head_force")
 
 
 @dataclass(frozen=True)
@@ -102,7 +70,7 @@ class Trajectory:
     nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
     # Mean force (N) for which the static force was trimmed, at the mean speed; nan: it was not
     target_mean: float = math.nan
-    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # identity of the run, plain data
+    settings: Mapping[str, Any] = field(default_factory=dict)  # identity of the run, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
@@ -315,9 +283,8 @@ class Trajectory:
     def inside(self, spans: SpanChoice = None) -> NDArray[np.bool_]:
         """Which samples lie inside the spans, (n,). Raises InputError as ``spans`` does."""
         covered = self.spans(spans)
-        if covered is None:
-            return np.ones(len(self.time), dtype=bool)
-        return self.alignment.within(self.position, covered)
+        everywhere = np.ones(len(self.time), dtype=bool)
+        return everywhere if covered is None else self.alignment.within(self.position, covered)
 
     def save(self, path: str | Path, spans: SpanChoice = None) -> None:
         """Write a Parquet, CSV or Excel file, whole or not at all, by its suffix.
@@ -345,7 +312,8 @@ class Trajectory:
                 columns[f"{name}_{k}"] = np.ascontiguousarray(column)
         facts = {"format": FORMAT} | {
             name: value.tolist() if isinstance(value := getattr(self, name), np.ndarray) else value
-            for name in _facts()
+            for name in (each.name for each in dataclasses.fields(self))
+            if name not in {*SERIES, "uplift", "dropper_force", "followers"}
         }
         facts["line"] = vars(self.line)
         masts = [self.alignment.masts] * bool(self.alignment.masts)
@@ -369,7 +337,6 @@ class Trajectory:
             raise InputError(f"{path} is for other programs: a run is read from its .parquet file only.")
         try:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
-                _check_size(file.metadata)
                 table = file.read()
             columns = {name: table[name].to_numpy() for name in table.column_names}
             facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
@@ -383,10 +350,7 @@ class Trajectory:
             supports, pitch, *masts = facts["alignment"]
             facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
             series = {name: columns[name] for name in SERIES}
-            for name, places in (
-                ("uplift", "support_position"),
-                ("dropper_force", "dropper_position"),
-            ):
+            for name, places in (("uplift", "support_position"), ("dropper_force", "dropper_position")):
                 count = sum(column.startswith(f"{name}_") for column in columns)
                 own = [columns[f"{name}_{k}"] for k in range(count)]
                 series[name] = np.array(own).T if own else np.zeros((table.num_rows, 0))
@@ -394,7 +358,7 @@ class Trajectory:
                     raise ValueError(f"columns of {name} are missing")
             followers = facts.pop("followers")
             first = cls(**series, **facts)
-            own = [follower_of(first, columns, *each) for each in enumerate(followers, start=2)]
+            own = [_follower_of(first, columns, *each) for each in enumerate(followers, start=2)]
             return dataclasses.replace(first, followers=tuple(own))
         except (pa.ArrowException, *DAMAGED) as error:
             reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
@@ -413,28 +377,10 @@ def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, 
     return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in SERIES}
 
 
-def follower_of(
-    first: Trajectory, columns: Mapping[str, Array], number: int, facts: Mapping[str, Any]
-) -> Trajectory:
-    """The record of a collector behind the first, from a file's columns; the inverse of the above."""
+def _follower_of(first: Trajectory, columns: Mapping[str, Array], number: int, facts: Any) -> Trajectory:
+    """The inverse: the record from a file's columns, and what it has of its own."""
     on_line = ~np.isnan(columns[f"{SERIES[0]}@{number}"])
     series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
     shared = {name: getattr(first, name)[on_line] for name in ("uplift", "dropper_force")}
     own: dict[str, Any] = {**series, **shared, **facts}
     return dataclasses.replace(first, **own)
-
-
-def _check_size(metadata: Any) -> None:
-    """Raise ValueError where a file's table would not fit into memory: a small file can declare a huge one.
-
-    metadata: of Parquet.
-    """
-    unpacked = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-    size = max(unpacked, 8 * metadata.num_rows * metadata.num_columns)
-    if not 0 <= size <= LARGEST * machine.memory():
-        raise ValueError(f"it would take {size / 1e9:,.1f} GB of memory")
-
-
-def _facts() -> tuple[str, ...]:
-    arrays = {*SERIES, "uplift", "dropper_force", "followers"}
-    return tuple(f.name for f in dataclasses.fields(Trajectory) if f.name not in arrays)

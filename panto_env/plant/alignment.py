@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from ..backend import NOT_NEGATIVE, inlined
 from ..base.arrays import Array, Index
 
-Spans = tuple[int, int]
-"""First and last span of a stretch, both included, counted from 1."""
+Spans = tuple[int, int]  # first and last span of a stretch, both included, counted from 1
 
 
 class AlignmentArrays(NamedTuple):

@@ -11,9 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from ..base.arrays import Array
-from ..base.ranges import Between
-from ..base.settings import Settings
-from .side_wind import SideWind
+from ..base.settings import Between, Settings
 from .wind import Wind
 
 # Wavelength (m) and amplitude (m) of the height irregularity of a smooth wire (seen in one toy model). It
@@ -32,13 +30,6 @@ Length = Annotated[float, Between(2, 2000, "m")]
 Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
 # A little may also have been gained: by friction of the pulleys, or weights too heavy.
 Lost = Annotated[float, Between(-0.1, 0.5)]
-# Ice loads of standards reach 1.5 kg/m (recalled).
-Ice = Annotated[float, Between(0, 5, "kg/m")]
-# From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
-Temperature = Annotated[float, Between(-80, 80, "K")]
-Strung = Annotated[float, Between(-40, 60, "°C")]
-# A hurricane blows with 33 m/s; trains are stopped well before.
-WindSpeed = Annotated[float, Between(-40, 40, "m/s")]
 
 
 class LineCondition(Settings):
@@ -98,7 +89,8 @@ class LineCondition(Settings):
         description="share of the messenger wire's tension that is lost, along the whole line; gained, where "
         "negative (-)",
     )
-    wind: WindSpeed = Field(
+    # A hurricane blows with 33 m/s; trains are stopped well before.
+    wind: Annotated[float, Between(-40, 40, "m/s")] = Field(
         0.0, description="mean wind along the track, at 10 m over the ground; a head wind is positive (m/s)"
     )
     # That of open country, 0.03 m rough, at 10 m by Davenport's spectrum: sqrt(6) 0.4 / ln(10 / 0.03).
@@ -107,20 +99,20 @@ class LineCondition(Settings):
         description="standard deviation of the gusts along the track over the mean wind; they are drawn at "
         "random from Davenport's spectrum (-)",
     )
-
-    ice: Ice = Field(
+    # Ice loads of standards reach 1.5 kg/m (recalled).
+    ice: Annotated[float, Between(0, 5, "kg/m")] = Field(
         0.0,
         description="ice on both wires of a flexible line, which was built without it (kg/m); a coat of "
         "10 mm on a wire of 13 mm is 0.65 kg/m at 900 kg/m^3",
     )
-
-    temperature: Temperature = Field(
+    # From the design's, at which wires were tensioned, to the coldest and hottest in the sun.
+    temperature: Annotated[float, Between(-80, 80, "K")] = Field(
         0.0,
         description="temperature of the wires less that at which the line was built (K); it acts on wires "
         "that are fixed at both ends (axial_stiffness)",
     )
     # Own choice; tables of tensions commonly begin at 10 to 15 degrees (recalled).
-    reference_temperature: Strung = Field(
+    reference_temperature: Annotated[float, Between(-40, 60, "°C")] = Field(
         15.0,
         description="temperature of the wires at which the line was built (°C); nothing but what is printed "
         "in °C depends on it",
@@ -154,9 +146,9 @@ class LineCondition(Settings):
         return Wind(self.wind, self.turbulence)
 
     @property
-    def across(self) -> SideWind:
+    def across(self) -> Wind:
         """The wind across the track."""
-        return SideWind(self.side_wind, self.turbulence)
+        return Wind(self.side_wind, self.turbulence)
 
     @property
     def in_still_air(self) -> LineCondition:
@@ -194,14 +186,8 @@ class LineCondition(Settings):
     @property
     def along_line(self) -> LineCondition:
         """What changes the wires' tension and mass all along the line, and nothing else."""
-        names = (
-            "lost_contact_tension",
-            "lost_messenger_tension",
-            "ice",
-            "temperature",
-            "reference_temperature",
-        )
-        return LineCondition(**{name: getattr(self, name) for name in names})
+        names = {"lost_contact_tension", "lost_messenger_tension", "ice", "temperature"}
+        return LineCondition(**self.model_dump(include=names | {"reference_temperature"}))
 
     @property
     def temperature_in_words(self) -> str:

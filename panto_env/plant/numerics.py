@@ -8,15 +8,13 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, field_validator
 
+from ..base.arrays import from_kmh, to_kmh
 from ..base.errors import InputError
-from ..base.ranges import Between
-from ..base.settings import Settings
-from ..base.units import from_kmh, to_kmh
+from ..base.settings import Between, Settings
 from .line_condition import LineCondition
 from .wind import SHORTEST_GUST
 
-SAMPLES_PER_WAVE = 8
-"""Time steps in which a train passes the shortest wave of the wire, for full accuracy."""
+SAMPLES_PER_WAVE = 8  # time steps in which a train passes the shortest wave of the wire, for full accuracy
 
 
 class Numerics(Settings):
@@ -79,7 +77,6 @@ class Runs(NamedTuple):
 
     @property
     def _shortest_gust(self) -> float:
-        """Time (s) in which the fastest train passes the shortest gust, infinite where there are none."""
         winds = [condition.wind for condition in self.conditions if condition.weather.gusts]
         return SHORTEST_GUST / (self.speeds[1] + max(winds)) if winds else math.inf
 
@@ -102,5 +99,4 @@ class Runs(NamedTuple):
             )
 
 
-RUNS = Runs()
-"""Runs at 250 to 300 km/h under an even wire."""
+RUNS = Runs()  # runs at 250 to 300 km/h under an even wire

@@ -1,28 +1,33 @@
-"""Lanes of trains on one line: the arrays behind the kernels."""
+"""Lanes of trains on one line: the arrays behind the kernels; and how lanes go on with one lane's state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Index, Lanes
-from ..base.errors import InputError
-from ..base.shown import beside
+from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
+from .catenary.flexible.scattered_build import slots_of_links
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
-from .drift import DRIFT_ROWS, ahead, gain
 from .line_condition import DrawnLine
 from .numerics import RUNS, Numerics, Runs
-from .pantograph.build import NONE_REFLECTED, check_compression, pantographs, rest_state
-from .pantograph.schema import PantographData
+from .pantograph.schema import (
+    NONE_REFLECTED,
+    PantographData,
+    check_compression,
+    pantographs,
+    parts,
+    rest_state,
+)
 from .pantograph.step import Part
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
-from .train import Train
+from .train import DRIFT_ROWS, Train, ahead, gain
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
 
 
@@ -146,10 +151,10 @@ class Plant:
         check_speeds(self.catenary.name, self.model.wave_speed, [speed])
 
     def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
-        """Set a collector's pantograph, with the moving mass of its actuator if it has one."""
         own = self.train.collectors[collector]
         reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
-        self.pantographs.set_lanes(collector, lanes, pantograph, self.model, reflected)
+        constants = parts(pantograph, self.model, reflected)
+        self.pantographs.table[collector, lanes, : len(constants)] = constants
 
     def start(
         self,
@@ -179,7 +184,11 @@ class Plant:
             own_waves[: line.waves.size] = line.waves.ravel()
         run.waves[lanes] = waves
         run.drift[lanes] = 0.0 if drift is None else drift
-        self._blow(lanes, drawn)
+        if run.wind.shape[1]:
+            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
+            run.wind[lanes] = [
+                own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)
+            ]
         heights = self.model.start_point.height
         heights = heights + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
         for collector in range(len(self.train.collectors)):
@@ -232,13 +241,6 @@ class Plant:
         table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
         return table
 
-    def _blow(self, lanes: Any, drawn: Sequence[DrawnLine]) -> None:
-        """Let the wind of the drawn lines blow in lanes, (n,)."""
-        if self.run.wind.shape[1]:
-            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
-            rows = [own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)]
-            self.run.wind[lanes] = rows
-
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""
         droppers = len(self.model.droppers) if tension else 0
@@ -269,7 +271,6 @@ class Plant:
         self._advance(samples, command, steps, 0, count)
 
     def _check_way(self, steps: int, samples: Samples, lanes: int) -> None:
-        """Raise InputError unless lanes can advance by ``steps``, and the samples have rows for them."""
         end, rows = self.row(Row.STEP)[:lanes] + steps, samples.rows.shape[1]
         if rows > 1 and end.max() >= rows:
             raise InputError(
@@ -287,3 +288,57 @@ class Plant:
     def advance_passively(self, steps: int, samples: Samples, lanes: int | None = None) -> None:
         """Advance the first lanes, by default all, by ``steps`` without actuators, as ``advance`` does."""
         self.advance(np.zeros((self.lanes, len(self.train.collectors), len(Place))), steps, samples, lanes)
+
+
+class Kept(NamedTuple):
+    """State of one lane of a flexible line, to go on with."""
+
+    wire: tuple[Array, ...]  # its row of each array of the wires
+    static: Array  # (links,): of its line (N)
+    gap: Array  # (links,): (m)
+    speed: float  # m/s
+    rows: tuple[Array, ...]  # of pantographs, actuators and trains
+
+
+def keep(plant: Plant, lane: int) -> Kept:
+    """The present state of one lane of a flexible line."""
+    line = plant.model.line
+    wire = tuple(array[min(lane, len(array) - 1)].copy() for array in _arrays(plant.model.wire))
+    static, gap = (each[min(lane, len(each) - 1)].copy() for each in (line.link_static, line.link_gap))
+    rows = tuple(table[..., min(lane, table.shape[-2] - 1), :].copy() for table in _tables(plant))
+    return Kept(wire, static, gap, float(plant.speed[lane]), rows)
+
+
+def go_on(plant: Plant, drawn: Sequence[DrawnLine], kept: Kept) -> None:
+    """Put the first lanes into a kept state, of this plant or of one like it, each on a line of its own.
+
+    The lines must have the kept one's tensions, and not differ from it where the train has been, nor for some
+    spans ahead of it: three for a dropper, six for a support. Closer, the force would differ from that of a
+    run from the line's start; waves ahead of a train have died out farther away.
+    """
+    line, wire = plant.model.line, plant.model.wire
+    for lane, own_line in enumerate(drawn):
+        plant.model.settle(lane, own_line, 0.0)
+        for array, own in zip(_arrays(wire), kept.wire, strict=True):
+            array[min(lane, len(array) - 1)] = own
+        if len(line.link_static) > 1:  # else all lanes have one line
+            numbers, sets, segments = slots_of_links(line, wire, lane)
+            longer = (line.link_gap[lane] - kept.gap)[numbers]
+            wire.static[lane, sets, segments] += (line.link_static[lane] - kept.static)[numbers]
+            wire.gap[lane, sets, segments] += longer
+            wire.extension[lane, sets, segments] -= longer
+    plant.speed[: len(drawn)] = kept.speed
+    for table, row in zip(_tables(plant), kept.rows, strict=True):
+        table[..., : len(drawn), :] = np.expand_dims(row, -2)
+
+
+def _arrays(tuples: Any) -> Iterator[Array]:
+    """Arrays of nested named tuples."""
+    for each in tuples:
+        yield from [each] if isinstance(each, np.ndarray) else _arrays(each)
+
+
+def _tables(plant: Plant) -> tuple[Array, ...]:
+    """Tables whose last axis but one is the lanes."""
+    run = plant.run
+    return run.table, run.waves, run.drift, run.wind, plant.pantographs.table, plant.actuators.table

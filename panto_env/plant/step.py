@@ -14,11 +14,10 @@ from .catenary.protocol import (
     record_wire,
     rise_at_contact,
 )
-from .contact import contact_force, shared_forces
-from .pantograph.step import PART, add_contact_force, move_freely
+from .functions import cosine_of_turns
+from .pantograph.step import PART, add_contact_force, contact_force, move_freely, shared_forces
 from .state import PLACE, ROW, SAMPLE_ROWS, own_row
 from .train import lift, lift_by_height, lift_by_wind, mean_stride, place_on_line
-from .trigonometry import cosine_of_turns
 
 
 @inlined

@@ -4,6 +4,13 @@ Gusts are frozen turbulence (Taylor): a pattern that the mean wind carries along
 head wind U meets a wave of length L at (v + U) / L, and a mast at U / L. The pattern is a sum of cosines, one
 in each of ``BANDS`` equal bands of the logarithm of the wavelength, with the band's share of Davenport's
 spectrum; wavelength within the band and phase are drawn.
+
+Wind across the track: its vertical gusts at any place along a line at any time, in closed form.
+
+Gusts are a sum of cosines in time and along the track. Each has a frequency from one of ``SIDE_BANDS`` equal
+bands of the logarithm of frequency, with the band's share of Panofsky's spectrum. Its wavenumber along the
+track is drawn from Cauchy's distribution of the scale C n / (2 pi U): over all draws the gusts at two places
+d apart then have Davenport's coherence exp(-C n d / U).
 """
 
 from __future__ import annotations
@@ -15,26 +22,23 @@ from typing import NamedTuple
 import numpy as np
 
 from ..backend import inlined
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
+from .functions import cosine_of_turns
 from .pantograph.schema import PantographData
-from .trigonometry import cosine_of_turns
 
 LONGEST_GUST, SHORTEST_GUST = 5000.0, 5.0
 """Wavelengths of gusts (m), own choice: 95 % of the spectrum's variance. Longer ones are a steady wind to a
 run of some km. A train at 300 km/h passes the shortest at 17 to 20 Hz, where EN 50317's low-pass ends."""
-BANDS = 30
-"""Cosines, ten to a tenfold of wavelength (own choice)."""
-DAVENPORT = 1200.0
-"""Length scale of Davenport's spectrum of the wind along its mean (m) (recalled)."""
+BANDS = 30  # cosines, ten to a tenfold of wavelength (own choice)
+DAVENPORT = 1200.0  # length scale of Davenport's spectrum of the wind along its mean (m) (recalled)
 GUST_ROWS = 1 + 3 * BANDS
 """Entries of a lane's wind: its mean (m per step); then for each cosine amplitude (m per step), turns per
 metre (1/m), phase (turns)."""
 
 
 class Wind(NamedTuple):
-    """Wind of a condition; head wind is positive."""
+    """Wind of a condition, along the track with a head wind positive, or across it."""
 
     mean: float  # m/s
     turbulence: float  # standard deviation of the gusts over the mean (-)
@@ -104,3 +108,45 @@ def wind_at(rows, x, steps):
     for k in range(1, rows.size, 3):
         total += rows[k] * cosine_of_turns(rows[k + 1] * place + rows[k + 2])
     return total
+
+
+HEIGHT = 6.0  # of the wires over the ground (m), own choice: on an embankment or a bridge gusts are slower
+SLOWEST_GUST, QUICKEST_GUST = 0.005, 3.0
+"""Reduced frequencies n z / U of gusts (-), own choice: 90 % of the spectrum's variance. Slower ones are a
+steady wind to a run of some km."""
+SIDE_BANDS = 60  # cosines, twenty to a tenfold of frequency (own choice)
+DECAY = 8.0  # c of the coherence of vertical gusts side by side (-) (recalled, low confidence: 6 to 10)
+SHORTEST_WAVE = 8.0
+"""Wavelength along the track (m) below which gusts are left out: they act on a wire in both directions at
+once (own choice)."""
+VERTICAL_SHARE = 0.5
+"""Standard deviation of the vertical gusts over that of those along the wind: the integral of Panofsky's
+spectrum is 1.5 u*^2, that of Davenport's 6 u*^2 (both recalled)."""
+SIDE_ROWS = 1 + 4 * SIDE_BANDS
+"""Entries of a lane's wind: its mean (m per step); then for each cosine amplitude (m per step), turns per
+step, turns per metre (1/m), phase (turns)."""
+
+
+def side_resolved(slowest: float = SLOWEST_GUST, quickest: float = QUICKEST_GUST) -> float:
+    """Share of the variance of Panofsky's spectrum in a band of reduced frequencies f = n z / U.
+
+    The spectrum is n S(n) / u*^2 = 6 f / (1 + 4 f)^2 (recalled), with the friction velocity u*.
+    """
+    return 1 / (1 + 4 * slowest) - 1 / (1 + 4 * quickest)
+
+
+def draw_side_wind(wind: Wind, time_step: float, random: np.random.Generator | None = None) -> Array:
+    """A lane's wind, (SIDE_ROWS,), with gusts where there is a generator to draw them from; time_step: s."""
+    rows = np.zeros(SIDE_ROWS)
+    rows[0] = wind.mean * time_step
+    if random is None or not wind.gusts:
+        return rows
+    limits = np.geomspace(SLOWEST_GUST, QUICKEST_GUST, SIDE_BANDS + 1)
+    shares = [side_resolved(slow, quick) for slow, quick in pairwise(limits)]
+    within, phase, share = random.uniform(0, 1, (3, SIDE_BANDS))
+    frequency = limits[:-1] * (limits[1:] / limits[:-1]) ** within * wind.mean / HEIGHT  # Hz
+    deviation = VERTICAL_SHARE * wind.turbulence * wind.mean
+    wavenumber = DECAY * frequency / (2 * np.pi * wind.mean) * np.tan(np.pi * (share - 0.5))
+    amplitude = deviation * np.sqrt(2 * np.array(shares)) * (abs(wavenumber) * SHORTEST_WAVE <= 1)
+    rows[1:] = np.stack([amplitude * time_step, frequency * time_step, wavenumber, phase], axis=1).ravel()
+    return rows

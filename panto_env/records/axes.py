@@ -1,16 +1,106 @@
-"""Time and place of every sample of a run, from what was recorded: time, position or speed, two of them."""
+"""Time and place of samples: what an odometer says, where a run is cut, and its pieces of even steps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from ..base.errors import InputError
-from .odometer import BACK, even_ways, standing
+from ..base.record_columns import equal_step
+from .record import Piece
+
+BACK = 1.0
+"""Way (m) up to which a position that falls is noise of the odometer. Beyond, the train runs back, or the
+odometer was reset if that is the way of a single step."""
+AHEAD = 3.0
+"""How many times as far as the speed explains a position may step forward, beside ``BACK``."""
+STANDING = 1.0
+"""Time (s) from which on a position that does not change means that the train stands."""
+
+
+def standing(time: Array, position: Array, gap: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples at which the train stands, (n,), by time (s) and position (m), (n,); gap as in ``Axes``."""
+    still = np.concatenate([[False], (np.diff(position) == 0) & ~gap, [False]])
+    begins, ends = np.flatnonzero(still[1:] & ~still[:-1]), np.flatnonzero(~still[1:] & still[:-1])
+    found = np.zeros(len(time), dtype=bool)
+    for begin, end in zip(begins, ends, strict=True):
+        if time[end] - time[begin] > STANDING:
+            found[begin : end + 1] = True
+    return found
+
+
+def resets(time: Array, position: Array, step: float, gap: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the position jumps between a sample and the next, (n - 1,).
+
+    time (s) and position (m), (n,); step, the usual one of time (s), and gap as in ``Axes``.
+    """
+    ways, steps = np.diff(position), np.diff(time)
+    usual = float(np.median(ways[ways > 0] / steps[ways > 0])) if (ways > 0).any() else 0.0
+    coarse = float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0  # steps of the odometer itself
+    return np.asarray((ways < -BACK) | (ways > AHEAD * max(usual * step, coarse) + BACK) & ~gap)
+
+
+def runs_back(position: Array, apart: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples behind the one at which the train turns back, up to where it turns forward again, (n,).
+
+    position: m, (n,); apart: whether the position before says nothing of the next one, (n - 1,): from there
+    on the train is taken to run forward. It has turned where it is ``BACK`` away from where it was furthest.
+    """
+    back = np.zeros(len(position), dtype=bool)
+    first = np.concatenate([[0], np.flatnonzero(apart) + 1, [len(position)]])
+    for begin, end in pairwise(first.tolist()):
+        part = position[begin:end]
+        if (part >= np.maximum.accumulate(part) - BACK).all():  # as in nearly all records, which are long
+            continue
+        since, sign, far = 0, 1.0, 0  # the first sample of this direction, and the one that is furthest
+        values = part.tolist()
+        for k, here in enumerate(values):
+            ahead = sign * (here - values[far])
+            if ahead >= 0:
+                far = k
+            elif ahead < -BACK:
+                turn = far + 1 if far else 0  # where it runs back from the first sample on, that is no turn
+                back[begin + since : begin + turn] = sign < 0
+                since, sign, far = turn, -sign, k
+        back[begin + since : end] = sign < 0
+    return back
+
+
+def rising(position: Array) -> Array:
+    """Positions (m), (n,), without the noise and the steps of an odometer: they rise from each sample on.
+
+    Between samples at which the position has grown it grows evenly; behind the last of them, as before it.
+    """
+    highest = np.maximum.accumulate(position)
+    new = np.flatnonzero(np.diff(highest, prepend=-np.inf) > 0)
+    if len(new) == len(position) or len(new) < 2:
+        return position
+    number = np.arange(len(position))
+    even = np.interp(number, new, highest[new])
+    first, last = new[0], new[-1]
+    rate = (highest[last] - highest[first]) / (last - first)
+    even[last:] = highest[last] + rate * (number[last:] - last)
+    return np.asarray(even)
+
+
+def even_ways(position: Array, apart: NDArray[np.bool_], still: NDArray[np.bool_]) -> Array:
+    """Positions (m), (n,), as ``rising`` between those apart, falling as evenly where the train runs back.
+
+    apart: as in ``runs_back``; still: where the train stands, (n,), which stays one position.
+    """
+    back = runs_back(position, apart)
+    change = apart | (back[1:] != back[:-1]) | (still[1:] != still[:-1])
+    even = position.copy()
+    for begin, end in pairwise([0, *(np.flatnonzero(change) + 1).tolist(), len(position)]):
+        sign = -1.0 if back[begin] else 1.0
+        even[begin:end] = sign * rising(sign * position[begin:end])
+    return even
+
 
 GAP = 1.5
 """Steps of time from which on samples are missing between two."""
@@ -116,3 +206,81 @@ def _long(steps: Array) -> NDArray[np.bool_]:
     grain = float(steps[steps > 0].min())
     rounded = min(float(np.quantile(steps, 1 - 1 / RARE)), 2 * grain)
     return np.asarray(steps > max(GAP * _usual(steps), 1.25 * rounded))
+
+
+SHORTEST = 1.0
+"""Pieces below this duration (s) are left out: EN 50317's low-pass settles within a fifth of it."""
+RUNS_BACK = "the train runs back"
+"""Reason of the break at which a train turns back: positions are counted in one direction only."""
+
+
+@dataclass(frozen=True)
+class Break:
+    """Why a run is cut, and where it first is."""
+
+    reason: str
+    count: int
+    position: float  # m
+    time: float  # s
+
+
+def cut(
+    run: str, axes: Axes, force: Array, series: Mapping[str, Array], raised: Array | None
+) -> tuple[list[Piece], list[Break]]:
+    """Pieces of a run, and why they end.
+
+    force: N, (n,), nan where missing; series: ``height`` and ``uplift`` (m), (n,), where recorded; raised: 1
+    where the pantograph is up, (n,). Raises InputError where steps of time within a piece are not equal.
+    """
+    still = standing(axes.time, axes.position, axes.gap)
+    down = np.zeros(len(force), dtype=bool) if raised is None else ~(raised > 0.5)
+    empty = np.isnan(force) & ~down
+    reset = resets(axes.time, axes.position, axes.step, axes.gap)
+    back = runs_back(axes.position, axes.gap | reset)
+    breaks = [
+        _break("samples are missing", axes, np.flatnonzero(axes.gap)),
+        _break("the position jumps, as an odometer that is reset", axes, np.flatnonzero(reset & ~axes.gap)),
+        _break("the force is missing", axes, _begins(empty)),
+        _break("the pantograph is down", axes, _begins(down)),
+        _break("the train stands", axes, _begins(still)),
+        _break(RUNS_BACK, axes, _begins(back)),
+    ]
+    good = ~(still | back | down | empty)
+    apart = axes.gap | reset | (good[1:] != good[:-1])
+    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(force)]
+    parts = [slice(begin, end) for begin, end in pairwise(edges) if good[begin]]
+    long = [
+        each for each in parts if axes.time[each.stop - 1] - axes.time[each.start] >= SHORTEST - axes.step
+    ]
+    short = np.array([each.start for each in parts if each not in long], dtype=int)
+    breaks.append(_break(f"a piece is shorter than {SHORTEST:g} s", axes, short))
+    pieces = [_piece(run, axes, force, series, each) for each in long]
+    return pieces, [each for each in breaks if each.count]
+
+
+def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part: slice) -> Piece:
+    time, own = axes.time[part], {name: values[part] for name, values in series.items()}
+    own = {name: values for name, values in own.items() if not np.isnan(values).all()}
+    position, forces = rising(axes.position[part]), force[part]
+    step = axes.step if axes.over_place else equal_step(time, 2, "to be judged")
+    if axes.over_place:
+        from scipy.interpolate import PchipInterpolator  # slow to import; it keeps 0 N at 0 N
+
+        equal = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
+        forces = np.asarray(PchipInterpolator(time, forces)(equal))
+        position, own = (
+            np.interp(equal, time, position),
+            {k: np.interp(equal, time, v) for k, v in own.items()},
+        )
+    return Piece(run, step, float(time[0]), position, forces, own.get("height"), own.get("uplift"))
+
+
+def _break(reason: str, axes: Axes, places: Index) -> Break:
+    """places: numbers of the samples at which the run is cut, or before which."""
+    first = int(places[0]) if places.size else 0
+    return Break(reason, len(places), float(axes.position[first]), float(axes.time[first]))
+
+
+def _begins(where: NDArray[np.bool_]) -> Index:
+    """Numbers of the samples at which stretches, (n,), begin."""
+    return np.flatnonzero(where & ~np.concatenate([[False], where[:-1]]))

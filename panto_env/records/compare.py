@@ -7,21 +7,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
-from ..metrics.criterion import Criterion
-from ..metrics.labels import LABELS
+from ..base.table import Table
+from ..metrics.compliance import Criterion, criteria_table
+from ..metrics.figures import LABELS
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
-from .record import Record
-from .samples import Samples
-from .shift import Shift, find_shift
+from ..terminal import number
+from .record import Record, Samples, Shift, find_shift
 
 SAME_SPEED = 0.03
 """Relative difference of speeds, mean and local, up to which a record is compared with a run. Own choice."""
@@ -104,31 +103,28 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
     )
-    criteria = (*_limits(figures, uplift, where, height), alike, *_information(figures))
-    return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
-
-
-def _limits(
-    figures: dict[str, tuple[float, float]], uplift: float, where: str, height: float
-) -> list[Criterion]:
-    measured, simulated = figures["std"]
-    std = 100 * (simulated / measured - 1)
-    heights = "mean over the spans of the range within each, low-passed at 20 Hz"
-    return [
-        Criterion("std", "σ of the contact force", "%", std, -STD, STD, SOURCE),
+    heights_note = "mean over the spans of the range within each, low-passed at 20 Hz"
+    criteria = (
+        Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
         Criterion(
-            "height", "range of the contact point's height", "mm", height, -HEIGHT, HEIGHT, SOURCE, heights
+            "height",
+            "range of the contact point's height",
+            "mm",
+            height,
+            -HEIGHT,
+            HEIGHT,
+            SOURCE,
+            heights_note,
         ),
-    ]
-
-
-def _information(figures: dict[str, tuple[float, float]]) -> list[Criterion]:
-    return [
-        Criterion(key, LABELS[key].name, "N", simulated - measured)
-        for key, (measured, simulated) in figures.items()
-        if key != "std"
-    ]
+        alike,
+        *(
+            Criterion(key, LABELS[key].name, "N", simulated - measured)
+            for key, (measured, simulated) in figures.items()
+            if key != "std"
+        ),
+    )
+    return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
 
 
 _STATISTICS = {
@@ -140,7 +136,6 @@ _STATISTICS = {
 
 
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
-    """The record's pieces at the run's speed, and notes."""
     same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
     if not same:
         raise InputError(
@@ -190,7 +185,6 @@ def _spans(
 
 
 def _check_speed(speed: Array, run: Trajectory, begin: float, end: float) -> None:
-    """Raise InputError unless local speeds (m/s), (m,), from begin to end (m), are about the run's."""
     away = float(np.abs(speed / run.speed - 1).max())
     if away > SAME_SPEED:
         low, high = to_kmh(float(speed.min())), to_kmh(float(speed.max()))
@@ -236,3 +230,77 @@ def _uplift(samples: Samples, run: Trajectory, begin: float, end: float) -> tupl
         f"and {1e3 * simulated:.1f} mm simulated at the support at {place:.6g} m"
     )
     return 1e3 * (simulated - measured), words
+
+
+def figures_table(found: Comparison) -> Table:
+    """Statistics of both forces over the common spans."""
+    rows = [
+        (LABELS[key].heading, number(measured), number(simulated), _signed(simulated - measured))
+        for key, (measured, simulated) in found.figures.items()
+    ]
+    first, last = found.spans[0], found.spans[-1]
+    title = f"{len(found.spans)} common spans, {first.begin:,.0f} to {last.end:,.0f} m"
+    return Table(title, ("figure", "record", "run", "run − record"), rows)
+
+
+def acceptance_table(found: Comparison) -> Table:
+    """Deviations with limits, and what was not measured."""
+    table = criteria_table(found.criteria, "Deviations, run minus record")
+    told = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
+    return Table(table.title, ("deviation of", *table.headings[1:]), told)
+
+
+def spans_table(found: Comparison) -> Table:
+    """Figures span by span: record, run, and for the standard deviation how much they differ."""
+    rows = [
+        (
+            found.run.alignment.span_name(each.span),
+            f"{each.begin:,.6g}",
+            *(number(value) for key in _STATISTICS for value in getattr(each, key)),
+            _signed(deviation(each.std)),
+        )
+        for each in found.spans
+    ]
+    short = [f"{LABELS[key].short} {whose}" for key in _STATISTICS for whose in ("rec.", "run")]
+    return Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
+
+
+def deviation(pair: tuple[float, float]) -> float:
+    """Deviation of a run's standard deviation from a record's (%)."""
+    measured, simulated = pair
+    return 100 * (simulated / measured - 1)
+
+
+def _signed(value: float) -> str:
+    """A difference with its sign, and never "-0.0"."""
+    return f"{value:+z.1f}"
+
+
+def shift_sentence(found: Comparison) -> str:
+    """The shift that was found, how sure it is, and what else came near."""
+    shift = found.shift
+    value = round(shift.value, 2) + 0.0
+    text = f"The record is shifted by {value:+.2f} m, where the forces correlate with {shift.correlation:.3f}"
+    if shift.other_correlation > 0:
+        text += f"; the next best shift is {shift.other:+.0f} m with {shift.other_correlation:.3f}"
+    return f"{text} (searched from {shift.search[0]:+.0f} to {shift.search[1]:+.0f} m)."
+
+
+def criterion_notes(found: Comparison) -> list[str]:
+    """Sentences on how deviations were found."""
+    return [f"{each.name}: {each.note}." for each in found.criteria if each.note]
+
+
+def plain(found: Comparison) -> dict[str, Any]:
+    """All that was found, as plain data; pairs are of record and run."""
+    return {
+        "record": found.samples.record.name,
+        "shift": vars(found.shift),
+        "accepted": found.accepted,
+        "verdict": found.verdict,
+        "figures": found.figures,
+        "criteria": [each.as_dict() for each in found.criteria],
+        "missing": list(found.missing),
+        "spans": [each._asdict() for each in found.spans],
+        "notes": list(found.notes),
+    }

@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh, to_kmh
-from ..metrics.compliance import LineFacts, compliance
-from ..metrics.criterion import Criterion
-from ..metrics.figures import ARC, Figures, arcing, contact_loss
-from ..metrics.spectrum import amplitudes
+from ..base.table import Table
+from ..metrics.compliance import Criterion, LineFacts, compliance, criteria_table, remarks
+from ..metrics.figures import ARC, HEADINGS, LABELS, Figures, arcing, contact_loss
+from ..metrics.low_pass import amplitudes
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
-from .record import Record
-from .samples import ABOVE, Samples
+from ..terminal import number
+from .record import ABOVE, Record, Samples
 
 CLASS_KMH, FIRST_KMH = 20.0, 15.0
 """Width of a class of speeds, and where one begins (km/h): a train at 200 or 300 km/h is in one class, not on
@@ -93,8 +92,10 @@ def judge(
     runs = list(dict.fromkeys(piece.run for piece in record.pieces))
     if len(runs) > 1:
         parts += [_part(samples, "run", f"run {name}", samples.run == k) for k, name in enumerate(runs)]
-    number = np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
-    classes = [_part(samples, "speed", _class_name(k), number == k) for k in np.unique(number)]
+    low = FIRST_KMH + CLASS_KMH * np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
+    classes = [
+        _part(samples, "speed", f"{max(k, 0):g}-{k + CLASS_KMH:g} km/h", low == k) for k in np.unique(low)
+    ]
     parts += classes
     edges = _section_edges(samples.position, line, section)
     at = np.searchsorted(edges, samples.position, side="right") - 1
@@ -128,11 +129,6 @@ def force_spectrum(record: Record) -> tuple[Array, Array]:
     return found[0][0], np.sqrt(np.mean([own**2 for _, own in found], axis=0))
 
 
-def _class_name(number: float) -> str:
-    begin = FIRST_KMH + CLASS_KMH * number
-    return f"{max(begin, 0):g}-{begin + CLASS_KMH:g} km/h"
-
-
 def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) -> Part:
     force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
     speed = float(samples.speed[inside].mean())
@@ -154,15 +150,14 @@ def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) ->
 
 
 def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -> list[Part]:
-    """Parts of the spans within reach (m), that runs cover together."""
     numbers, found = alignment.span_of(samples.position), []
-    for number in np.unique(numbers):
-        begin, end = alignment.limits((int(number), int(number)))
+    for span in np.unique(numbers):
+        begin, end = alignment.limits((int(span), int(span)))
         if begin < reach[0] - 1e-6 or end > reach[1] + 1e-6:
             continue
-        words = f"{alignment.span_name(int(number))}: {begin:,.6g} to {end:,.6g} m"
-        if samples.way(numbers == number) >= COVERED * (end - begin):
-            found.append(_part(samples, "span", words, numbers == number))
+        words = f"{alignment.span_name(int(span))}: {begin:,.6g} to {end:,.6g} m"
+        if samples.way(numbers == span) >= COVERED * (end - begin):
+            found.append(_part(samples, "span", words, numbers == span))
     return found
 
 
@@ -242,4 +237,118 @@ def _beyond(samples: Samples, reach: tuple[float, float]) -> list[str]:
     return [
         f"The record runs from {begin:,.0f} to {end:,.0f} m, and spans are known from {known}: what lies "
         "beyond counts in all figures but those by span."
+    ]
+
+
+SHOWN = {
+    "mean": 1,
+    "std": 1,
+    "statistical_max": 1,
+    "statistical_min": 1,
+    "max": 1,
+    "min": 1,
+    "contact_loss": 2,
+}
+"""Figures in the columns of tables, and their decimals."""
+ARCING = "arcing NQ (%)"
+TITLES = {
+    "run": "By run",
+    "speed": "By speed, of each second about a sample",
+    "section": "By section",
+    "span": "By span",
+}
+"""Titles of the tables of each kind of part, but for the whole."""
+FILE_HEADINGS = HEADINGS | {"arcing": "arcing (%)", "speed_kmh": "speed (km/h)"}
+
+
+def whole_table(found: Judgement, title: str) -> Table:
+    """Figures of the whole record, one below the other."""
+    part = found.whole
+    rows = [
+        (LABELS[key].heading, number(getattr(part.figures, key), digits)) for key, digits in SHOWN.items()
+    ]
+    rows += [
+        (ARCING, number(part.arcing, 3)),
+        (LABELS["distance"].heading, f"{part.figures.distance:,.0f}"),
+        ("mean speed (km/h)", number(to_kmh(part.speed))),
+        ("samples", f"{part.samples:,}"),
+        ("samples a second", number(1 / found.samples.step)),
+    ]
+    return Table(title, ("figure", "value"), rows)
+
+
+def part_tables(found: Judgement) -> list[Table]:
+    """Tables by run, speed, section and span, of those kinds that have more than one part, or are spans."""
+    tables = []
+    for kind, title in TITLES.items():
+        parts = found.of(kind)
+        if len(parts) > 1 or (kind == "span" and parts):
+            tables.append(_parts_table(parts, title))
+    return tables
+
+
+def _parts_table(parts: list[Part], title: str) -> Table:
+    long = [] if parts[0].kind == "span" else ["distance (m)"]
+    short = [LABELS[key].short_heading for key in SHOWN]
+    rows = [
+        (
+            part.where,
+            *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
+            number(part.arcing, 2),
+            *(number(part.figures.distance, 0) for _ in long),
+            number(to_kmh(part.speed), 0),
+        )
+        for part in parts
+    ]
+    return Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
+
+
+def requirements_table(found: Judgement) -> Table:
+    """Requirements at the mean speed of each class of speeds."""
+    if len(found.requirements) == 1:
+        part, criteria = found.requirements[0]
+        return criteria_table(criteria, f"Requirements at {to_kmh(part.speed):.1f} km/h")
+    rows: list[tuple[str | float, ...]] = []
+    ends, headings = [], criteria_table([], "").headings
+    for part, criteria in found.requirements:
+        rows += [(part.where, *row) for row in criteria_table(criteria, "").rows]
+        ends.append(len(rows) - 1)
+    title = "Requirements by speed, at the mean of each class"
+    return Table(title, ("speed", *headings), rows, text_columns=2, section_ends=tuple(ends))
+
+
+def requirement_remarks(found: Judgement) -> list[str]:
+    """Notes on requirements, each once, and values without limits where there is one class of speeds."""
+    alone = len(found.requirements) == 1
+    kept = [each for _, criteria in found.requirements for each in criteria if alone or each.limited]
+    return list(dict.fromkeys(line for each in kept for line in remarks([each])))
+
+
+def plain(found: Judgement) -> dict[str, Any]:
+    """All figures, requirements and notes as plain data."""
+    return {
+        "record": found.samples.record.name,
+        "low_passed": found.samples.low_passed,
+        "parts": rows_of(found),
+        "requirements": [
+            {"where": part.where, "criteria": [each.as_dict() for each in criteria]}
+            for part, criteria in found.requirements
+        ],
+        "notes": list(found.notes),
+    }
+
+
+def rows_of(found: Judgement) -> list[dict[str, Any]]:
+    """A row for each part, with the names of ``Figures``, for a file or as plain data."""
+    return [
+        {
+            "kind": part.kind,
+            "where": part.where,
+            **{key: getattr(part.figures, key) for key in SHOWN},
+            "arcing": part.arcing,
+            "distance": part.figures.distance,
+            "speed_kmh": to_kmh(part.speed),
+            "samples": part.samples,
+        }
+        for part in found.parts
     ]

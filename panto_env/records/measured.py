@@ -40,6 +40,10 @@ def measured(
         end, begin = (np.interp(time + half, edges, integral) for half in (0.5 * step, -0.5 * step))
         return np.asarray((end - begin) / step)
 
+    uplift = None
+    if run.uplift.size:  # of the support in the middle of the run
+        middle = int(np.argmin(np.abs(run.support_position - run.distance / 2)))
+        uplift = np.asarray(np.interp(time, run.time + 0.5 * run.time_step, run.uplift[:, middle]))
     noise = force_noise * np.random.default_rng(seed).standard_normal(count)
     piece = Piece(
         run="",
@@ -48,14 +52,6 @@ def measured(
         position=np.interp(time, run.time, run.position) + position_error,
         force=seen(run.contact_force) + noise,
         height=seen(run.wire),
-        uplift=_uplift(run, time),
+        uplift=uplift,
     )
     return Record(name or f"{run.pantograph} on {run.catenary} at {run.speed_kmh:g} km/h", (piece,))
-
-
-def _uplift(run: Trajectory, time: Array) -> Array | None:
-    """Uplift of the support in the middle of the run, (n,), m; None where the line has no supports."""
-    if not run.uplift.size:
-        return None
-    middle = int(np.argmin(np.abs(run.support_position - run.distance / 2)))
-    return np.asarray(np.interp(time, run.time + 0.5 * run.time_step, run.uplift[:, middle]))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import overload
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
-from ..base.units import to_kmh
 from .record import Piece
 
 FORCE = (5.0, 1000.0)
@@ -76,7 +74,7 @@ def check_axes(run: str, time: Array | None, position: Array | None) -> None:
     They are refused, too, where rows are not in order. run: words for messages, such as " of run 'a'" or
     nothing.
     """
-    rises, ahead = (_direction(each) for each in (time, position))
+    rises, ahead = (None if each is None else _direction(each) for each in (time, position))
     if rises is not None and rises <= 0 and (ahead is None or ahead > 0):
         other, advice = (", but the position does", "swapped") if ahead else ("", "the right column")
         them = "the two are" if ahead else "it is"
@@ -159,12 +157,6 @@ def _check_order(run: str, speed: float) -> None:
         )
 
 
-@overload
-def _direction(values: None) -> None: ...
-@overload
-def _direction(values: Array) -> float: ...
-def _direction(values: Array | None) -> float | None:
+def _direction(values: Array) -> float:
     """1 where most steps rise, -1 where most of those that are not 0 fall, 0 where none is either."""
-    if values is None:
-        return None
     return float(np.sign(np.sign(np.diff(values)).sum()))

@@ -1,23 +1,38 @@
-"""Pictures of a record, and of a record over a run. Matplotlib is imported late: it is slow to import."""
+"""Pictures and pages of a record, alone and over a run. Matplotlib is imported late: it is slow to import."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..base import marks
+from ..base import plotting as marks
 from ..base.arrays import Array
-from ..base.colours import BLUE, LIMIT, ORANGE
-from ..base.legend import legend_above
+from ..base.checksums import __version__
+from ..base.files import PAGES, check_output, write_whole
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.table import Alarm, Table
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from .compare import Comparison
-from .judge import Judgement, force_spectrum
+from ..report.charts import drawn
+from ..report.page import FILTER, page_template
+from .compare import Comparison, acceptance_table, criterion_notes, figures_table, shift_sentence, spans_table
+from .judge import (
+    Judgement,
+    force_spectrum,
+    part_tables,
+    requirement_remarks,
+    requirements_table,
+    whole_table,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 HIGHEST = 25.0
 """Maximum frequency of spectra (Hz)."""
@@ -29,14 +44,30 @@ MOST_SUPPORTS = 60
 
 def plot_record(found: Judgement, title: str) -> Figure:
     """Contact force along the line, raw and low-passed, above its spectrum."""
+    return _pair(title, found, draw_force, draw_spectrum, "both")
+
+
+def plot_comparison(found: Comparison, title: str) -> Figure:
+    """Both forces by place, above the standard deviation of each in every common span."""
+    return _pair(title, found, draw_overlay, draw_spans, "y")
+
+
+def _pair(
+    title: str,
+    found: Any,
+    draw_upper: Callable[[Axes, Any], None],
+    draw_lower: Callable[[Axes, Any], None],
+    grid: Literal["both", "y"],
+) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 7), layout="constrained")
-    force, spectrum = figure.subplots(2, 1, height_ratios=(3, 2))
-    draw_force(force, found)
-    draw_spectrum(spectrum, found)
-    for axis in (force, spectrum):
-        axis.grid(color="0.92", axis="y" if axis is force else "both")
+    upper, lower = figure.subplots(2, 1, height_ratios=(3, 2))
+    draw_upper(upper, found)
+    draw_lower(lower, found)
+    upper.grid(color="0.92", axis="y")
+    lower.grid(color="0.92", axis=grid)
+    for axis in (upper, lower):
         axis.set_axisbelow(True)
     figure.suptitle(title, fontsize="medium", x=0.01, ha="left")
     return figure
@@ -91,21 +122,6 @@ def _thin(position: Array, force: Array) -> tuple[Array, Array]:
     return position[shown], force[shown]
 
 
-def plot_comparison(found: Comparison, title: str) -> Figure:
-    """Both forces by place, above the standard deviation of each in every common span."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    force, spans = figure.subplots(2, 1, height_ratios=(3, 2))
-    draw_overlay(force, found)
-    draw_spans(spans, found)
-    for axis in (force, spans):
-        axis.grid(color="0.92", axis="y")
-        axis.set_axisbelow(True)
-    figure.suptitle(title, fontsize="medium", x=0.01, ha="left")
-    return figure
-
-
 def draw_overlay(axes: Axes, found: Comparison) -> None:
     """Draw both forces, low-passed without delay, by place over the common spans, with supports."""
     begin, end = found.spans[0].begin, found.spans[-1].end
@@ -129,3 +145,61 @@ def draw_spans(axes: Axes, found: Comparison) -> None:
     axes.set(xlabel="span", ylabel="standard deviation σ (N)")
     axes.set_xticks(at[:: -(-len(at) // 20)])
     legend_above(axes, 2)
+
+
+def save_record_page(found: Judgement, title: str, path: str | Path) -> None:
+    """Write the page of a record, whole or not at all. Raises InputError for a name with another suffix."""
+    supports = found.alignment is not None
+    charts = [
+        (
+            "Contact force along the line",
+            drawn(lambda axes: draw_force(axes, found), along_line=supports),
+        ),
+        ("Spectrum of the force as recorded", drawn(lambda axes: draw_spectrum(axes, found))),
+    ]
+    shown = [
+        whole_table(found, "Figures of the whole record"),
+        requirements_table(found),
+        *part_tables(found),
+    ]
+    _save(title, FILTER, found.notes, charts, shown, requirement_remarks(found), path)
+
+
+def save_comparison_page(found: Comparison, title: str, path: str | Path) -> None:
+    """Write the page of a record beside a run, as ``save_record_page`` does."""
+    charts = [
+        (
+            "Both forces by place, low-passed at 20 Hz, not delayed",
+            drawn(lambda axes: draw_overlay(axes, found), along_line=True),
+        ),
+        ("Standard deviation by span", drawn(lambda axes: draw_spans(axes, found))),
+    ]
+    shown = [acceptance_table(found), figures_table(found), spans_table(found)]
+    words = f"The simulation is {found.verdict}. {shift_sentence(found)} {FILTER}"
+    _save(title, words, found.notes, charts, shown, criterion_notes(found), path)
+
+
+def _save(
+    title: str,
+    introduction: str,
+    notes: Sequence[str],
+    charts: Sequence[tuple[str, str]],
+    shown: Sequence[Table],
+    sentences: Sequence[str],
+    path: str | Path,
+) -> None:
+    check_output(path, PAGES)
+    template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
+    style = (files("panto_env.report") / "templates" / "style.css").read_text(encoding="utf-8")
+    text = template.render(
+        version=__version__,
+        title=title,
+        style=style,
+        introduction=introduction,
+        notes=notes,
+        charts=charts,
+        tables=shown,
+        remarks=sentences,
+    )
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

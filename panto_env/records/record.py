@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
+from ..base.errors import InputError
+from ..metrics.low_pass import CUTOFF, band_rms, low_pass, zero_phase_low_pass
+from ..metrics.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -56,3 +61,206 @@ class Record:
     def longest(self) -> Piece:
         """The piece that covers the longest way."""
         return max(self.pieces, key=lambda piece: piece.length)
+
+
+SETTLING = 0.2
+"""Time (s) at the begin of each piece that is left out of filtered figures: by then EN 50317's filter, which
+starts settled at the first sample, has forgotten all but 0.2 % of what that was wrong by."""
+SPEED_OVER = 1.0
+"""Time (s) over which the local speed is a mean, since odometers count in steps."""
+ABOVE, LITTLE = 30.0, 0.05
+"""Frequency (Hz) above which a force that was low-passed at 20 Hz has less than this share of what it has up
+to 20 Hz, by rms. Behind EN 50317's filter simulated forces have 0.2 to 1.4 %, behind one of fourth order up
+to 3.4 %, raw ones 7 to 40 %."""
+
+
+def is_low_passed(piece: Piece) -> bool:
+    """Whether the force of a piece was low-passed at about 20 Hz before it was recorded."""
+    if piece.filtered is not None:
+        return piece.filtered <= CUTOFF
+    force = (piece.force - piece.force.mean()) * np.hanning(len(piece.force))
+    above = band_rms(force, piece.time_step, ABOVE, 0.5 / piece.time_step)
+    return above < LITTLE * band_rms(force, piece.time_step, 0.0, CUTOFF)
+
+
+def local_speed(piece: Piece) -> Array:
+    """Speed at each sample, the mean over ``SPEED_OVER`` about it, (n,), m/s."""
+    half, count = round(0.5 * SPEED_OVER / piece.time_step), len(piece.force)
+    begin = np.clip(np.arange(count) - half, 0, None)
+    end = np.clip(np.arange(count) + half, None, count - 1)
+    return np.asarray((piece.position[end] - piece.position[begin]) / ((end - begin) * piece.time_step))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The n samples of a record's pieces, one piece behind the other."""
+
+    record: Record
+
+    @cached_property
+    def slices(self) -> list[slice]:
+        """Samples of each piece."""
+        ends = np.cumsum([len(piece.force) for piece in self.record.pieces])
+        pairs = zip(ends.tolist(), self.record.pieces, strict=True)
+        return [slice(end - len(piece.force), end) for end, piece in pairs]
+
+    @cached_property
+    def low_passed(self) -> bool:
+        """Whether the record holds low-passed forces: then they are judged as they are, losses not at all."""
+        return is_low_passed(self.record.longest)
+
+    @property
+    def shows_losses(self) -> bool:
+        """Whether losses of contact can be seen: behind a low-pass the force does not fall to 0."""
+        return not self.low_passed and self.record.longest.filtered is None
+
+    @cached_property
+    def raw(self) -> Array:
+        """(n,): contact force as recorded (N)."""
+        return np.concatenate([piece.force for piece in self.record.pieces])
+
+    @cached_property
+    def filtered(self) -> Array:
+        """(n,): contact force behind EN 50317's low-pass (N), or as recorded where it was low-passed."""
+        if self.low_passed:
+            return self.raw
+        return np.concatenate([low_pass(piece.force, piece.time_step) for piece in self.record.pieces])
+
+    @cached_property
+    def in_place(self) -> Array:
+        """(n,): as ``filtered``, but without delay (N), for pictures and for comparisons by place."""
+        if self.low_passed:
+            return self.raw
+        return np.concatenate(
+            [zero_phase_low_pass(piece.force, piece.time_step) for piece in self.record.pieces]
+        )
+
+    @cached_property
+    def settled(self) -> NDArray[np.bool_]:
+        """(n,): samples whose filtered force counts."""
+        if self.low_passed:
+            return np.ones(len(self.raw), dtype=bool)
+        pieces = self.record.pieces
+        return np.concatenate([np.arange(len(one.force)) * one.time_step >= SETTLING for one in pieces])
+
+    @cached_property
+    def position(self) -> Array:
+        """(n,): along the line (m)."""
+        return np.concatenate([piece.position for piece in self.record.pieces])
+
+    @cached_property
+    def until(self) -> Array:
+        """(n,): position of the next sample of the piece (m), of its last one as the speed has it."""
+        found = []
+        for piece in self.record.pieces:
+            last = piece.position[-1] + piece.time_step * local_speed(piece)[-1]
+            found.append(np.append(piece.position[1:], last))
+        return np.concatenate(found)
+
+    def way(self, inside: NDArray[np.bool_]) -> float:
+        """Way (m) that samples inside, (n,), cover; what several pieces cover counts once."""
+        begin, end = self.position[inside], self.until[inside]
+        order = np.argsort(begin, kind="stable")
+        begin, end = begin[order], np.maximum.accumulate(end[order])
+        covered = np.concatenate([begin[:1], end[:-1]])  # up to where those before have been
+        return float(np.maximum(end - np.maximum(begin, covered), 0.0).sum())
+
+    @cached_property
+    def speed(self) -> Array:
+        """(n,): local speed (m/s)."""
+        return np.concatenate([local_speed(piece) for piece in self.record.pieces])
+
+    @cached_property
+    def run(self) -> NDArray[np.intp]:
+        """(n,): number of the run of each sample, by its first appearance from 0."""
+        names = list(dict.fromkeys(piece.run for piece in self.record.pieces))
+        counts = [len(piece.force) for piece in self.record.pieces]
+        return np.repeat([names.index(piece.run) for piece in self.record.pieces], counts)
+
+    @property
+    def step(self) -> float:
+        """Time from a sample to the next (s), the same in all pieces but for rounding."""
+        return self.record.pieces[0].time_step
+
+
+GRID = 0.25
+"""Distance of the places (m) at which forces are compared: at 300 km/h, 20 Hz have a wavelength of 4 m."""
+SEARCH, NEAR = 1.5, 0.5
+"""Spans on each side within which a shift is searched: without any idea, and about one that is given."""
+ENOUGH = 0.5
+"""Share of the way that the best-covered shift has in common with the run, from which others count."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What is added to a record's positions (m), and how well the forces then correlate."""
+
+    value: float  # m
+    correlation: float
+    other: float  # m, the next best one at least a quarter of a span away; nan for none
+    other_correlation: float
+    search: tuple[float, float]  # m
+
+
+def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near: float | None) -> Shift:
+    """The shift with the highest correlation of forces without delay, from begin to end (m) of a run.
+
+    A line of equal spans correlates at every span: the next best shift says how sure the best one is.
+
+    near: about the shift (m), if known. Raises InputError where a record has less than a span in common with
+    the run, wherever it is shifted.
+    """
+    span = run.alignment.mean_length
+    middle, reach = (0.0, SEARCH * span) if near is None else (near, NEAR * span)
+    lags = middle + GRID * np.arange(-math.ceil(reach / GRID), math.ceil(reach / GRID) + 1)
+    places = np.arange(begin, end, GRID)
+    own = np.interp(places, run.position, zero_phase_low_pass(run.contact_force, run.time_step))
+    # The record on a grid that reaches further on both sides: a shift by a step is one by an index.
+    there = begin - lags[-1] + GRID * np.arange(len(places) + len(lags) - 1)
+    pieces = [
+        np.interp(there, samples.position[part], samples.in_place[part], left=np.nan, right=np.nan)
+        for part in samples.slices
+    ]
+    # Lag k reads the record at places - lags[k], which begins at index len(lags) - 1 - k.
+    found = np.array([_correlation(own, pieces, len(lags) - 1 - k) for k in range(len(lags))])
+    ways, correlations = GRID * found[:, 1], found[:, 0]
+    if not ways.max() >= span:
+        first, last = samples.position.min(), samples.position.max()
+        raise InputError(
+            f"The record runs from {first:,.0f} to {last:,.0f} m and the evaluated run from {begin:,.0f} to "
+            f"{end:,.0f} m, so they have less than a span in common; give about what is to be added to the "
+            f"record's positions: --shift {0.5 * (begin + end - first - last):.0f}."
+        )
+    correlations[(ways < ENOUGH * ways.max()) | ~np.isfinite(correlations)] = -1.0
+    peaks = _peaks(correlations)
+    best = max(peaks, key=lambda k: correlations[k])
+    rest = [k for k in peaks if abs(lags[k] - lags[best]) > 0.25 * span]
+    second = max(rest, key=lambda k: correlations[k], default=None)
+    value, correlation = _vertex(lags, correlations, best)
+    other = (math.nan, math.nan) if second is None else (float(lags[second]), float(correlations[second]))
+    return Shift(value, correlation, *other, (float(lags[0]), float(lags[-1])))
+
+
+def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, int]:
+    """Correlation of the run's force, (n,), with the record's from an index on, and the number of places."""
+    others = [piece[begin : begin + len(own)] for piece in pieces]
+    known: list[NDArray[np.bool_]] = [~np.isnan(each) for each in others]
+    a = np.concatenate([own[here] for here in known])
+    b = np.concatenate([other[here] for other, here in zip(others, known, strict=True)])
+    if len(a) < 2 or a.std() == 0 or b.std() == 0:
+        return math.nan, len(a)
+    return float(np.corrcoef(a, b)[0, 1]), len(a)
+
+
+def _peaks(values: Array) -> list[int]:
+    padded = np.concatenate([[-math.inf], values, [-math.inf]])
+    return np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:])).tolist()
+
+
+def _vertex(lags: Array, values: Array, k: int) -> tuple[float, float]:
+    if not 0 < k < len(lags) - 1 or values[k - 1] <= -1.0 or values[k + 1] <= -1.0:
+        return float(lags[k]), float(values[k])
+    before, here, after = values[k - 1 : k + 2]
+    bend = before - 2 * here + after
+    offset = 0.5 * (before - after) / bend if bend < 0 else 0.0
+    return float(lags[k] + GRID * offset), float(here - 0.25 * (before - after) * offset)

@@ -1,8 +1,9 @@
-"""A picture in memory, which needs no screen. OpenCV draws lines, Pillow draws words."""
+"""A picture to draw on, its colours, and the check for the packages of the extra 'render'."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from .packages import check_packages
+from ..base.errors import InputError, listed
+from ..base.plotting import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
+
+IN_WORDS = {"cv2": "OpenCV", "pygame": "pygame", "imageio_ffmpeg": "imageio-ffmpeg"}
+
+
+def check_packages(*names: str) -> None:
+    """Raise InputError where packages that a picture or a film needs are not installed."""
+    missing = [IN_WORDS[name] for name in names if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"Pictures and films need {listed(missing)} not installed; install panto-env with its "
+            "extra: pip install 'panto-env[render]'."
+        )
+
 
 Colour = tuple[int, int, int]
 PARTS = 4
 """Resolution of places: 1 / 2^PARTS of a pixel."""
 SMALLEST = 8
 """Minimum size of words (px)."""
-KEPT_WORDS = 2000
-"""Number of drawings of words that are kept, since numbers repeat."""
 
 
 def rgb(colour: str) -> Colour:
@@ -33,14 +46,6 @@ class Canvas:
         """Raises InputError where OpenCV is not installed."""
         check_packages("cv2")
         self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
-
-    def start_from(self, other: Canvas) -> None:
-        """Begin a new picture with a copy of another canvas."""
-        self.pixels = other.pixels.copy()
-
-    def fill(self, colour: Colour) -> None:
-        """Fill the picture with one colour."""
-        self.pixels[...] = colour
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
         """Draw a filled rectangle."""
@@ -103,7 +108,7 @@ def _exact(points: Any) -> NDArray[np.int32]:
     return np.asarray(np.rint(near * (1 << PARTS)), dtype=np.int32)
 
 
-@lru_cache(maxsize=KEPT_WORDS)
+@lru_cache(maxsize=2000)  # numbers repeat
 def _shade(text: str, size: int, bold: bool) -> NDArray[np.float32]:
     """Opacity of drawn words, 0 to 1, (height, width, 1)."""
     from PIL import Image, ImageDraw
@@ -130,3 +135,13 @@ def zigzag(x: float, top: float, bottom: float, half: float, turns: int) -> Arra
     down = np.concatenate([[0.0, 0.1], np.linspace(0.15, 0.85, 2 * turns), [0.9, 1.0]])
     aside = np.concatenate([[0.0, 0.0], np.where(np.arange(2 * turns) % 2, -half, half), [0.0, 0.0]])
     return np.column_stack([x + aside, top + (bottom - top) * down])
+
+
+GROUND, INK, QUIET, FAINT = (250, 251, 252), (28, 37, 48), (105, 115, 126), (222, 227, 232)
+METAL, TRAIN, RAW = (70, 78, 88), (196, 204, 213), (186, 194, 203)
+SUPPORT, PAPER = (135, 144, 154), (255, 255, 255)
+FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
+OTHERS = rgb(GREEN), rgb(PURPLE), rgb(BROWN)
+"""Colours of the pantographs of a train that a picture does not show, from the front."""
+WORDS = 0.0222
+"""Size of words, as a share of a frame's height; at 720 rows, 16 px."""

@@ -2,32 +2,160 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
 from ..plant.state import Place
-from .canvas import SMALLEST, Canvas, Colour, zigzag
-from .layout import TITLE, Layout, force_axis, lost
-from .moment import Moment
-from .overview import SHARE, draw_train
-from .palette import (
+from .canvas import (
     BAD,
     FAINT,
     FORCE,
     GROUND,
     INK,
     METAL,
+    OTHERS,
+    PAPER,
     PUSH,
     QUIET,
     RAW,
+    SMALLEST,
     SUPPORT,
     TRAIN,
     WORDS,
+    Canvas,
+    Colour,
+    zigzag,
 )
+from .moment import AHEAD, BEHIND, TITLE, Layout, Moment, Rider, TrainView, force_axis, lost
+
+SHARE = 0.24
+"""Share of a frame's height that the strip has."""
+NAMES, WIRE, ROOF, CHART = 0.11, 0.20, 0.42, 0.47
+"""Shares of the strip's height: middle of the names, the wire, the roof, top of the chart."""
+LIFT = 0.05
+"""Height (m) that the wire is shown to rise by ``RISE`` of the strip's height."""
+RISE = 0.06
+
+
+@dataclass(frozen=True)
+class Overview:
+    """Layout of the strip, and what it is drawn on."""
+
+    canvas: Canvas
+    top: float  # px
+    width: float  # px
+    height: float  # px
+    margin: float  # of the chart (px from the left)
+    begin: float  # position at the left end of the chart (m)
+    per_metre: float  # px
+
+    def across(self, places: Array | float) -> Array:
+        """Pixels from the left for places along the line (m)."""
+        return self.margin + self.per_metre * (np.asarray(places) - self.begin)
+
+    def down(self, share: Array | float) -> Array:
+        """Pixels from the picture's top for shares of the strip's height."""
+        return self.top + self.height * np.asarray(share)
+
+
+def draw_train(canvas: Canvas, moment: Moment, top: float, size: float, margin: float, axis: float) -> None:
+    """Draw the strip of a moment of a train; its lower part has the forces of all, by place.
+
+    top: of the strip; size: of words; margin: left end of its chart (px); axis: maximum of the chart (N).
+    """
+    train = moment.train
+    assert train is not None
+    height, width = canvas.pixels.shape[:2]
+    span, right = moment.alignment.mean_length, 0.985 * width
+    begin = train.riders[-1].position - span
+    per_metre = (right - margin) / (train.riders[0].position + AHEAD * span - begin)
+    strip = Overview(canvas, top, right, height - top, margin, begin, per_metre)
+    canvas.box(0, top, width, height - top, GROUND)
+    canvas.line([(0, top), (width, top)], FAINT, 2)
+    _draw_part_shown(strip, moment, span)
+    _draw_chart(strip, moment, axis, size)
+    _draw_wire(strip, train)
+    x = margin
+    for number, rider in enumerate(train.riders):
+        colour = colour_of(number, train.shown)
+        _draw_rider(strip, train, rider, colour, number == train.shown)
+        _draw_rider_force(strip, rider, colour, axis, number == train.shown)
+        words = f"{number + 1} {rider.name} {_rider_force(rider)}{', above' if number == train.shown else ''}"
+        y, bold = float(strip.down(NAMES)), number == train.shown
+        x += canvas.words(x, y, words, colour, size, bold=bold) + 1.5 * size
+
+
+def colour_of(number: int, shown: int) -> Colour:
+    """Colour of a pantograph by its number, from 0: the one that is shown has that of the force above."""
+    return FORCE if number == shown else OTHERS[number - (number > shown)]
+
+
+def _rider_force(rider: Rider) -> str:
+    if rider.position < 0:
+        return "not yet on the line"
+    return f"{rider.filtered[-1]:.0f} N" if rider.filtered.size else "–"
+
+
+def _draw_part_shown(strip: Overview, moment: Moment, span: float) -> None:
+    left, right = strip.across(np.array([moment.position - BEHIND * span, moment.position + AHEAD * span]))
+    left, right = max(float(left), strip.margin), min(float(right), strip.width)
+    high, low = strip.down(NAMES + 0.05), strip.down(ROOF)
+    strip.canvas.box(left, float(high), right - left, float(low - high), PAPER)
+
+
+def _draw_chart(strip: Overview, moment: Moment, axis: float, size: float) -> None:
+    top, bottom = float(strip.down(CHART)), float(strip.down(0.97))
+    strip.canvas.box(strip.margin, top, strip.width - strip.margin, bottom - top, PAPER)
+    for force, colour in ((0.0, INK), (axis, FAINT)):
+        y = float(_level(strip, force, axis))
+        strip.canvas.line([(strip.margin, y), (strip.width, y)], colour)
+        strip.canvas.words(strip.margin - 0.4 * size, y, f"{force:.0f} N", QUIET, 0.8 * size, anchor="right")
+    end = strip.begin + (strip.width - strip.margin) / strip.per_metre
+    for number in moment.alignment.supports_within(strip.begin, end):
+        x = float(strip.across(moment.alignment.support(number)))
+        for y in np.arange(top, bottom, 9):
+            strip.canvas.line([(x, y), (x, min(y + 4, bottom))], SUPPORT)
+
+
+def _draw_wire(strip: Overview, train: TrainView) -> None:
+    inside = train.line.x >= strip.begin
+    places, heights = train.line.x[inside], train.line.contact[inside]
+    strip.canvas.wire(np.column_stack([strip.across(places), _wire(strip, heights)]), INK, 2)
+    left, right = (float(strip.across(train.riders[k].position)) for k in (-1, 0))
+    ends, top = 8 * strip.per_metre, float(strip.down(ROOF))
+    strip.canvas.box(left - ends, top, right - left + 2 * ends, 0.03 * strip.height, TRAIN)
+
+
+def _wire(strip: Overview, heights: Array | float) -> Array:
+    return strip.down(WIRE + 0.06 - RISE / LIFT * np.asarray(heights))
+
+
+def _draw_rider(strip: Overview, train: TrainView, rider: Rider, colour: Colour, shown: bool) -> None:
+    x, foot = float(strip.across(rider.position)), float(strip.down(ROOF))
+    head = float(_wire(strip, float(np.interp(rider.position, train.line.x, train.line.contact))))
+    strip.canvas.line([(x, head), (x + 5, 0.5 * (head + foot)), (x, foot)], colour if shown else METAL, 2)
+    strip.canvas.line([(x - 7, head), (x + 7, head)], colour, 5 if shown else 3)
+
+
+def _draw_rider_force(strip: Overview, rider: Rider, colour: Colour, axis: float, shown: bool) -> None:
+    if rider.filtered.size < 2:
+        return
+    few = slice(None, None, -max(1, int(rider.places.size / 2000)))  # from the newest sample back
+    points = np.column_stack([strip.across(rider.places), _level(strip, rider.filtered, axis)])[few]
+    strip.canvas.line(points, colour, 2 if shown else 1)
+    x, y = points[0].tolist()
+    strip.canvas.dot(x, y, 4, colour, PAPER)
+
+
+def _level(strip: Overview, forces: Array | float, axis: float) -> Array:
+    """Pixels from the picture's top for contact forces (N), from 0 to ``axis``."""
+    low, high = CHART + 0.47, CHART + 0.04
+    return strip.down(low - (low - high) * np.clip(np.asarray(forces) / axis, -0.04, 1.06))
+
 
 STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
 """Possible distances of the lines of the chart (N), and how many there are at most."""
@@ -61,14 +189,14 @@ class Picture:
         forces = [moment.force, *(rider.filtered for rider in riders)]
         self._highest = max(self._highest, *(float(force.max(initial=0.0)) for force in forces))
         axis = force_axis(self._highest, moment.nominal_force, moment.largest_force)
-        rows, size = _rows(moment), _size(layout)
+        rows, size = _rows(moment), WORDS * layout.height
         apart = 1.25 * (size if moment.train is None else max(size, SMALLEST))
         what = (layout, moment.title, axis, moment.largest_force, moment.nominal_force, *rows)
         if self._drawn_for != what:
             self._drawn_for = what
             _draw_still(self._still, layout, moment, axis)
             _draw_rows(self._still, layout, list(rows), apart, named=True)
-        self.canvas.start_from(self._still)
+        self.canvas.pixels = self._still.pixels.copy()
         _draw_line(self.canvas, layout, moment)
         _draw_pantograph(self.canvas, layout, moment)
         _draw_actuators(self.canvas, layout, moment)
@@ -79,14 +207,10 @@ class Picture:
         return self.canvas.pixels
 
 
-def _size(layout: Layout) -> float:
-    return WORDS * layout.height
-
-
 def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
     """Draw the parts that do not change from frame to frame; axis: maximum of the chart (N)."""
-    canvas.fill(GROUND)
-    size, left, right = _size(layout), layout.margin, layout.pantograph
+    canvas.pixels[...] = GROUND
+    size, left, right = WORDS * layout.height, layout.margin, layout.pantograph
     canvas.words(0.015 * layout.width, 0.04 * layout.height, moment.title, INK, 1.35 * size, bold=True)
     _draw_scale(canvas, layout)
     canvas.box(0, layout.roof, layout.pantograph + 0.1 * layout.width, 0.027 * layout.height, TRAIN)
@@ -105,8 +229,7 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
 
 
 def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
-    """Draw the names of the chart's lines and marks above it, where they cover nothing."""
-    size, y = 0.85 * _size(layout), layout.chart[0] - 0.75 * _size(layout)
+    size, y = 0.85 * (WORDS * layout.height), layout.chart[0] - 0.75 * (WORDS * layout.height)
     x = layout.margin
     limit = f"{moment.standard}: {moment.largest_force:.0f} N"
     if moment.largest_force > axis:
@@ -120,7 +243,6 @@ def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) ->
 
 
 def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colour: Colour) -> None:
-    """Draw what an entry of the legend stands for, as the chart has it."""
     if words == "contact lost":
         canvas.box(x + 0.7 * size, y - 0.35 * size, 0.7 * size, 0.7 * size, colour)
     elif words == "support":
@@ -132,14 +254,13 @@ def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colo
 
 
 def _dashes(canvas: Canvas, left: float, right: float, y: float, colour: Colour) -> None:
-    """Draw a dashed level line."""
     for x in np.arange(left, right, 14):
         canvas.line([(x, y), (min(x + 7, right), y)], colour)
 
 
 def _draw_scale(canvas: Canvas, layout: Layout) -> None:
     """Draw the scale: ten metres along the line, ten centimetres upwards, and the exaggeration."""
-    size, right = _size(layout), 0.985 * layout.width
+    size, right = WORDS * layout.height, 0.985 * layout.width
     y, long = 0.04 * layout.height, 10 * layout.per_metre
     high = 0.1 * layout.exaggeration * layout.per_metre
     canvas.line([(right - long, y), (right, y)], QUIET, 2)
@@ -181,8 +302,7 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | None, slack: bool) -> None:
-    """Draw the names of the wires at the left, and of slack droppers while there is one."""
-    size, x = 0.85 * _size(layout), 0.01 * layout.width
+    size, x = 0.85 * (WORDS * layout.height), 0.01 * layout.width
     canvas.words(x, float(contact[0, 1]) + size, "contact wire", QUIET, size)
     if upper is not None:
         highest = float(upper[:, 1].min())
@@ -193,7 +313,6 @@ def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | N
 
 
 def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: Array | None) -> None:
-    """Draw a mast behind the line, its arm, and the steady arm of the contact wire."""
     away, scale = 0.018 * layout.width, layout.height / 720
     low = float(np.interp(x, contact[:, 0], contact[:, 1]))
     high = low - 40 * scale if upper is None else float(np.interp(x, upper[:, 0], upper[:, 1]))
@@ -209,14 +328,14 @@ def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: 
 
 
 def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw a line that is only a spring above the pantograph, and the limits of its spans."""
     x, y = layout.pantograph, float(layout.up(moment.wire))
     ceiling = 0.16 * layout.height
     canvas.line([(x - 60, ceiling), (x + 60, ceiling)], METAL, 3)
     canvas.line(zigzag(x, ceiling, y, 0.012 * layout.width, 7), METAL, 2)
     canvas.line([(x - 34, y), (x + 34, y)], INK, 3)
     words = "no wire: a spring, stiff at the ends of a span and soft in its middle"
-    canvas.words(x - 80, ceiling + 0.9 * _size(layout), words, QUIET, 0.9 * _size(layout), anchor="right")
+    size = 0.9 * (WORDS * layout.height)
+    canvas.words(x - 80, ceiling + size, words, QUIET, size, anchor="right")
     begin = moment.position - layout.pantograph / layout.per_metre
     for number in moment.alignment.supports_within(begin, begin + layout.width / layout.per_metre):
         at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
@@ -225,7 +344,6 @@ def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 
 def _draw_pantograph(canvas: Canvas, layout: Layout, moment: Moment) -> None:
-    """Draw collector head, masses with the springs between them, and the frame's two arms to the roof."""
     x, scale = layout.pantograph, layout.height / 720
     chain = layout.chain(moment.heights).tolist()
     head, frame = chain[0], chain[-1]
@@ -259,11 +377,10 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
             canvas.line([(x, y), (x, tip + 0.6 * wing)], PUSH, 5 * scale)
             canvas.shape([(x, tip), (x - 9 * scale, tip + wing), (x + 9 * scale, tip + wing)], PUSH)
         words = f"actuator on the {name} {force:+.0f} N"
-        canvas.words(x - 20 * scale, y, words, (176, 110, 0), _size(layout), anchor="right")
+        canvas.words(x - 20 * scale, y, words, (176, 110, 0), WORDS * layout.height, anchor="right")
 
 
 def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
-    """Draw the contact force below the places where it acted, and dashed lines at supports."""
     begin = moment.position - (layout.pantograph - layout.margin) / layout.per_metre
     for number in moment.alignment.supports_within(begin, moment.position):
         at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
@@ -282,7 +399,6 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
 
 
 def _rows(moment: Moment) -> dict[str, str]:
-    """Numbers to the right of the chart, by name."""
     place = f"{moment.position:.0f} m"
     if moment.position >= 0:
         place += f", span {moment.alignment.span_name(moment.alignment.span_of(moment.position))}"
@@ -300,7 +416,7 @@ def _rows(moment: Moment) -> dict[str, str]:
 
 def _draw_rows(canvas: Canvas, layout: Layout, words: list[str], apart: float, *, named: bool) -> None:
     """Draw the names of these numbers, which do not change, or the numbers; apart: distance of rows (px)."""
-    size, y = _size(layout), layout.chart[0]
+    size, y = WORDS * layout.height, layout.chart[0]
     x = layout.pantograph + 0.03 * layout.width if named else 0.985 * layout.width
     anchor, colour = ("left", QUIET) if named else ("right", INK)
     for each in words:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console, ConsoleOptions, RenderResult
+from rich.live import Live
 from rich.text import Text
 
-from ..base.arrays import Array
-from ..base.units import to_kmh
+from ..base.arrays import Array, to_kmh
 from ..control import Task
-from ..metrics import en50367
+from ..metrics import compliance as en50367
 from ..plant.state import Row
 from .moment import Rider, felt, position_of, shown_collector, train_of
 
@@ -76,7 +80,6 @@ class Strip:
         )
 
     def _force_chart(self, across: Array, columns: int) -> list[Text]:
-        """The low-passed force from 0 to beyond its limit, with marks where contact was lost."""
         seen = self._felt
         highest = max(self._limit, float(seen.filtered.max(initial=0.0)))
         lines = chart(across, seen.filtered, (0.0, 1.1 * highest), FORCE_ROWS, columns, self._limit)
@@ -86,7 +89,6 @@ class Strip:
 
 
 def _rider_in_words(number: int, rider: Rider) -> str:
-    """A pantograph of a train: its place, and its force with that of the last spans."""
     if rider.filtered.size < 2:
         return f"{number}: {rider.position:.0f} m"
     near = rider.filtered[-1]
@@ -149,3 +151,30 @@ def _round(heights: Array) -> tuple[float, float]:
         return 0.0, 10.0
     low, high = 10 * np.floor(heights.min() / 10), 10 * np.ceil(heights.max() / 10)
     return float(low), float(max(high, low + 10))
+
+
+INTERVAL = 0.1
+"""Time (s) between two pictures."""
+
+
+@contextmanager
+def live(console: Console, policy: str) -> Iterator[Callable[[Task], None]]:
+    """Show a task's first lane on a terminal while the body runs; yields a function of the task.
+
+    policy: its name. The last picture stays. The cursor is restored in any case.
+    """
+    with Live(Text("preparing the line"), console=console, auto_refresh=False) as shown:
+        latest: list[Task] = []
+        drawn = 0.0
+
+        def watch(task: Task) -> None:
+            nonlocal drawn
+            latest[:] = [task]
+            now = time.monotonic()
+            if now >= drawn + INTERVAL:
+                shown.update(Strip(task, policy), refresh=True)
+                drawn = now
+
+        yield watch
+        if latest:
+            shown.update(Strip(latest[0], policy), refresh=True)

@@ -19,15 +19,11 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.files import check_output, write_whole
-from .packages import check_packages
+from .canvas import check_packages
 
 Frames = Iterable[NDArray[np.uint8]]
 FILMS = (".mp4", ".gif")
 """Suffixes of files for films."""
-QUALITY = "23"
-"""Quality of H.264, its usual value; a smaller one gives a better picture and a larger file."""
-COLOURS = 64
-"""Number of colours of a GIF."""
 
 
 def write_film(frames: Frames, path: str | Path, rate: float, size: tuple[int, int]) -> None:
@@ -52,9 +48,9 @@ def _write_mp4(frames: Frames, path: Path, rate: float, size: tuple[int, int]) -
 
     Raises OSError, with its number where that is known, unless FFmpeg took all frames and ended well.
     """
-    options = f"-y -v error -f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {rate:.6f} -i - -an".split()
-    options += f"-vcodec libx264 -pix_fmt yuv420p -crf {QUALITY} -preset slow -movflags +faststart".split()
-    command = [_encoder(), *options, str(path)]
+    given = f"-y -v error -f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {rate:.6f} -i - -an"
+    made = "-vcodec libx264 -pix_fmt yuv420p -crf 23 -preset slow -movflags +faststart"
+    command = [_encoder(), *f"{given} {made}".split(), str(path)]
     with TemporaryFile() as remarks:
         # In a session of its own it gets no interrupt from the keyboard: whether it ends is decided here.
         process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=remarks, start_new_session=True)
@@ -79,7 +75,6 @@ def _write_mp4(frames: Frames, path: Path, rate: float, size: tuple[int, int]) -
 
 
 def _encoder() -> str:
-    """Path of FFmpeg. Raises InputError where there is none."""
     check_packages("imageio_ffmpeg")
     import imageio_ffmpeg
 
@@ -93,7 +88,6 @@ def _encoder() -> str:
 
 
 def _failure(status: int, remarks: str) -> OSError:
-    """Why FFmpeg failed, by its exit status and what it printed."""
     if status < 0 and -status == getattr(signal, "SIGXFSZ", None):
         return OSError(errno.EFBIG, os.strerror(errno.EFBIG))
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO):
@@ -113,7 +107,7 @@ def _write_gif(frames: Frames, path: Path, rate: float, size: tuple[int, int]) -
         for frame in frames:
             image = Image.fromarray(frame)
             if palette is None:  # the same for all frames: no flicker, and a smaller file
-                palette = image.quantize(COLOURS)
+                palette = image.quantize(64)
             yield image.quantize(palette=palette, dither=Image.Dither.NONE)
 
     first, *others = pictures()

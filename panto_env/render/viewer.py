@@ -1,8 +1,9 @@
-"""Drawing of an environment: a picture per lane, and a window if requested."""
+"""Frames of tasks while they run, and a window that shows them, with pygame."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +11,10 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..control import Task
 from ..control.state import TaskRow
-from ..metrics.labels import LABELS
+from ..metrics.figures import LABELS
+from .canvas import check_packages
 from .moment import moment_of
 from .picture import Picture
-
-if TYPE_CHECKING:
-    from .window import Window
-
-SHOWN = ("mean", "std", "contact_loss")
-"""Figures of the episode so far that are shown next to the picture."""
 
 
 class Viewer:
@@ -28,7 +24,7 @@ class Viewer:
         """size: width and height of a frame (px)."""
         self._size = size
         self._pictures: dict[int, Picture] = {}
-        self._window: Window | None = None
+        self._pygame: Any = None  # while there is a window
 
     def frame(self, task: Task, row: int, title: str, reward: float) -> NDArray[np.uint8]:
         """Present frame of a row of a task's results, (height, width, 3).
@@ -41,18 +37,39 @@ class Viewer:
         return self._pictures[row].draw(moment_of(task, row, title, figures))
 
     def show(self, frame: NDArray[np.uint8], title: str, rate: float) -> None:
-        """Show a frame in a window, and wait for the time of the next one; rate: frames per second."""
-        from .window import Window
+        """Show a frame, (height, width, 3), in a window at the right time for ``rate`` frames per second.
 
-        if self._window is None:
-            self._window = Window(self._size, title)
-        self._window.show(frame, rate)
+        Raises InputError where pygame or a screen is missing.
+        """
+        if self._pygame is None:
+            self._open(title)
+        height, width, _ = frame.shape
+        picture = self._pygame.image.frombuffer(frame.tobytes(), (width, height), "RGB")
+        self._screen.blit(picture, (0, 0))
+        self._pygame.event.pump()
+        self._clock.tick(rate)
+        self._pygame.display.flip()
+
+    def _open(self, title: str) -> None:
+        check_packages("pygame")
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # no greeting on standard output
+        import pygame
+
+        try:
+            pygame.display.init()
+            self._screen = pygame.display.set_mode(self._size)
+        except pygame.error as error:
+            raise InputError(
+                f"No window can be opened here ({error}); use render_mode='rgb_array', or `panto film`."
+            ) from error
+        pygame.display.set_caption(title)
+        self._pygame, self._clock = pygame, pygame.time.Clock()
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
+        if self._pygame is not None:
+            self._pygame.display.quit()
+            self._pygame = None
 
 
 def figures_so_far(task: Task, row: int) -> dict[str, str]:
@@ -63,5 +80,6 @@ def figures_so_far(task: Task, row: int) -> dict[str, str]:
         values = task.figures(row).as_dict()
     except InputError:
         return {}
-    texts = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in SHOWN}
+    shown = ("mean", "std", "contact_loss")
+    texts = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in shown}
     return {f"{LABELS[name].short} so far": text for name, text in texts.items()}

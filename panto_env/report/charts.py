@@ -1,4 +1,4 @@
-"""Charts of a report, as SVG inside the page."""
+"""Charts of a report, as SVG inside the page; names: the runs of a chart, and their names."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base import marks
-from ..base.colours import BLUE, series_colour
-from ..base.legend import legend_above
-from ..metrics import en50367
-from ..metrics.low_pass import zero_phase_low_pass
-from ..metrics.spectrum import amplitudes
+from ..base import plotting as marks
+from ..base.plotting import BLUE, legend_above, series_colour
+from ..metrics import compliance as en50367
+from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from .findings import Findings
 
 if TYPE_CHECKING:
@@ -86,10 +84,7 @@ def force_together(one: Findings) -> str:
 
 
 def force_folded(names: Mapping[Findings, str]) -> str:
-    """Contact force over the place within the span: median, minimum and maximum of all spans.
-
-    names: runs and their names.
-    """
+    """Contact force over the place within the span: median, minimum and maximum of all spans."""
 
     def draw(axes: Axes) -> None:
         for k, one in enumerate(names):
@@ -109,10 +104,7 @@ def force_folded(names: Mapping[Findings, str]) -> str:
 
 
 def spectrum(names: Mapping[Findings, str]) -> str:
-    """Amplitudes of the force of runs, with the span and dropper frequencies of the first one.
-
-    names: runs and their names.
-    """
+    """Amplitudes of the force of runs, with the span and dropper frequencies of the first one."""
     first = next(iter(names))
     of = f", {names[first]}" if len(names) > 1 else ""
 
@@ -136,7 +128,7 @@ def spectrum(names: Mapping[Findings, str]) -> str:
 
 
 def uplifts(names: Mapping[Findings, str]) -> str:
-    """Maximum uplift at each support; names: runs and their names."""
+    """Maximum uplift at each support."""
     supports = sorted({number for one in names for number, _, _ in one.uplifts})
 
     def draw(axes: Axes) -> None:
@@ -171,7 +163,10 @@ def stiffness(one: Findings) -> str:
 
 def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
     """A distinct name for each run, from what differs between runs, if necessary with its file."""
-    columns = list(zip(*map(_parts, found), strict=True))
+    runs = [one.run for one in found]
+    pantographs = [f"{one.number or ''} {one.run.pantograph}".lstrip() for one in found]
+    columns = [[run.catenary for run in runs], pantographs, [f"{run.speed_kmh:g} km/h" for run in runs]]
+    columns += [[run.policy for run in runs], [f"seed {run.seed}" for run in runs]]
     differing = [column for column in columns if len({*column}) > 1] or [columns[2]]
     names = [", ".join(words) for words in zip(*differing, strict=True)]
     if len({*names}) < len(names):
@@ -182,9 +177,3 @@ def names_of(found: Sequence[Findings]) -> dict[Findings, str]:
 def of_run(one: Findings, name: str) -> str:
     """Name for what all pantographs of a run share; name: of these findings."""
     return f"train of {len(one.train)} pantographs ({one.file})" if one.train else name
-
-
-def _parts(one: Findings) -> tuple[str, ...]:
-    run = one.run
-    pantograph = f"{one.number} {run.pantograph}" if one.number else run.pantograph
-    return run.catenary, pantograph, f"{run.speed_kmh:g} km/h", run.policy, f"seed {run.seed}"

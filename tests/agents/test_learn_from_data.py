@@ -1,18 +1,24 @@
-"""What the examples learn from data alone: small here, as their pages say in `make studies`."""
+"""What the examples learn from data alone, small here, and the table of several trainings' evaluations."""
+
+from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
 
 import pytest
 
-from panto_baselines.dataset.designs_settings import load_designs
-from panto_baselines.dataset.make_designs import make_designs
-from panto_baselines.dataset.make_episodes import make_episodes
+pytest.importorskip("minari")
+pytest.importorskip("tensorboard")
+
+from torch.utils.tensorboard import SummaryWriter
+
+from panto_baselines.dataset.designs import load_designs
+from panto_baselines.dataset.make import make_designs, make_episodes
 from panto_baselines.dataset.settings import chosen, load_episodes
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+from .learning_curve import FIRST, RATIO, printed, table
 
-pytest.importorskip("minari")
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def load(name):
@@ -82,3 +88,28 @@ def test_from_the_whole_data_a_clone_does_what_its_teacher_does_and_sigma_is_kno
     (r2, error), (yardstick, _) = scores["trees"], scores["linear"]
     assert r2 > 0.93 > 0.9 > yardstick
     assert error < 6
+
+
+def log(folder, ratios, began):
+    with SummaryWriter(folder) as writer:
+        writer.add_scalar(FIRST, 1.0, 0, walltime=began)
+        for number, ratio in enumerate(ratios, start=1):
+            writer.add_scalar(RATIO, ratio, number * 10_000_000, walltime=began + number * 1800)
+    return folder
+
+
+def test_median_and_range_of_three_trainings_and_their_time(tmp_path):
+    logs = [
+        log(tmp_path / f"{k}", ratios, 1e9 + k)
+        for k, ratios in enumerate([(0.5, 0.45), (0.52, 0.40), (0.6, 0.41)])
+    ]
+    assert printed(table(logs)).splitlines()[2:] == [
+        "| 10 | -48.0 | -50.0 | -40.0 | 0.50 |",
+        "| 20 | -59.0 | -60.0 | -55.0 | 1.00 |",
+    ]
+
+
+def test_trainings_with_different_numbers_of_evaluations_are_refused(tmp_path):
+    logs = [log(tmp_path / "a", [0.5], 1e9), log(tmp_path / "b", [0.5, 0.4], 1e9)]
+    with pytest.raises(ValueError, match="longer than argument 1"):
+        table(logs)

@@ -1,25 +1,92 @@
-"""Kernels that drive a network through linear passes, beside the same in torch."""
+"""Kernels that drive a network through linear passes, beside the same in torch, step by step."""
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
 import pytest
 
 pytest.importorskip("torch")
 
+
+import math
+from typing import Any
+
+import numpy as np
 import torch
 from torch import nn
 
 from panto_agents.linear_pass import Columns, LinearPass
-from panto_agents.linear_rollout import Rollout, Terms, grouped
-from panto_agents.network import Network
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_agents.linear_rollout import Network, Rollout, Terms, grouped
+from panto_agents.model_file import RecurrentActor
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
+from panto_env.control.entries import AVERAGED
 
-from .rollout_in_torch import Washout as InTorch
-from .rollout_in_torch import driven
 
+def driven(network: Any, own: Any, terms: Any) -> tuple[torch.Tensor, torch.Tensor]:
+    """Force (N) and actions at the steps of a pass, (times,)."""
+    columns, washout = terms.columns, InTorch(terms)
+    response = torch.tensor(own.response) * torch.tensor(own.unit)
+    share = torch.full((columns.now.shape[1],), 1 - math.exp(-terms.interval / AVERAGED))
+    share[-1] = 0.0  # the action has no average
+    share *= columns.deviate
+    averages, state = torch.zeros(len(share)), None
+    now, changes, actions, force = [], [], [], []
+    for t in range(len(own.actions)):
+        moved = sum(
+            (changes[t - 1 - k] * response[t, k] for k in range(min(t, response.shape[1]))),
+            0 * response[0, 0],
+        )
+        averages = averages + share * (moved[:-1] - averages)
+        now.append(moved[:-1] - averages)
+        seen = torch.tensor(own.observations[t])
+        for ago in range(min(len(columns.now), t + 1)):
+            seen = seen.index_add(0, torch.tensor(columns.now[ago]), now[t - ago])
+        for place in range(columns.force.size):
+            when = float(own.recalled[t].ravel()[place])
+            if when >= 0:
+                part = torch.lerp(now[int(when)], now[int(when) + 1], when - int(when))
+                entries = torch.tensor([columns.force.ravel()[place], columns.acted.ravel()[place]])
+                seen = seen.index_add(0, entries, part[[columns.of_force, -1]])
+        action, state = stepped(network, seen, state)
+        actions.append(washout(action))
+        changes.append(actions[-1] - float(own.actions[t]))
+        force.append(float(own.force[t]) + moved[-1])
+    return torch.stack(force), torch.stack(actions)
+
+
+def stepped(network: Any, seen: torch.Tensor, state: Any) -> tuple[torch.Tensor, Any]:
+    """Action and next state of a network by torch's own modules."""
+    values = network.activation(network.first(seen[None]))
+    if network.cell is not None:
+        state = network.cell(values, state)
+        values = torch.cat([state, values], dim=1)
+    for layer in network.rest[:-1]:
+        values = network.activation(layer(values))
+    return torch.tanh(network.rest[-1](values))[0, 0], state
+
+
+class InTorch:
+    """``panto_baselines.policies.repetitive.Washout`` of one action in torch."""
+
+    def __init__(self, terms: Any) -> None:
+        self._settings, self._interval = terms.washout, terms.interval
+        if self._settings is not None:
+            self._share = 1 - math.exp(-terms.interval / self._settings.time_constant)
+            self._rate = self._settings.rate / terms.limit
+        self._average = self._force = torch.tensor(0.0)
+
+    def __call__(self, requested: torch.Tensor) -> torch.Tensor:
+        if self._settings is None:
+            return requested.clamp(-1, 1)
+        left = (requested - self._average).clamp(-1, 1)
+        ahead, lag = left - self._force, self._settings.lag
+        by_rate = (ahead.abs() - self._rate * lag).clamp(0, self._rate * self._interval)
+        nearer = 1 - torch.exp((by_rate / self._rate - self._interval) / lag) if lag else 1.0
+        self._force = self._force + ahead.sign() * (by_rate + (ahead.abs() - by_rate) * nearer)
+        self._average = self._average + self._share * self._force
+        return left
+
+
+torch.set_num_threads(1)
 ENTRIES, VALUES, DEPTH, PLACES, LENGTH = 23, 6, 2, 3, 12
 INTERVAL, LIMIT = 0.01, 100.0
 WASHOUT = WashoutSettings(time_constant=0.3)
@@ -104,3 +171,25 @@ def test_the_washout_in_torch_is_that_of_the_policies():
     for each in requested:
         expected = float(known(np.array([LIMIT * each]))[0]) / LIMIT
         assert float(own(torch.tensor(each))) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_recurrent_actor_acts_as_its_network_in_torch_and_forgets_at_a_reset():
+    torch.manual_seed(0)
+    network = Network(4, (6, 5), nn.Tanh, 3)
+    with torch.no_grad():
+        network.rest[-1].weight *= 100
+    linear = [network.first, *network.rest]
+    arrays = [[getattr(each, kind).detach().numpy() for each in linear] for kind in ("weight", "bias")]
+    actor = RecurrentActor(*map(tuple, arrays), "tanh", True, cell=network.arrays())
+    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
+    expected, state = [], None
+    with torch.no_grad():
+        for each in seen:
+            action, state = stepped(network, torch.tensor(each), state)
+            expected.append(action.item())
+    for _ in range(2):
+        actor.reset(None)
+        assert [actor.act(each)[0] for each in seen] == pytest.approx(expected, abs=1e-5)
+    assert np.std(expected) > 0.03
+    actor.reset(None)
+    assert actor.act(seen[5])[0] != pytest.approx(expected[5], abs=1e-3)  # it remembers what came before

@@ -1,12 +1,21 @@
-"""A model that Stable-Baselines3 trained by itself, saved as a policy: the same actions, in every command."""
+"""Models that other libraries trained, as policies, and the lanes that Stable-Baselines3 learns in."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+
+from pathlib import Path
 
 import gymnasium
 import gymnasium.wrappers as single
 import gymnasium.wrappers.vector as several
 import numpy as np
-import pytest
 import torch
-from stable_baselines3 import A2C, PPO, SAC
+from gymnasium.wrappers.vector import NormalizeObservation
+from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import (
     DummyVecEnv,
@@ -15,61 +24,43 @@ from stable_baselines3.common.vec_env import (
     VecFrameStack,
     VecMonitor,
     VecNormalize,
+    VecVideoRecorder,
 )
 
+from panto_agents.lanes import PantographVecEnv
 from panto_agents.model_file import Step, read_model, write_policy
 from panto_agents.stable_baselines import save_policy
-from panto_agents.vec_env import PantographVecEnv
 from panto_env import InputError, simulate
 from panto_env.policies import find_policy, wishes
 
 SHORT = {"distance": 120.0, "accuracy": "fast", "settle": 0.0}
 NAME = "panto_env:Pantograph-v0"
+torch.set_num_threads(1)  # more of them wait for each other where the networks are so small
 
 
 def trained(kind, env, **more):
     return kind("MlpPolicy", env, seed=3, device="cpu", **more)
 
 
-def environments():
-    return {
-        "single": gymnasium.make(NAME, **SHORT),
-        "dummy": DummyVecEnv([lambda: gymnasium.make(NAME, **SHORT)] * 2),
-        "native": PantographVecEnv(gymnasium.make_vec(NAME, num_envs=2, **SHORT)),
-    }
+def bare(**more):
+    return gymnasium.make(NAME, **SHORT | more)
 
 
-@pytest.mark.parametrize("env", ["single", "dummy", "native"])
-@pytest.mark.parametrize(
-    ("kind", "more"),
-    [(PPO, {"n_steps": 64, "batch_size": 64}), (SAC, {"learning_starts": 10}), (PPO, {"n_steps": 64})],
-)
-def test_the_file_acts_as_the_model_does(env, kind, more, tmp_path):
-    model = trained(kind, environments()[env], **more).learn(80)
-    save_policy(model, tmp_path / "mine.safetensors")
-    policy = find_policy(str(tmp_path / "mine.safetensors"))
-    assert wishes(policy).items() >= {"observation": "centred", "history": 0, "washout": 1.0}.items()
-    test = gymnasium.make(NAME, **SHORT).unwrapped
-    observation, _ = test.reset(seed=0)
-    policy.reset(test.context)
-    for _ in range(20):
-        action, _ = model.predict(observation, deterministic=True)
-        np.testing.assert_allclose(policy.act(observation), action, atol=1e-6)
-        observation, *_ = test.step(action)
+def native(lanes=2, **more):
+    return gymnasium.make_vec(NAME, num_envs=lanes, **SHORT | more)
 
 
 def test_a_pass_of_it_has_the_washout_of_its_training(tmp_path):
-    save_policy(
-        trained(PPO, gymnasium.make(NAME, **SHORT), n_steps=64).learn(64), tmp_path / "mine.safetensors"
-    )
-    run = simulate(
-        policy=str(tmp_path / "mine.safetensors"), distance=60.0, actuator="realistic", sensors="realistic"
-    )
+    mine = str(tmp_path / "mine.safetensors")
+    save_policy(trained(PPO, bare(), n_steps=64).learn(64), mine)
+    asked = {"observation": "centred", "history": 0, "washout": 1.0}
+    assert wishes(find_policy(mine)).items() >= asked.items()
+    run = simulate(policy=mine, distance=60.0, actuator="realistic", sensors="realistic")
     assert run.settings["washout"] == 1.0
 
 
 def with_a_layer_of_its_own():
-    model = trained(PPO, gymnasium.make(NAME, **SHORT), n_steps=64)
+    model = trained(PPO, bare(), n_steps=64)
     model.policy.action_net = torch.nn.Sequential(model.policy.action_net, torch.nn.Hardtanh(-1e-3, 1e-3))
     return model
 
@@ -77,19 +68,12 @@ def with_a_layer_of_its_own():
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (lambda: trained(A2C, gymnasium.make(NAME, **SHORT)), "ppo or sac"),
+        (lambda: trained(A2C, bare()), "ppo or sac"),
         (lambda: trained(PPO, gymnasium.make("Pendulum-v1")), "of this project|Pendulum"),
-        (lambda: trained(PPO, VecNormalize(environments()["dummy"])), "VecNormalize has no statistics"),
-        (
-            lambda: PPO(
-                "MlpPolicy",
-                gymnasium.make(NAME, **SHORT),
-                policy_kwargs={"activation_fn": torch.nn.ELU},
-            ),
-            "tanh or relu",
-        ),
-        (lambda: trained(SAC, gymnasium.make(NAME, **SHORT), use_sde=True), "does more than linear layers"),
-        (lambda: with_a_layer_of_its_own(), "does more than linear layers"),
+        (lambda: trained(PPO, VecNormalize(DummyVecEnv([bare] * 2))), "VecNormalize has no statistics"),
+        (lambda: trained(PPO, bare(), policy_kwargs={"activation_fn": torch.nn.ELU}), "tanh or relu"),
+        (lambda: trained(SAC, bare(), use_sde=True), "does more than linear layers"),
+        (with_a_layer_of_its_own, "does more than linear layers"),
     ],
 )
 def test_models_that_a_file_cannot_hold_are_refused(model, message, tmp_path):
@@ -115,15 +99,8 @@ class Upside(gymnasium.RewardWrapper):
         return self.env.step(-action)
 
 
-def bare(**more):
-    return gymnasium.make(NAME, **SHORT | more)
-
-
-def native(lanes=2, **more):
-    return gymnasium.make_vec(NAME, num_envs=lanes, **SHORT | more)
-
-
 CHAINS = {
+    "none": lambda: DummyVecEnv([bare] * 2),
     "normalised": lambda: single.NormalizeObservation(bare()),
     "stacked": lambda: single.FrameStackObservation(bare(), 3),
     "stacked on zeros, flat": lambda: single.FlattenObservation(
@@ -181,12 +158,11 @@ def base_of(env):
 @pytest.mark.parametrize(
     ("kind", "chain"),
     [(PPO, chain) for chain in CHAINS]
-    # Stable-Baselines3's buffer takes no stacks of what VecNormalize has normalised.
-    + [(SAC, chain) for chain in CHAINS if chain != "stacks on VecNormalize"],
+    + [(SAC, chain) for chain in ("none", "other actions", "VecNormalize on stacks", "vector")],
 )
 def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
     more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}
-    model = trained(kind, CHAINS[chain](), **more).learn(100)
+    model = trained(kind, CHAINS[chain](), policy_kwargs={"net_arch": [64, 64]}, **more).learn(100)
     env = model.get_env()
     freeze(env)
     make_lively(model, env)
@@ -280,3 +256,164 @@ def test_a_stack_that_does_not_fit_is_not_a_whole_model_file(tmp_path):
     write_policy(tmp_path / "wrong.safetensors", wrong, actor)
     with pytest.raises(InputError, match="do not fit each other"):
         find_policy(str(tmp_path / "wrong.safetensors"))
+
+
+STIFFNESS = "panto_env:PantographStiffness-v0"
+
+
+def make_lanes(lanes=3, mode="SameStep", **settings):
+    return PantographVecEnv(gymnasium.make_vec(STIFFNESS, num_envs=lanes, autoreset_mode=mode, **settings))
+
+
+@pytest.mark.parametrize("make_model", [PPO, SAC])
+def test_stable_baselines_given_a_vector_environment_itself_names_its_wrapper(make_model):
+    native = gymnasium.make_vec(STIFFNESS, num_envs=3)
+    with pytest.raises(InputError, match=r"from panto_agents.lanes import PantographVecEnv"):
+        make_model("MlpPolicy", native)
+    assert repr(type(native)) == "<class 'panto_env.envs.vector.PantographVectorEnv'>"
+
+
+def test_what_is_no_vector_environment_is_refused():
+    for other in (gymnasium.make(STIFFNESS), gymnasium.make_vec("CartPole-v1"), "env"):
+        with pytest.raises(
+            InputError, match=r"needs an environment of gymnasium.make_vec for Pantograph-v0, .* not"
+        ):
+            PantographVecEnv(other)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+def test_every_mode_of_autoreset_gives_the_same(mode):
+    settings = {"distance": 20.0, "sensors": "realistic", "speed_kmh": (200, 300)}
+    envs = [make_lanes(**settings), make_lanes(mode=mode, **settings)]
+    for env in envs:
+        env.seed(4)
+    np.testing.assert_array_equal(*[env.reset() for env in envs])
+    ends = 0
+    for action in np.random.default_rng(0).uniform(-1, 1, (90, 3, 1)):
+        mine, other = (env.step(action) for env in envs)
+        for info in (*mine[3], *other[3]):
+            info.get("episode", {"t": 0}).pop("t")  # on the clock
+        np.testing.assert_equal(mine, other)
+        ends += mine[2].sum()
+    assert ends > 6
+
+
+def test_wrappers_of_gymnasium_may_stand_between():
+    native = gymnasium.make_vec(STIFFNESS, num_envs=3, distance=10.0)
+    env = PantographVecEnv(NormalizeObservation(native))
+    assert np.abs(env.reset()).max() < 10
+    model = PPO("MlpPolicy", env, n_steps=32, batch_size=32, device="cpu")
+    model.learn(32)
+    assert native.unwrapped.np_random_seed == env.get_attr("np_random_seed")[0]
+
+
+def test_ends_as_stable_baselines_expects():
+    env = make_lanes(distance=10.0)
+    env.seed(4)
+    first = env.reset()
+    assert first.dtype == np.float32
+    for _ in range(20):
+        observation, reward, done, infos = env.step(np.zeros((3, 1), np.float32))
+        if done.all():
+            break
+    assert done.all()
+    assert reward.dtype == np.float32
+    np.testing.assert_array_equal(observation, first)
+    assert infos[2]["TimeLimit.truncated"]
+    assert infos[2]["terminal_observation"].shape == (9,)
+    assert infos[2]["figures"]["mean"] > 0
+
+
+def test_seed_of_lane_i_is_seed_plus_i():
+    env = make_lanes(sensors="realistic")
+    env.seed(4)
+    observation = env.reset()
+    for lane in range(3):
+        single = gymnasium.make("panto_env:PantographStiffness-v0", sensors="realistic")
+        np.testing.assert_array_equal(observation[lane], single.reset(seed=4 + lane)[0])
+
+
+def test_rest_of_the_interface():
+    env = make_lanes()
+    assert env.env_is_wrapped(VecMonitor) == [False] * 3
+    assert env.get_attr("num_envs", indices=[0, 1]) == [3, 3]
+    with pytest.raises(NotImplementedError, match="share one environment"):
+        env.set_attr("num_envs", 1)
+
+
+def test_the_end_of_an_episode_has_its_return_as_a_monitor_s():
+    """Without it a training showed no reward."""
+    plain, watched = make_lanes(distance=10.0), VecMonitor(make_lanes(distance=10.0))
+    for env in (plain, watched):
+        env.seed(4)
+        env.reset()
+    ends = 0
+    for action in np.random.default_rng(0).uniform(-1, 1, (60, 3, 1)):
+        *_, done, infos = plain.step(action)
+        *_, others = watched.step(action)
+        for lane in np.flatnonzero(done):
+            ours, theirs = infos[lane]["episode"], others[lane]["episode"]
+            assert set(ours) == {"r", "l", "t"}
+            assert ours["l"] == theirs["l"]
+            assert ours["r"] == pytest.approx(theirs["r"], rel=1e-5)
+            ends += 1
+    assert ends > 6
+    model = PPO("MlpPolicy", plain, n_steps=64, batch_size=64, seed=0, device="cpu").learn(192)
+    assert np.mean([episode["r"] for episode in model.ep_info_buffer]) < 0
+
+
+def test_options_go_to_the_lanes():
+    env = make_lanes()
+    env.set_options({"speed_kmh": 200})
+    env.reset()
+    assert [info["speed_kmh"] for info in env.reset_infos] == pytest.approx([200] * 3)
+    env.set_options([{"speed_kmh": 200}, {}, {}])
+    with pytest.raises(InputError, match="the same options for all"):
+        env.reset()
+
+
+def test_pictures_are_those_of_the_lanes(tmp_path):
+    pytest.importorskip("PIL")
+    env = make_lanes(render_mode="rgb_array", render_size=(128, 96), distance=30.0)
+    env.reset()
+    frames = env.get_images()
+    assert [frame.shape for frame in frames] == [(96, 128, 3)] * 3
+    assert env.render().shape[2] == 3
+    pytest.importorskip("moviepy")
+    recorder = VecVideoRecorder(env, str(tmp_path), lambda step: step == 0, video_length=5)
+    assert recorder.frames_per_sec == env.env.metadata["render_fps"]
+    recorder.reset()
+    for _ in range(7):
+        recorder.step(np.zeros((3, 1), np.float32))
+    recorder.close()
+    assert len(list(tmp_path.glob("*.mp4"))) == 1
+
+
+def test_without_pictures_a_sentence_says_what_to_do():
+    with pytest.raises(InputError, match="There are no pictures; add render_mode='rgb_array'"):
+        make_lanes().get_images()
+
+
+FILE = Path(__file__).parents[1] / "extensions" / "of_td3.py"
+
+
+def test_a_file_of_any_library_acts_as_the_model_does(tmp_path):
+    lanes = DummyVecEnv([bare])
+    kwargs = {"learning_starts": 20, "batch_size": 8, "policy_kwargs": {"net_arch": [16]}}
+    model = TD3("MlpPolicy", lanes, seed=0, device="cpu", **kwargs).learn(40)
+    model.save(tmp_path / "td3.zip")
+    (tmp_path / "policy.py").write_text(FILE.read_text())
+    policy = find_policy(f"{tmp_path / 'policy.py'}:Mine")
+    assert wishes(policy) == {"observation": "centred", "history": 0, "washout": 1.0}
+    lanes.seed(5)
+    observation, twin = lanes.reset(), bare().unwrapped
+    seen, _ = twin.reset(seed=5)
+    policy.reset(twin.context)
+    for _ in range(10):
+        action = model.predict(observation, deterministic=True)[0]
+        np.testing.assert_allclose(policy.act(seen), action[0], atol=1e-6)
+        observation, *_ = lanes.step(action)
+        seen, *_ = twin.step(action[0])
+    real = {"actuator": "realistic", "sensors": "realistic"}
+    run = simulate(policy=f"{tmp_path / 'policy.py'}:Mine", distance=60.0, accuracy="fast", **real)
+    assert np.ptp(run.frame_force) > 0

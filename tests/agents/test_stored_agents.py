@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file
 
-from panto_agents.ensemble import Ensemble
 from panto_agents.model_file import read_model
+from panto_agents.policy import Ensemble
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER, further_trainings
 from panto_env import InputError, simulate
@@ -20,39 +20,28 @@ from panto_env.policies import find_policy, policy_names
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.safetensors"))
 KEPT = ("catenary", "pantograph", "pantographs", "distances", "controlled", "actuator", "sensors")
-GAINS = {
-    "known-line": 0.72,
-    "head": 0.40,
-    "high-speed": 0.75,
-    "train": 0.55,
-    "any-line": 0.6,
-    "any-pantograph": 0.6,
-    "trailing": 0.6,
-    "trailing-alone": 0.6,
+AGENTS = {
+    "known-line": ("agent-clone", 0.72),
+    "head": ("agent-head", 0.40),
+    "high-speed": ("agent-high-speed", 0.75),
+    "train": ("agent-train", 0.55),
+    "any-line": ("agent-any-line", 0.6),
+    "any-pantograph": ("agent-any-pantograph", 0.6),
+    "trailing": ("agent-trailing", 0.6),
+    "trailing-alone": ("agent-trailing-alone", 0.6),
 }
-"""Of sigma to the passive pantograph at 300 km/h on a test seed: at most."""
-CONFIGS = {
-    "known-line": "agent-clone",
-    "head": "agent-head",
-    "high-speed": "agent-high-speed",
-    "train": "agent-train",
-    "any-line": "agent-any-line",
-    "any-pantograph": "agent-any-pantograph",
-    "trailing": "agent-trailing",
-    "trailing-alone": "agent-trailing-alone",
-}
-FURTHER = [(name, seed) for name in NAMES for seed in further_trainings(name)]
+"""Configuration, and sigma over that of the passive pantograph at 300 km/h on a test seed: at most."""
 
 
 def given(name):
     """Settings of a pass as in the agent's training."""
-    environment = load_training(CONFIGS[name]).environment
+    environment = load_training(AGENTS[name][0]).environment
     kept = {key: environment[key] for key in KEPT if key in environment}
     return {"actuator": "realistic", "sensors": "realistic", "speed_kmh": 300.0, "seed": 0} | kept
 
 
 def test_each_file_is_a_policy_and_each_policy_has_its_file():
-    assert sorted(GAINS) == NAMES
+    assert sorted(AGENTS) == NAMES
     agents = {each for each in policy_names() if each.startswith("agent-")}
     assert agents == {f"agent-{name}" for name in NAMES} | {"agent-any-line-five"}
 
@@ -77,51 +66,36 @@ def test_an_ensemble_is_of_agents_for_the_same_task():
 
 
 @pytest.mark.parametrize("name", NAMES)
-class TestAgent:
-    def test_is_small_and_holds_nothing_pickled(self, name):
-        path = FOLDER / f"{name}.safetensors"
-        assert path.stat().st_size < 500_000
-        assert all(name.startswith("actor/") for name in load_file(path))
-
-    def test_says_what_made_it(self, name):
-        facts, _ = read_model(FOLDER / f"{name}.safetensors")
-        training = load_training(CONFIGS[name])
-        assert facts.qualified
-        assert facts.environment == training.environment
-        assert facts.variants == training.variants
-        assert facts.seed == training.seed
-        assert facts.commit
-        assert "dirty" not in facts.commit
-        assert facts.command.split()[:3] == ["panto", "train", CONFIGS[name]]
-
-    def test_steadies_the_force_at_its_mean(self, name):
-        passive, steadied = (
-            simulate(**given(name), policy=policy, record_droppers=False).worst_controlled().summary()
-            for policy in ("passive", f"agent-{name}")
-        )
-        assert steadied.std < GAINS[name] * passive.std
-        assert abs(steadied.mean / passive.mean - 1) < 0.015
-
-
-@pytest.mark.parametrize(("name", "seed"), FURTHER)
-class TestFurtherTraining:
-    def test_is_the_same_recipe_under_another_seed(self, name, seed):
-        path = further_trainings(name)[seed]
+def test_each_is_small_holds_nothing_pickled_and_says_what_made_it(name):
+    training = load_training(AGENTS[name][0])
+    paths = {0: FOLDER / f"{name}.safetensors"} | further_trainings(name)
+    first, _ = read_model(paths[0])
+    assert first.environment == training.environment
+    assert first.variants == training.variants
+    assert training.seed == 0
+    assert first.command.split()[:3] == ["panto", "train", AGENTS[name][0]]
+    for seed, path in paths.items():
         assert path.stat().st_size < 500_000
         assert all(each.startswith("actor/") for each in load_file(path))
         facts, _ = read_model(path)
-        first, _ = read_model(FOLDER / f"{name}.safetensors")
         assert facts.seed == seed
         assert facts.qualified
-        assert (facts.environment, facts.variants, facts.needs) == (
-            first.environment,
-            first.variants,
-            first.needs,
-        )
+        same = facts.environment, facts.variants, facts.needs
+        assert same == (first.environment, first.variants, first.needs)
+        assert facts.commit
         assert "dirty" not in facts.commit
+        assert find_policy(f"agent-{name}:seed={seed}").facts == facts
+        assert facts.needs.observation in ("measured", "deviations")
 
-    def test_is_the_policy_of_that_seed(self, name, seed):
-        assert find_policy(f"agent-{name}:seed={seed}").facts.seed == seed
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_steadies_the_force_at_its_mean(name):
+    passive, steadied = (
+        simulate(**given(name), policy=policy, record_droppers=False).worst_controlled().summary()
+        for policy in ("passive", f"agent-{name}")
+    )
+    assert steadied.std < AGENTS[name][1] * passive.std
+    assert abs(steadied.mean / passive.mean - 1) < 0.015
 
 
 @pytest.mark.parametrize("seed", ["999", "-1", "0.5", "'../head'"])
@@ -131,23 +105,18 @@ def test_a_seed_that_nothing_was_trained_under_is_refused(seed):
 
 
 def test_agent_trailing_alone_lacks_what_the_one_in_front_measured_and_nothing_else():
-    seeing, alone = (load_training(CONFIGS[name]).model_dump() for name in ("trailing", "trailing-alone"))
+    seeing, alone = (load_training(AGENTS[name][0]).model_dump() for name in ("trailing", "trailing-alone"))
     assert seeing["environment"].pop("front")
     assert alone == seeing
 
 
 def test_they_need_no_torch():
     code = (
-        "import sys, panto_env\n"
+        "import sys, panto_env, panto_agents.command\n"
         "panto_env.simulate(policy='agent-known-line', distance=120, record_droppers=False)\n"
         "assert not {'torch', 'stable_baselines3'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_their_docstrings_are_what_the_list_shows():
-    for name in NAMES:
-        assert find_policy(f"agent-{name}").facts.needs.observation in ("measured", "deviations")
 
 
 @pytest.mark.parametrize(
@@ -169,3 +138,21 @@ def test_a_line_too_slow_for_an_agent_is_refused_with_the_reason(line, sentence)
     with pytest.raises(InputError, match=sentence) as caught:
         simulate(given, "dsa250", 160.0, "agent-high-speed", actuator="realistic", sensors="realistic")
     assert "or a range 'normalise' for the speeds of this line" in str(caught.value)
+
+
+pytest.importorskip("huggingface_hub")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_card_is_of_today_and_a_hub_can_read_it(name):
+    hub = pytest.importorskip("huggingface_hub")
+    from ..cards import card
+
+    text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
+    assert text == card(name), "run `make cards`"
+    data = hub.ModelCard(text).data
+    assert data.license == "mit"
+    assert data.eval_results
+    assert all(each.metric_value < 0 for each in data.eval_results)
+    for told in ("What it is", "Where it fails", "Limits"):
+        assert told in text

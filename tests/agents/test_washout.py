@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from panto_agents import train
 from panto_agents.model_file import export_model, read_model
 from panto_agents.policy import TrainedPolicy, load
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 

@@ -1,13 +1,16 @@
-"""Names, labels and changes of parameters, and spans as a command reads them."""
+"""Names, labels and changes of parameters, and options of commands: units, defaults, spans, panels."""
+
+import json
+import re
 
 import numpy as np
 import pytest
 import typer
+from typer.testing import CliRunner
 
 from panto_env import InputError
-from panto_env.analysis import parameters
 from panto_env.analysis import sweep as sweep_module
-from panto_env.analysis.options import SEVERAL, parse_spans, with_settings
+from panto_env.analysis.options import PANELS, SEVERAL, parse_spans, with_settings
 from panto_env.analysis.parameters import (
     change,
     change_together,
@@ -17,6 +20,7 @@ from panto_env.analysis.parameters import (
 )
 from panto_env.analysis.sweep import FAMILIES, labels, sweep
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.cli import make_app
 from panto_env.control.settings import fields, run_settings
 
 from .test_line_check import of_unlike_spans
@@ -35,23 +39,15 @@ def test_the_names_of_an_entry_are_all_its_numbers():
     assert not {"c.name", "c.sources", "c.contact_wire", "c.droppers.positions", "c.ends"} & set(names)
 
 
-ORDINALS = "1st 2nd 3rd 4th 9th 10th 11th 12th 13th 20th 21st 22nd 23rd 100th 101st 111th 112th 113th 121st"
-
-
-@pytest.mark.parametrize("word", ORDINALS.split())
-def test_ordinal_numbers(word):
-    assert parameters._ordinal(int(word[:-2])) == word
-
-
 def test_labels_have_the_unit_at_their_end_or_none():
     line = load_catenary("re250")
     assert parameter_label("line.spans", line).startswith("line: default number of spans")
-    assert parameter_label("line_condition.irregularity", run_settings({}).line_condition[0]).startswith(
-        "line condition: "
-    )
-    assert parameter_label("catenary.droppers.positions.2", line) == (
-        "catenary: droppers: distance from support, 2nd (m)"
-    )
+    condition = run_settings({}).line_condition[0]
+    assert parameter_label("line_condition.irregularity", condition).startswith("line condition: ")
+    for word in ("1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "22nd", "101st", "112th"):
+        assert parameter_label(f"catenary.droppers.positions.{word[:-2]}", line) == (
+            f"catenary: droppers: distance from support, {word} (m)"
+        )
     assert labels(["policy.gain", "speed_kmh"]) == {
         "speed_kmh": "speed of the train (km/h)",
         "policy.gain": "policy: gain",
@@ -66,6 +62,11 @@ def test_an_unknown_name_is_refused_with_what_is_known(name):
     assert "' of three-mass: " in str(told.value)
     assert str(told.value).endswith("frame_friction (lists count from 1).")
     with pytest.raises(InputError) as told:
+        check_name("catenary.nothing", load_catenary("en50318-2002"))
+    known = str(told.value).partition("known are ")[2]
+    assert "catenary.droppers.positions.1," in known
+    assert "positions.2" not in known
+    with pytest.raises(InputError) as told:
         check_name("sensors.nothing", run_settings({}).sensors)
     assert str(told.value).startswith("Unknown parameter 'sensors.nothing': ")
     assert "lists count" not in str(told.value)
@@ -77,15 +78,9 @@ def test_an_unknown_name_is_refused_with_what_is_known(name):
 )
 def test_only_the_speed_and_the_families_values_are_swept(name):
     """Each setting by its bare name would change nothing without a word."""
-    with pytest.raises(InputError, match="Unknown parameter"):
+    begin = "" if name in FAMILIES else ".*it must be speed_kmh, distances or begin with one of 'catenary.', "
+    with pytest.raises(InputError, match=f"Unknown parameter{begin}"):
         sweep({name: [250.0]}, workers=1)
-    if name not in FAMILIES:
-        with pytest.raises(InputError) as told:
-            sweep({name: [250.0]}, workers=1)
-        assert (
-            "it must be speed_kmh, distances or begin with one of 'catenary.', 'pantograph.', 'actuator.', "
-            in str(told.value)
-        )
 
 
 def test_a_change_is_of_one_value_and_the_entry_stays():
@@ -102,23 +97,17 @@ def test_a_change_is_of_one_value_and_the_entry_stays():
 
 
 @pytest.mark.parametrize(
-    ("values", "message"),
+    ("name", "value", "message"),
     [
-        ({"catenary.span_length": -5.0}, "must be a number from"),  # from its schema
-        ({"catenary.messenger_wire.tension": 200.0}, "."),  # from what hangs it
+        ("catenary.span_length", -5.0, ".*must be a number from"),  # from its schema
+        ("catenary.messenger_wire.tension", 200.0, ""),  # from what hangs it
     ],
 )
-def test_what_cannot_be_is_said_after_which_value_it_was(values, message):
-    line = load_catenary("re250")
-    (name, value), *_ = values.items()
-    with pytest.raises(InputError) as told:
-        change(line, name, value)
-    assert str(told.value).startswith(f"{name} cannot be {value:g}: ")
-    assert message in str(told.value)
-    with pytest.raises(InputError) as told:
-        change_together(line, values)
-    assert str(told.value).startswith("These values do not go together: ")
-    assert message in str(told.value)
+def test_what_cannot_be_is_said_after_which_value_it_was(name, value, message):
+    with pytest.raises(InputError, match=f"^{name} cannot be {value:g}: {message}"):
+        change(load_catenary("re250"), name, value)
+    with pytest.raises(InputError, match=f"^These values do not go together: {message}"):
+        change_together(load_catenary("re250"), {name: value})
 
 
 def test_a_value_that_every_span_replaces_is_refused():
@@ -138,34 +127,15 @@ def test_a_value_that_every_span_replaces_is_refused():
     assert change_together(line, both).contact_wire.tension == 14000.0
 
 
-SPANS = {
-    None: None,
-    "all": "all",
-    "5-6": (5, 6),
-    " 5 - 16 ": (5, 16),
-    "7-7": (7, 7),
-    "1-1000": (1, 1000),
-}
-
-
-@pytest.mark.parametrize(("text", "spans"), SPANS.items())
-def test_spans_that_a_command_takes(text, spans):
-    assert parse_spans(text) == spans
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "5", "5-", "-6", "-", "5-6-7", "a-6", "5-b", "٥-٦", "1234567890-2", "1-1234567890", "5.0-6", "ALL"],
-)
-def test_spans_that_it_does_not_take(text):
-    with pytest.raises(InputError, match=r"^--spans must read first-last, e\.g\. 5-6, or all, not '"):
-        parse_spans(text)
-
-
-@pytest.mark.parametrize("text", ["6-5", "0-3", "1-1001", "123456789-999999999"])
-def test_spans_that_are_none(text):
-    with pytest.raises(InputError):
-        parse_spans(text)
+def test_spans_that_a_command_takes():
+    taken = {None: None, "all": "all", "5-6": (5, 6), " 5 - 16 ": (5, 16), "7-7": (7, 7), "1-1000": (1, 1000)}
+    assert {text: parse_spans(text) for text in taken} == taken
+    for text in ("", "5", "5-", "-6", "-", "5-6-7", "a-6", "5-b", "٥-٦", "1234567890-2", "5.0-6", "ALL"):
+        with pytest.raises(InputError, match=r"^--spans must read first-last, e\.g\. 5-6, or all, not '"):
+            parse_spans(text)
+    for text in ("6-5", "0-3", "1-1001", "123456789-999999999"):
+        with pytest.raises(InputError, match="spans must be two whole numbers"):
+            parse_spans(text)
 
 
 def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
@@ -174,14 +144,10 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
         """Do nothing."""
 
     options = {each.name: each for each in command.__signature__.parameters.values()}
-    assert "more" in options
-    assert "settings" not in options
-    assert "precision" not in options
-    assert options["more"].default == 3
+    assert not {"settings", "precision"} & set(options)
+    assert options.pop("more").default == 3
     renamed = {"speed": "speed_kmh", "line_spans": "spans"}
     for name, option in options.items():
-        if name == "more":
-            continue
         field = fields()[renamed.get(name, name)]
         kind, info = option.annotation.__metadata__[0], option.annotation.__metadata__[-1]
         assert kind is info
@@ -191,30 +157,17 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
         default = "" if flag or field.default in (None, ()) else f" Default: {field.default}."
         often = " May be given several times." * (name in SEVERAL)
         assert info.help == f"{own[:1].upper()}{own[1:]}.{often}{default}"
-    app = typer.Typer()
-    app.command()(command)
-    for option in typer.main.get_command(app).params:
-        assert option.opts == [f"--{option.name.replace('_', '-')}"] or option.opts[0].endswith("completion")
-        assert option.secondary_opts == [], "a flag has no second one that switches it off"
 
 
 def test_droppers_are_laid_out_anew_by_spacing_pre_sag_and_span():
     """As the TOML file takes them; a span of another length had kept its droppers' places, or was refused."""
     line = load_catenary("re250")
-    of_file = {
-        name: value
-        for name, value in line.droppers.model_dump(exclude_none=True).items()
-        if name not in ("positions", "sag")
-    }
+    of_file = line.droppers.model_dump(exclude_none=True, exclude={"positions", "sag"})
     first = line.droppers.positions[0]
     closer = change(line, "catenary.droppers.spacing", 5.0)
     given = {"spacing": 5.0, "first": first, "pre_sag": max(line.droppers.sag) - line.droppers.sag[0]}
-    assert (
-        closer.droppers
-        == type(line)
-        .model_validate(line.model_dump(exclude_none=True) | {"droppers": of_file | given})
-        .droppers
-    )
+    laid_out = type(line).model_validate(line.model_dump(exclude_none=True) | {"droppers": of_file | given})
+    assert closer.droppers == laid_out.droppers
     assert len(closer.droppers.positions) > len(line.droppers.positions)
     sagging = change(closer, "catenary.droppers.pre_sag", 0.04)
     assert sagging.droppers.positions == closer.droppers.positions
@@ -241,3 +194,71 @@ def test_span_and_spacing_are_swept_together_in_any_order(monkeypatch):
         sweep(order, catenary="re250", workers=1)
         found = {(each.span_length, len(each.droppers.positions)) for each in seen}
         assert found == {(50.0, 9), (50.0, 5), (65.0, 12), (65.0, 7)}
+
+
+LINE = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--distance", "650"]
+
+
+def call(*words, **options):
+    """What a command with settings as options gets, and its help."""
+    got = {}
+
+    @with_settings(**options)
+    def command(settings):
+        got.update(settings)
+
+    app = typer.Typer()
+    app.command()(command)
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 0, done.output
+    return got, " ".join(done.output.split())
+
+
+def test_a_time_step_is_given_in_milliseconds():
+    assert call("--time-step", "2.5") == ({"time_step": 0.0025}, "")
+    done = CliRunner().invoke(make_app(), ["simulate", *LINE, "--time-step", "2.5", "--json"])
+    assert json.loads(done.stdout)["settings"]["time_step"] == 0.0025
+
+
+def test_the_help_says_defaults_unless_a_file_may_have_others():
+    shown = f"Default: {fields()['speed_kmh'].default}."
+    assert shown in call("--help", only=("speed_kmh",))[1].replace("│ ", "").replace(" │", "")
+    assert "Default" not in call("--help", only=("speed_kmh",), defaults=False)[1]
+
+
+def test_the_help_groups_options_and_learning_comes_last():
+    done = CliRunner().invoke(make_app(), ["simulate", "--help"], env={"COLUMNS": "120"})
+    panels = {}
+    for line in done.output.splitlines():
+        if line.startswith("╭─"):
+            panels[line.strip("╭╮─ ")] = options = []
+        elif found := re.match(r"│ +\*? *--([a-z-]+)", line):
+            options.append(found[1])
+    assert list(panels) == ["Options", "Line", "Pantograph", "Run", "Output", "Control and learning"]
+    assert panels["Options"] == ["help"]
+    assert {"catenary", "line-condition"} <= set(panels["Line"])
+    assert {"pantograph", "mean-force", "actuator", "sensors"} <= set(panels["Pantograph"])
+    assert {"speed", "policy", "spans", "seed", "time-step"} <= set(panels["Run"])
+    assert {"output", "plot", "json", "figures", "droppers"} <= set(panels["Output"])
+    assert {"washout", "history", "settle"} <= set(panels["Control and learning"])
+    assert panels["Run"].index("policy") < panels["Run"].index("time-step")
+
+
+@pytest.mark.parametrize("command", ["sweep", "film", "rig", "evaluate", "benchmark", "tune", "oracle"])
+def test_commands_with_settings_have_no_option_outside_a_panel(command):
+    done = CliRunner().invoke(make_app(), [command, "--help"], env={"COLUMNS": "120"})
+    first = done.output.partition("╭─ Options")[2].partition("╰")[0]
+    assert re.findall(r"--[a-z-]+", first) == ["--help"]
+    order = [panel for panel in PANELS if f"╭─ {panel} ─" in done.output]
+    assert order == sorted(order, key=lambda panel: done.output.index(f"╭─ {panel} ─"))
+    assert "Output" in order
+
+
+def test_commands_are_grouped_by_what_a_person_wants():
+    shown = CliRunner().invoke(make_app(), ["--help"], env={"COLUMNS": "120"}).output
+    places = [shown.index(f"╭─ {panel} ─") for panel in ("Simulate", "Judge", "Identify", "Control", "Learn")]
+    assert places == sorted(places)
+    assert "─ Commands ─" not in shown
+    assert "From other packages" not in shown, "a command of ours is in no panel"
+    assert places[0] < shown.index("│ simulate ") < places[1] < shown.index("│ report ") < places[2]
+    assert places[3] < shown.index("│ benchmark ") < places[4] < shown.index("│ train ")

@@ -1,19 +1,15 @@
 import os
-import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import Future
 from functools import partial
-from types import SimpleNamespace
 
 import pytest
 
 from panto_env import InputError
-from panto_env.analysis import pool, worker
+from panto_env.analysis import pool
 from panto_env.analysis.pool import collect, in_processes, in_threads, one_by_one, workers_for
-from panto_env.base.machine import cores
 
 
 def later(seconds, result):
@@ -57,44 +53,20 @@ def test_jobs_that_have_not_begun_are_cancelled_after_an_error():
 
 def test_each_process_is_another_one_with_one_thread_of_linear_algebra(monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     ((threads, process),) = in_processes([environment_and_process])
     assert threads == "1"
     assert process != os.getpid()
-    assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
+    assert (os.environ["OPENBLAS_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
 
 
-def test_there_are_as_many_threads_as_cores_unless_told_otherwise():
-    def name():
-        time.sleep(0.01)
-        return threading.current_thread().name
-
-    assert len(set(in_threads([name] * 50))) <= cores()
-    assert len(set(in_threads([name] * 50, workers=3))) <= 3
-
-
-@pytest.mark.parametrize(
-    ("jobs", "workers", "taken"),
-    [
-        (50, None, 3),  # one per core
-        (2, None, 2),  # but not more than there are jobs
-        (1, None, 1),
-        (0, None, 1),
-        (50, 1, 1),
-        (50, 2, 2),
-        (50, 12, 12),  # at most four per core
-        (50, 13, 12),
-        (11, 12, 11),
-    ],
-)
-def test_the_number_of_workers(monkeypatch, jobs, workers, taken):
+def test_the_number_of_workers(monkeypatch):
+    """One per core, or as many as asked for up to four per core, but not more than there are jobs."""
     monkeypatch.setattr(pool, "cores", lambda: 3)
-    assert workers_for(jobs, workers) == taken
-
-
-@pytest.mark.parametrize("workers", [0, -1])
-def test_less_than_one_worker_is_refused(workers):
-    with pytest.raises(InputError, match=f"^workers must be 1 or more, not {workers}.$"):
-        workers_for(5, workers)
+    given = {(50, None): 3, (2, None): 2, (0, None): 1, (50, 1): 1, (50, 12): 12, (50, 13): 12, (11, 12): 11}
+    assert {each: workers_for(*each) for each in given} == given
+    with pytest.raises(InputError, match=r"^workers must be 1 or more, not 0\.$"):
+        workers_for(5, 0)
 
 
 def test_each_result_is_taken_with_its_place_as_soon_as_it_is_there():
@@ -113,23 +85,6 @@ def test_each_result_is_taken_with_its_place_as_soon_as_it_is_there():
     assert collect([], None) == []
 
 
-def test_the_environment_is_as_it_was_after_processes_and_after_their_error(monkeypatch):
-    given = {"OPENBLAS_NUM_THREADS": None, "MKL_NUM_THREADS": "5", "OMP_NUM_THREADS": None}
-    for name, value in given.items():
-        monkeypatch.setenv(name, value or "1")
-        if value is None:
-            monkeypatch.delenv(name)
-
-    def during():
-        with pool._one_thread_of_linear_algebra():
-            assert {name: os.environ[name] for name in given} == dict.fromkeys(given, "1")
-            fail()
-
-    with pytest.raises(InputError):
-        during()
-    assert {name: os.environ.get(name) for name in given} == given
-
-
 def test_a_script_without_main_guard_is_told_what_to_do(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
@@ -140,25 +95,3 @@ def test_a_script_without_main_guard_is_told_what_to_do(tmp_path):
     result = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert result.returncode != 0
     assert "make this call under `if __name__ == '__main__':`" in result.stderr
-
-
-def test_a_worker_ends_at_once_when_its_parent_is_gone_and_never_keeps_itself_alive(monkeypatch):
-    """What a worker does first, here: a pipe is its parent, and closing the pipe is the parent's end."""
-    ours, parents = os.pipe()
-    ended, handler = threading.Event(), signal.getsignal(signal.SIGINT)
-    statuses = []
-    monkeypatch.setattr(worker, "parent_process", lambda: SimpleNamespace(sentinel=ours))
-    monkeypatch.setattr(worker.os, "_exit", lambda status: (statuses.append(status), ended.set()))
-    try:
-        worker.end_with_parent()
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN, "an interrupt is the parent's"
-        (watch,) = [thread for thread in threading.enumerate() if thread.name == "panto-parent"]
-        assert watch.daemon, "the worker would wait for its parent, which waits for it"
-        assert not ended.wait(0.1)
-        os.close(parents)
-        assert ended.wait(10)
-        watch.join(10)
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        os.close(ours)
-    assert statuses == [worker.ORPHANED] == [1]

@@ -2,7 +2,6 @@
 
 import os
 import platform
-import random
 import resource
 import shutil
 import stat
@@ -56,14 +55,13 @@ START = "from pathlib import Path; import time\nwhile not Path('go').exists(): t
 def start(tmp_path):
     """Starts a process that may compile a kernel; those that are left at the end are ended."""
     (tmp_path / "module.py").write_text(MODULE)
-    environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}
-    started = []
+    environment, started = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}, []
 
     def start(code):
-        command = [sys.executable, "-c", code]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        started.append(subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes))
-        return started[-1]
+        process = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment, **pipes)
+        started.append(process)
+        return process
 
     yield start
     for process in started:
@@ -97,14 +95,6 @@ def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(st
     assert list((tmp_path / "cache").rglob("*.lock"))
     brief = "from panto_env.backend import kept_kernels; kept_kernels.LONGEST_WAIT = 0.5\n"
     assert start(brief + CALL).communicate(timeout=120) == ("4.5 0\n", "")
-
-
-def test_a_form_under_a_wrong_name_is_compiled_anew(call, tmp_path):
-    call()
-    assert call(code=CALL.replace("1.5", "2")) == (["6.0", "0"], "")
-    first, second = sorted(files(tmp_path / "cache", ".nbc"))
-    shutil.copy(second, first)
-    assert call() == (["4.5", "0"], "")
 
 
 def test_a_process_that_dies_while_it_compiles_blocks_nobody(call, tmp_path):
@@ -158,12 +148,9 @@ def files(folder, suffix):
 DAMAGES = {
     "empty": lambda data: b"",
     "half": lambda data: data[: len(data) // 2],
-    "garbage": lambda data: random.Random(0).randbytes(len(data)),
-    "text of any length": lambda data: b"\x8d" + 8 * b"\xff" + data,  # an OverflowError of pickle
     "bit": lambda data: (
         data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 4]) + data[len(data) // 2 + 1 :]
     ),
-    "check": lambda data: bytes([data[0] ^ 1]) + data[1:],
 }
 
 
@@ -201,13 +188,6 @@ def folder(tmp_path, monkeypatch):
     return cache.cache_folder.__wrapped__
 
 
-def test_it_is_the_user_s_alone(folder, tmp_path):
-    found = folder()
-    assert found == tmp_path / "cache" / cache.kernel_hash()
-    assert stat.S_IMODE(found.stat().st_mode) == 0o700
-    assert folder() == found
-
-
 def plant(place, how, tmp_path):
     """What another user may have put where kernels are looked for."""
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -220,10 +200,16 @@ def plant(place, how, tmp_path):
 
 
 @pytest.mark.parametrize("how", ["link", "open"])
-def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how):
+def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how, monkeypatch):
     """The wanted one first, then the one in the temporary folder, whose name is known, and its parent."""
     wanted = tmp_path / "cache" / cache.kernel_hash()
     common = tmp_path / "tmp" / f"panto_env-{cache._user()}"
+    assert folder() == wanted
+    assert stat.S_IMODE(wanted.stat().st_mode) == 0o700
+    with monkeypatch.context() as other:
+        other.setattr(cache, "_user", lambda: wanted.stat().st_uid + 1)
+        assert folder().parent == tmp_path / "tmp"
+    wanted.rmdir()
     plant(wanted, how, tmp_path)
     assert folder() == common / cache.kernel_hash()
     shutil.rmtree(common / cache.kernel_hash())
@@ -234,12 +220,6 @@ def test_a_folder_that_others_can_write_to_is_left_alone(folder, tmp_path, how):
     assert alone != common
     assert stat.S_IMODE(alone.stat().st_mode) == 0o700
     assert folder() != alone  # as fresh each time as the process that asks
-
-
-def test_another_user_s_folder_is_left_alone(folder, tmp_path, monkeypatch):
-    own = folder()
-    monkeypatch.setattr(cache, "_user", lambda: own.stat().st_uid + 1)
-    assert folder().parent == tmp_path / "tmp"
 
 
 def test_where_no_folder_can_be_made_kernels_run_without(tmp_path, monkeypatch):

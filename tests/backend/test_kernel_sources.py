@@ -13,8 +13,8 @@ import pytest
 import panto_env
 from panto_env import backend
 from panto_env.backend import JIT, compile
-from panto_env.backend.cache import PACKAGE
-from panto_env.backend.kernel_sources import DECORATORS, kernel_sources
+from panto_env.backend.cache import DECORATORS, PACKAGE, kernel_sources
+from panto_env.control import entries
 
 
 @pytest.fixture(scope="module")
@@ -87,15 +87,21 @@ def defined_elsewhere(function, name, sources):
 
 
 CHANGES = {
-    "a docstring": ("plant/contact.py", '"""Mean contact', '"""Of course: mean contact', False),
+    "a docstring": ("plant/pantograph/step.py", '"""Mean contact', '"""Of course: mean contact', False),
     "a comment": ("plant/step.py", "\n\n\n", "\n\n\n# of course\n", False),
     "a message": ("control/settings.py", "InputError(", 'InputError("Of course: " + ', False),
     "a file that no kernel names": ("control/settings.py", "class ", "OF_COURSE = 1\n\n\nclass ", False),
-    "an operation": ("plant/contact.py", " * ", " / ", True),
-    "a number": ("plant/valid_range.py", "HEIGHT = 3.0", "HEIGHT = 4.0", True),
+    "an operation": ("plant/pantograph/step.py", " * ", " / ", True),
+    "an entry of observations": (
+        "control/entries.py",
+        "return now[NOW.SPEED]",
+        "return 2 * now[NOW.SPEED]",
+        True,
+    ),
+    "a number": ("plant/state.py", "HEIGHT = 3.0", "HEIGHT = 4.0", True),
     "an option of the compiler": ("backend/compile.py", '"error_model": "numpy"', '"error_model": "x"', True),
     "a field of a table": (
-        "plant/catenary/three_span/arrays.py",
+        "plant/catenary/three_span.py",
         "(NamedTuple):",
         "(NamedTuple):\n    x: int",
         True,
@@ -120,7 +126,8 @@ def text_of(value):
 
 def test_decorators_are_those_of_the_backend():
     """A new one is added to the list, or its functions would not count."""
-    given = [getattr(each, name, None) for name in DECORATORS for each in (backend, compile, numba.extending)]
+    homes = backend, compile, numba.extending, entries
+    given = [getattr(each, name, None) for name in DECORATORS for each in homes]
     assert sum(map(callable, given)) >= len(DECORATORS)
     made = {name for name, value in vars(compile).items() if callable(value) and "njit(" in text_of(value)}
     assert made == {"kernel", "inlined", "called"}

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 
-import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
@@ -19,23 +18,26 @@ from panto_env.backend import JIT
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.envs import IDS
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train
 
 
-def used_by_four_threads(env, action, tries=2000, patience=60.0):
-    """What each of four threads that step as fast as they can meets: observations, and refusals.
+def in_the_way(refusal):
+    return refusal.startswith("Another thread")
 
-    A thread tries at least as often, and on until another one was in its way.
-    """
-    told, refused, start = [], [], threading.Barrier(4)
-    latest = time.monotonic() + patience
+
+@pytest.mark.parametrize("lanes", [None, 64])
+def test_an_environment_is_one_thread_s_at_a_time(lanes):
+    """Four threads step as fast as they can; each goes on until another one was in its way."""
+    env = made(lanes)
+    env.reset(seed=0)
+    action, told, refused, start = env.action_space.sample(), [], [], threading.Barrier(4)
+    latest = time.monotonic() + 60.0
 
     def use():
         start.wait()
         done = 0
-        while done < tries or not (any(map(in_the_way, refused)) or time.monotonic() > latest):
+        while done < 2000 or not (any(map(in_the_way, refused)) or time.monotonic() > latest):
             done += 1
             try:
                 told.append(env.step(action)[0])
@@ -50,19 +52,6 @@ def used_by_four_threads(env, action, tries=2000, patience=60.0):
         thread.start()
     for thread in threads:
         thread.join()
-    return told, refused
-
-
-def in_the_way(refusal):
-    return refusal.startswith("Another thread")
-
-
-@pytest.mark.parametrize("name", IDS)
-def test_an_environment_is_one_thread_s_at_a_time(name):
-    env = gymnasium.make(f"panto_env:{name}", disable_env_checker=True).unwrapped
-    env.reset(seed=0)
-    action = env.action_space.sample()
-    told, refused = used_by_four_threads(env, action)
     assert all(np.isfinite(seen).all() for seen in told)
     assert {text.split(";")[0] for text in refused} <= {
         "Another thread is using this environment, or was when this process was forked",
@@ -71,14 +60,6 @@ def test_an_environment_is_one_thread_s_at_a_time(name):
     assert any(map(in_the_way, refused))
     env.reset(seed=0)  # it goes on in order
     assert np.isfinite(env.step(action)[0]).all()
-
-
-def test_a_vector_environment_is_one_thread_s_at_a_time():
-    envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=64)
-    envs.reset(seed=0)
-    told, refused = used_by_four_threads(envs, envs.action_space.sample())
-    assert all(np.isfinite(seen).all() for seen in told)
-    assert any(map(in_the_way, refused))
 
 
 FORKED = """
@@ -96,7 +77,7 @@ def use():
 
 thread = threading.Thread(target=use)
 thread.start()
-for k in range(100):
+for k in range(40):
     time.sleep(0.003 * (k % 7))
     child = os.fork()
     if child == 0:
@@ -121,7 +102,7 @@ def test_forked_while_another_thread_steps_it_is_refused_or_steps():
     done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     told, ends = done.stdout.splitlines()[::2], done.stdout.splitlines()[1::2]
-    assert ends == ["0"] * 100
+    assert ends == ["0"] * 40
     refused = [line for line in told if line != "stepped"]
     assert refused
     assert all("or was when this process was forked; give each" in line for line in refused)
@@ -129,9 +110,7 @@ def test_forked_while_another_thread_steps_it_is_refused_or_steps():
 
 COPIES = {
     "pickle": lambda env: pickle.loads(pickle.dumps(env)),
-    "cloudpickle": lambda env: pickle.loads(cloudpickle.dumps(env)),
     "deepcopy": copy.deepcopy,
-    "copy": copy.copy,
 }
 
 
@@ -183,29 +162,16 @@ def test_a_copy_while_another_thread_steps_is_whole_or_refused(lanes, way):
             np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("way", COPIES)
 @pytest.mark.parametrize("lanes", [None, 2])
-def test_no_copy_is_made_of_an_environment_in_use(lanes, way):
+def test_nothing_is_read_of_an_environment_in_use(lanes):
     env = made(lanes)
     env.reset(seed=0)
-    assert env._in_use.begin(False)
-    with pytest.raises(InputError, match="Another thread is using this environment"):
-        COPIES[way](env)
-    env._in_use.end()
-    twin = COPIES[way](env)
-    assert env._in_use.begin(False)
-    twin.step(np.zeros(twin.action_space.shape))  # it has a lock of its own
-    with pytest.raises(InputError, match="Another thread"):
-        env.step(np.zeros(env.action_space.shape))
-
-
-@pytest.mark.parametrize("read", ["render", "trajectory", "context"])
-def test_nothing_is_read_of_an_environment_in_use(read):
-    env = made(None)
-    env.reset(seed=0)
-    assert env._in_use.begin(False)
-    with pytest.raises(InputError, match="Another thread is using this environment"):
-        getattr(env, read)()
+    for read in (env.render, lambda: env.context if lanes is None else env.context(0)):
+        assert env._in_use.begin(False)
+        with pytest.raises(InputError, match="Another thread is using this environment"):
+            read()
+        env._in_use.end()
+        read()
 
 
 def test_an_environment_that_holds_itself_is_copied():
@@ -258,14 +224,9 @@ def test_the_kernel_makes_no_step_beyond_an_episode_s_end(task):
     np.testing.assert_array_equal(task.plant.run.table, kept)
 
 
-@pytest.mark.parametrize("catenary", ["en50318-2002", "periodic-stiffness", "ohl-three-span"])
-@pytest.mark.parametrize("lanes", [1, 3])
-def test_a_step_says_exactly_whether_an_episode_has_ended(catenary, lanes):
-    pantograph = "three-mass" if catenary == "periodic-stiffness" else "own-two-mass"
-    given = {"catenary": catenary, "pantograph": pantograph, "distance": 60.0, "accuracy": "fast"}
-    task = Task(run_settings(given), lanes=lanes)
-    task.reset(np.arange(lanes), np.random.default_rng(0))
-    action = np.zeros((lanes, 1))
+def test_a_step_says_exactly_whether_an_episode_has_ended(task):
+    task.reset(np.arange(3), np.random.default_rng(0))
+    action = np.zeros((3, 1))
     *before, last = [task.step(action) for _ in range(task.length.most_control_steps)]
     assert last
     assert len(before) > 10

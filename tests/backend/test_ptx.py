@@ -1,19 +1,36 @@
 """The kernels' own source compiles for a GPU; without one, and where the compiler is installed."""
 
+from types import SimpleNamespace
+
+import numba
 import numpy as np
 import pytest
 
 pytest.importorskip("numba_cuda", reason="numba-cuda is not installed; `make ptx` installs it apart")
 torch = pytest.importorskip("torch")
 
-from panto_env.backend.columns import Columns  # noqa: E402
-from panto_env.backend.cuda import TILE, PackedTiles, compiled  # noqa: E402
-from panto_env.backend.ptx import COMPUTE_CAPABILITY, ptx_of, without_device  # noqa: E402
+from panto_env.backend.cuda import (  # noqa: E402
+    TILE,
+    Columns,
+    PackedTiles,
+    compiled,
+)
 from panto_env.control import Task  # noqa: E402
 from panto_env.control.on_device import BEGUN, RESULTS, arrays_of, control_unless_idle  # noqa: E402
 from panto_env.control.settings import run_settings  # noqa: E402
 from panto_env.envs import IDS  # noqa: E402
-from panto_env.plant.contact import contact_force  # noqa: E402
+from panto_env.plant.pantograph.step import contact_force  # noqa: E402
+
+COMPUTE_CAPABILITY = (9, 0)
+
+
+@pytest.fixture(autouse=True)
+def without_device(monkeypatch):
+    """Called functions are compiled for the same GPU, although the machine has none."""
+    from numba.cuda import dispatcher
+
+    device = SimpleNamespace(compute_capability=COMPUTE_CAPABILITY)
+    monkeypatch.setattr(dispatcher, "get_current_device", lambda: device)
 
 
 def columns(name, lanes):
@@ -24,15 +41,18 @@ def columns(name, lanes):
 
 
 def test_contact_law():
-    assert "fma.rn.f64" in ptx_of(contact_force, *[1.0] * 7)
+    from numba import cuda
+
+    law, types = contact_force.py_func, (numba.float64,) * 7
+    ptx, _ = cuda.compile_ptx(law, types, device=True, cc=COMPUTE_CAPABILITY)
+    assert "fma.rn.f64" in ptx
 
 
 @pytest.mark.parametrize("name", IDS)
 def test_whole_control_step(name):
     own = columns(name, TILE)
     packed, answers = PackedTiles(own, 0, RESULTS), PackedTiles(own, RESULTS, BEGUN)
-    with without_device():
-        ptx = compiled(control_unless_idle, packed.type, answers.type, COMPUTE_CAPABILITY)
+    ptx = compiled(control_unless_idle, packed.type, answers.type, COMPUTE_CAPABILITY)
     assert ptx.count(".entry") == 1
     assert f".maxntid {TILE}" in ptx
     assert "fma.rn.f64" in ptx

@@ -12,10 +12,11 @@ import panto_env
 from panto_env.base import machine
 from panto_env.base.checksums import with_checksum
 from panto_env.base.errors import InputError
-from panto_env.cli import speed
+from panto_env.cli import studies as speed
 from panto_env.envs import IDS
-from panto_env.studies.throughput import environments, study, tables
-from panto_env.studies.throughput.plots import plot_speed
+from panto_env.studies.throughput import study, tables
+from panto_env.studies.throughput import study as environments
+from panto_env.studies.throughput.tables import plot_speed
 
 ROOT = Path(panto_env.__file__).parents[1]
 chooses_cores = pytest.mark.skipif(
@@ -145,7 +146,8 @@ def test_what_is_no_result_is_refused(tmp_path, text):
     path.write_text(text, encoding="latin-1")
     with pytest.raises(
         InputError,
-        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|.* its checksum does not fit)",
+        match=r"bad\.json (is no result of 'panto speed --json'|is not JSON|could not be read|"
+        r".* its checksum does not fit)",
     ):
         speed.speed([path])
 

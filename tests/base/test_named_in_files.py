@@ -3,25 +3,23 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
 from panto_agents.model_file import read_model
 from panto_agents.policy import load
-from panto_agents.run_folder import RunFolder
-from panto_agents.settings import load_training, parse_training
+from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER
-from panto_baselines.benchmark.replay import replay
+from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark.run import run as benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.submission import replay
 from panto_baselines.dataset.settings import load_episodes
 from panto_env import InputError, policies, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
-from panto_env.base.array_file import read_arrays, write_arrays
-from panto_env.base.checksums import read_checked, write_checked
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
+from panto_env.base.checksums import read_arrays, read_checked, write_arrays, write_checked
 from panto_env.base.settings import parse
-from panto_env.cli import make_app
 from panto_env.policies import find_policy
 
+from ..command import panto
 from ..plugin import install
 
 STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0}
@@ -79,57 +77,36 @@ def model(evil, tmp_path):
     return path
 
 
-@pytest.fixture
-def saved(evil, tmp_path):
-    """A saved run under that policy."""
-    run = simulate(**STIFFNESS, policy=evil)
-    (tmp_path / "ran").unlink()
-    run.save(tmp_path / "run.parquet")
-    return tmp_path / "run.parquet"
-
-
-def refused(*arguments):
-    """What the command ``panto`` says."""
-    result = CliRunner().invoke(make_app(), [str(each) for each in arguments])
-    assert isinstance(result.exception, InputError), result.output
-    return str(result.exception)
-
-
 def test_a_path_that_a_person_names_runs(tmp_path):
     (tmp_path / "evil.py").write_text(EVIL)
     find_policy(f"{tmp_path}/evil.py:Policy")
     assert (tmp_path / "ran").exists()
 
 
-@pytest.mark.parametrize("load_it", [load, lambda path: find_policy(str(path))])
-def test_the_base_of_a_model_file(model, load_it):
-    with pytest.raises(InputError, match=rf"model\.safetensors {REFUSED}") as caught:
-        load_it(model)
-    assert "\n" not in str(caught.value)
-
-
-def test_the_base_of_the_base_of_a_model_file(model, tmp_path):
+def test_the_base_of_a_model_file_and_of_its_base(model, tmp_path):
     table, arrays = read_arrays(model)
     write_arrays(tmp_path / "outer.safetensors", table | {"residual_of": str(model)}, arrays)
-    with pytest.raises(InputError, match=rf"model\.safetensors {REFUSED}"):
-        load(tmp_path / "outer.safetensors")
+    for load_it, path in ((load, model), (find_policy, str(model)), (load, tmp_path / "outer.safetensors")):
+        with pytest.raises(InputError, match=rf"model\.safetensors {REFUSED}"):
+            load_it(path)
 
 
-@pytest.mark.parametrize("command", ["evaluate", "benchmark", "film", "simulate"])
-def test_no_command_runs_the_base_of_a_model_file(model, command, tmp_path):
-    given = {
-        "evaluate": ["evaluate", model],
-        "benchmark": ["benchmark", model, "--seeds", 1, "--speed", 300, "--workers", 1],
-        "film": ["film", model, "--output", tmp_path / "film.mp4"],
-        "simulate": ["simulate", "--policy", model],
-    }[command]
-    assert "but a file may name only installed policies" in refused(*given)
+def test_no_command_runs_the_base_of_a_model_file(model, tmp_path):
+    for given in (
+        ("evaluate", model),
+        ("benchmark", model, "--seeds", 1, "--speed", 300, "--workers", 1),
+        ("film", model, "--output", tmp_path / "film.mp4"),
+        ("simulate", "--policy", model),
+    ):
+        assert "but a file may name only installed policies" in panto(*given).stderr
 
 
-def test_the_policy_of_a_saved_run(saved, tmp_path):
+def test_the_policy_of_a_saved_run(evil, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
-    said = refused("film", saved, "--output", tmp_path / "film.mp4")
-    assert f"{saved} names the policy" in said
+    saved = tmp_path / "run.parquet"
+    simulate(**STIFFNESS, policy=evil).save(saved)
+    (tmp_path / "ran").unlink()
+    assert f"{saved} names the policy" in panto("film", saved, "--output", tmp_path / "film.mp4").stderr
     run, settings = load_with_settings(saved)
     with pytest.raises(InputError, match=f"cannot be repeated: it {REFUSED}"):
         check_made_anew(run, settings, saved)
@@ -181,22 +158,5 @@ def test_no_name_slips_through(evil, policy, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path / "site")
     with pytest.raises(InputError, match="but a file may name only installed policies"):
         policies.check_named(policy.replace("EVIL", evil), "it")
-
-
-@pytest.mark.parametrize("policy", ["pd", "pd:gain=0.5", "agent-head", "best.safetensors", "nobody"])
-def test_what_runs_no_code_may_be_named(policy):
-    policies.check_named(policy, "it")
-
-
-def test_a_training_names_its_base_in_the_model_file(evil):
-    """So it has to be an installed one from the first."""
-    table = {
-        "algorithm": "ppo",
-        "total_steps": 1000,
-        "checkpoint_steps": 100,
-        "environment": {"id": "PantographStiffness-v0"},
-        "evaluation": {"interval_steps": 100},
-        "residual_of": evil,
-    }
-    with pytest.raises(InputError, match=REFUSED):
-        parse_training(table, "The training")
+    for harmless in ("pd:gain=0.5", "agent-head", "best.safetensors", "nobody"):
+        policies.check_named(harmless, "it")

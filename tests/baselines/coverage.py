@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import stats
 
-from panto_baselines.benchmark.intervals import Clusters, interval_of_mean, share_of
+from panto_baselines.benchmark.statistics import Clusters, interval_of_mean, share_of
 from panto_env.base.table import Table
 
 SEEDS = (4, 8, 16, 32)

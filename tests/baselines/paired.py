@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from panto_baselines.benchmark.intervals import Clusters, interquartile_mean, interval_of_mean
+from panto_baselines.benchmark.statistics import Clusters, interquartile_mean, interval_of_mean
 from panto_env.base.checksums import read_checked
 
 

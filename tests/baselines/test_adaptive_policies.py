@@ -2,79 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from panto_baselines.policies.adaptive import Adaptive
-from panto_baselines.policies.adaptive_fb_ff import AdaptiveFeedforward
-from panto_baselines.policies.fb_ff import FeedbackFeedforward
-from panto_baselines.policies.fitted_fb_ff import FittedFeedback
-from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
-from panto_baselines.policies.linear_feedback import COUNT, FEEDBACK_GAINS, SIGNALS, LinearFeedback
-from panto_baselines.policies.pd import ProportionalDerivative
-from panto_baselines.policies.periodic import HARMONICS
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import LISTENING, Pace
-from panto_baselines.policies.tuned_fb_ff import TunedFeedbackFeedforward
-from panto_baselines.policies.tuned_pd import TunedProportionalDerivative
-from panto_baselines.tuning.batch import Still, run_batch
-from panto_baselines.tuning.tune import MEAN_TOLERANCE
+from panto_baselines.policies.adaptive import (
+    COUNT,
+    HARMONICS,
+    SIGNALS,
+    Adaptive,
+    AdaptiveFeedforward,
+    FittedFeedback,
+    LinearFeedback,
+)
+from panto_baselines.policies.fb_ff import FeedbackFeedforward, TunedFeedbackFeedforward
+from panto_baselines.policies.feedback import ProportionalDerivative, TunedProportionalDerivative
+from panto_baselines.policies.line_model import OUTPUTS
+from panto_baselines.policies.repetitive import LISTENING, Repetitive
+from panto_baselines.tuning.tune import MEAN_TOLERANCE, Still, run_batch
 from panto_env import InputError
-from panto_env.control import Task
-from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
 
-Array = NDArray[np.float64]
-SPEED_KMH = 250.0
+from .laws import CONTEXT, MODEL, repeated, seen
 
-
-def a_context(**settings: Any) -> Context:
-    task = Task(run_settings({"speed_kmh": SPEED_KMH, "accuracy": "fast"} | settings), keep_samples=False)
-    task.reset(0, np.random.default_rng(0))
-    return task.context(0)
-
-
-CONTEXT = a_context()
-MODEL = line_model(CONTEXT, mean_line(CONTEXT))
 FEEDBACK = np.array([0.0, 2, 0, -12, -9, 0, 0, 3, -6, -4, 0, 0, 0, 0, 2, -1.5, -1])
 """Gains that leave the loop stable and change its answers by a quarter and more."""
-
-
-def seen(**values: float) -> NDArray[np.float32]:
-    """An observation, (1, entries), of these values (spaces as underscores), the rest 0."""
-    observation = np.zeros((1, len(CONTEXT.layout.entries)), dtype=np.float32)
-    for name, value in values.items():
-        place = CONTEXT.layout.index(name.replace("_", " "))
-        observation[0, place] = value / CONTEXT.layout.entries[place].scale
-    return observation
-
-
-def repeated(policy: Repetitive, spans: int) -> tuple[Array, Array]:
-    """Sigma of each span of the model under a force that repeats with the span, with control and without."""
-    rate = CONTEXT.speed / CONTEXT.alignment.mean_length * CONTEXT.control_interval
-    sampled = MODEL.sampled(CONTEXT.control_interval)
-    policy.begin(CONTEXT, 1)
-    state = np.zeros(sampled.size)
-    with_control, without = [], []
-    for k in range(int(spans / rate)):
-        angle = 2 * np.pi * k * rate
-        disturbance = 20 * np.cos(angle) + 15 * np.sin(2 * angle) - 8 * np.cos(3 * angle)
-        outputs = dict(zip(OUTPUTS, sampled.c @ state, strict=True))
-        outputs["contact force"] += 115 + disturbance
-        place = {"sine of span position": np.sin(angle), "cosine of span position": np.cos(angle)}
-        values = outputs | place | {"speed": CONTEXT.speed}
-        force = float(policy.forces(seen(**{name.replace(" ", "_"): v for name, v in values.items()}))[0])
-        state = sampled.a @ state + sampled.b * force
-        with_control.append(outputs["contact force"])
-        without.append(disturbance)
-    whole = [slice(int(np.ceil(j / rate)), int((j + 1) / rate)) for j in range(spans - 1)]
-    controlled, passive = (
-        np.array([np.std(np.array(force)[each]) for each in whole]) for force in (with_control, without)
-    )
-    return controlled, passive
 
 
 # --- the closed loop -------------------------------------------------------------------------------
@@ -132,17 +83,11 @@ def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
         random = np.random.default_rng(4)
         forces.append([])
         for k in range(10):
-            place = {"sine_of_span_position": np.sin(0.1 * k), "cosine_of_span_position": np.cos(0.1 * k)}
             readings = {"contact_force": random.normal(120, 30), "frame_velocity": random.normal(0, 0.1)}
-            observation = seen(**place, **readings, speed=CONTEXT.speed)
+            observation = seen(angle=0.1 * k, **readings)
             forces[-1].append(policy.forces(observation)[0])
     assert np.std(forces[1]) > 2.0
     assert forces[0] == pytest.approx(forces[1], abs=0.06 * np.abs(forces[1]).max())
-
-
-def test_gains_are_named_in_order() -> None:
-    assert list(AdaptiveFeedforward.TUNED) == [*FittedFeedback.TUNED, *Pace._fields]
-    assert list(Adaptive.TUNED) == [*FEEDBACK_GAINS, *Pace._fields]
 
 
 # --- on the line -----------------------------------------------------------------------------------
@@ -185,8 +130,6 @@ def test_tuned_fb_ff_is_fb_ff_with_its_amplitude_and_phase() -> None:
     tuned.reset(CONTEXT)
     plain.reset(CONTEXT)
     for force, angle in ((100.0, 0.1), (330.0, 2.2), (-20.0, 4.5)):
-        observation = seen(
-            contact_force=force, sine_of_span_position=np.sin(angle), cosine_of_span_position=np.cos(angle)
-        )
+        observation = seen(angle=angle, contact_force=force)
         expected = plain.force(observation[0]) + 2.0
         assert tuned.forces(observation)[0] == pytest.approx(expected, abs=1e-3)

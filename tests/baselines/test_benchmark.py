@@ -8,6 +8,7 @@ import math
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,20 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command, plot
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.controls import ORACLE_TAPE, policy_of
 from panto_baselines.benchmark.run import Benchmark
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
-from panto_baselines.benchmark.statistics import MOVED, MOVED_AT_MOST
+from panto_baselines.benchmark.settings import (
+    ORACLE_TAPE,
+    OTHER_SEED,
+    SALTED,
+    SEEDS,
+    TEST,
+    BenchmarkSettings,
+    load_benchmark,
+    policy_of,
+    salted_seed,
+)
+from panto_baselines.benchmark.single_pass import run_pass
+from panto_baselines.oracle import stored
 from panto_baselines.report.page import page
 from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
@@ -29,37 +40,9 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
-from ..plugin import install
-
 CONFIGS = Path(__file__).parents[2] / "configs"
 P = "p:gain=0.1"
 LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
-PLUGIN = """
-import numpy as np
-from panto_baselines.policies.force_law import ForceLaw
-
-class Half(ForceLaw):
-    "Presses with half of the nominal force."
-    def force(self, observation):
-        return -0.5 * self.context.nominal_force
-
-class Bad(ForceLaw):
-    def force(self, observation):
-        raise ArithmeticError("no idea")
-
-class Lost(ForceLaw):
-    def force(self, observation):
-        return -1e9
-
-class Nan:
-    def reset(self, context): pass
-    def act(self, observation): return np.array([float("nan")])
-
-class Less(ForceLaw):
-    "Presses less, by what just qualifies."
-    def force(self, observation):
-        return -0.013 * self.context.nominal_force
-"""
 
 
 def settings(**given: Any) -> BenchmarkSettings:
@@ -70,15 +53,6 @@ def settings(**given: Any) -> BenchmarkSettings:
 @pytest.fixture(scope="module")
 def outcome() -> Benchmark:
     return benchmark.run(settings(), workers=1)
-
-
-@pytest.fixture
-def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Somebody's installed package with policies of their own."""
-    names = ("Half", "Bad", "Lost", "Nan", "Less")
-    policies = {name.lower(): f"panto_test_plugin:{name}" for name in names}
-    install(tmp_path / "site", {"panto_env.policies": policies}, {"panto_test_plugin": PLUGIN})
-    monkeypatch.syspath_prepend(tmp_path / "site")
 
 
 def called(*arguments: str) -> Any:
@@ -107,7 +81,9 @@ def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Bench
 
 
 def test_outcome_does_not_depend_on_workers_and_repeats(outcome: Benchmark) -> None:
-    again = benchmark.run(settings(), workers=2)
+    calls: list[tuple[int, int]] = []
+    again = benchmark.run(settings(), workers=2, progress=lambda *call: calls.append(call))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert again == outcome
     assert json.dumps(again.as_dict()) == json.dumps(outcome.as_dict())
 
@@ -133,27 +109,14 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
     assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
 
 
-def test_progress_counts_all_passes() -> None:
-    calls: list[tuple[int, int]] = []
-    benchmark.run(settings(), workers=1, progress=lambda done, total: calls.append((done, total)))
-    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
-
-
-def test_a_policy_that_presses_half_as_much_is_disqualified(plugin: None) -> None:
-    given = settings(policies=["half", "lost"], seeds=1, actuator={"force_limit": 300.0})
-    done = benchmark.run(given, workers=2)
-    passive, half, lost = done.cells
-    assert half.figures["std"] < passive.figures["std"]
-    assert half.rank is None
-    assert "mean force" in half.disqualified
-    assert lost.rank is None
-    assert "ended early" in lost.disqualified
-    assert passive.rank == 1
-
-
-def test_a_bias_within_what_qualifies_gains_nothing(plugin: None) -> None:
+def test_a_bias_within_what_qualifies_gains_nothing(tmp_path: Path) -> None:
     """It lowers sigma, by as much as the passive pantograph's falls at that mean."""
-    done = benchmark.run(settings(policies=["less"]), workers=1)
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from panto_baselines.policies.feedback import ForceLaw\nclass Less(ForceLaw):\n"
+        "    def force(self, observation): return -0.013 * self.context.nominal_force\n"
+    )
+    done = benchmark.run(settings(policies=[f"{path}:Less"]), workers=1)
     passive, less = done.cells
     assert less.disqualified == ""
     assert -1.5 < less.mean_change < -1.2
@@ -210,37 +173,11 @@ def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], wo
     with pytest.raises(InputError) as caught:
         benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
     assert words in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("policy", "workers", "words"),
-    [
-        ("bad", 1, "panto_test_plugin.py:12: ArithmeticError: no idea."),
-        ("bad", 2, "panto_test_plugin.py:12: ArithmeticError: no idea."),
-        ("nan", 1, "its action must be finite numbers of shape (1,), not array([nan])."),
-    ],
-)
-def test_a_policy_that_fails_is_named(plugin: None, policy: str, workers: int, words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        benchmark.run(settings(policies=[policy], seeds=1), workers=workers)
-    assert str(caught.value).startswith(f"The policy '{policy}' failed in act")
-    assert words in str(caught.value)
-
-
-def test_workers_must_be_some() -> None:
     with pytest.raises(InputError, match="workers must be 1 or more"):
         benchmark.run(settings(), workers=0)
 
 
 # --- files ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("path", sorted(CONFIGS.glob("benchmark*.toml")), ids=lambda path: path.stem)
-def test_shipped_benchmarks_load(path: Path) -> None:
-    loaded = load_benchmark(path)
-    assert len(loaded.policies) >= 4
-    assert len(loaded.seeds) >= 5
-    assert {line.catenary for line in loaded.lines} >= {"en50318-2002", "shinkansen-simple"}
 
 
 @pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
@@ -254,7 +191,6 @@ def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("seeds = ", "is not valid TOML"),
         ("seed = 3", "key 'seed'"),
         ("[[lines]]\nspeeds_kmh = [-3]", "key 'lines.1.speeds_kmh.1'"),
         (None, "does not exist"),
@@ -280,13 +216,6 @@ def test_json_holds_everything_and_the_settings_that_make_it_again(
     assert len(table["rows"]) == 4
     assert table["cells"][1]["rank"] in (1, 2)
     assert [(each["policy"], each["seed"]) for each in table["traces"]] == [("passive", 0), (P, 0)]
-
-
-def test_command_writes_the_page_that_its_json_gives(tmp_path: Path) -> None:
-    files = tmp_path / "out.json", tmp_path / "out.html"
-    result = called("p", "--output", str(files[0]), "--html", str(files[1]))
-    assert result.exit_code == 0, result.output
-    assert files[1].read_text(encoding="utf-8") == page([read_result(files[0])])
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
@@ -324,18 +253,18 @@ def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> 
 # --- the command ---------------------------------------------------------------------------------
 
 
-def test_command_prints_a_table_for_people() -> None:
-    result = called("p:gain=0.5")
+def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_json_gives(
+    tmp_path: Path,
+) -> None:
+    files = tmp_path / "out.json", tmp_path / "out.html"
+    result = called("p:gain=0.5", "--salt", "draw", "--output", str(files[0]), "--html", str(files[1]))
     assert result.exit_code == 0, result.output
-    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
-        assert words in result.stdout
-
-
-def test_command_draws_a_salt_and_prints_it_with_its_hash() -> None:
-    words = " ".join(called("passive", "--salt", "draw").stdout.split())
-    found = re.search(r"salt '([0-9a-f]{32})', SHA-256 ([0-9a-f]{64})\.", words)
+    found = re.search(r"salt '(\w{32})', SHA-256 (\w{64})\.", " ".join(result.stdout.split()))
     assert found
     assert hashlib.sha256(found[1].encode()).hexdigest() == found[2]
+    assert files[1].read_text(encoding="utf-8") == page([read_result(files[0])])
+    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
+        assert words in result.stdout
 
 
 def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
@@ -345,22 +274,6 @@ def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
     assert [cell["policy"] for cell in json.loads(result.stdout)["cells"]] == ["passive", "p"]
     assert all(path.stat().st_size > 100 for path in files)
     assert files[1].read_bytes().startswith(b"\x89PNG")
-
-
-def test_command_takes_a_file_and_what_is_given_beside_it(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        'policies = ["p"]\n[[lines]]\ncatenary = "benchmark-2015"\ndistance = 350\nspans = [4, 6]\n'
-    )
-    result = called("--config", str(path), "--json", "--line-condition", "new")
-    assert result.exit_code == 0, result.output
-    used = json.loads(result.stdout)["settings"]
-    assert used["policies"] == ["passive", "p"]
-    assert used["seeds"] == [0]
-    assert used["line_condition"]["irregularity"] == 0
-    assert used["lines"] == [
-        Line(catenary="benchmark-2015", speeds_kmh=(300,), distance=350, spans=(4, 6)).model_dump(mode="json")
-    ]
 
 
 @pytest.mark.parametrize(
@@ -405,17 +318,6 @@ def test_a_line_can_have_policies_of_its_own():
     ]
 
 
-def test_the_help_says_what_policies_are_ranked_by() -> None:
-    """Two cells: the one with the lower CF is not first if its sigma is higher at the same mean force."""
-    app = typer.Typer()
-    app.command()(command.benchmark)
-    words = " ".join(CliRunner().invoke(app, ["--help"], terminal_width=200).stdout.split())
-    assert "Ranks them by the change of σ from a passive pantograph at the same mean force" in words
-    assert "cost function" not in words
-    assert f"more than {100 * MOVED:g} % in a cell" in words
-    assert f"more than {100 * MOVED_AT_MOST:g} % in any pass" in words
-
-
 def test_skyhook_says_how_to_give_gains_where_none_are_stored() -> None:
     with pytest.raises(InputError, match=r"give them \(frame, head\) as the parameter gains"):
         simulate("re250", policy="skyhook", speed_kmh=200.0)
@@ -437,3 +339,55 @@ def test_pd_and_fb_ff_are_ranked_with_a_washout() -> None:
         assert "washout = 1.0 keeps the mean" in found[law].disqualified
         assert found[f"{law}:washout=1"].disqualified == ""
         assert found[f"{law}:washout=1"].change < -5
+
+
+def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_says() -> None:
+    tapes = range(TEST.start + OTHER_SEED, TEST.stop + OTHER_SEED)
+    ordered = sorted((*SEEDS.values(), SALTED, tapes), key=lambda seeds: seeds.start)
+    assert all(one.stop <= other.start for one, other in pairwise(ordered))
+    salted = settings(seeds=3, salt="salt")
+    assert (settings().drawn_seeds, salted.seeds) == ((0, 1), (0, 1, 2))
+    assert salted.drawn_seeds == tuple(salted_seed("salt", number) for number in range(3))
+    first = int(hashlib.sha256(b"salt:0").hexdigest()[:16], 16)
+    assert salted.drawn_seeds[0] == 2**52 + first % 2**52
+    with pytest.raises(InputError, match="key 'salt'"):
+        settings(salt="")
+
+
+def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> None:
+    track = load_benchmark("benchmark/known-line")
+    rows = [run_pass(track, track.lines[0], (10, 19), ORACLE_TAPE, 300.0, seed).row for seed in (0, 1)]
+    cells = [each for each in stored.stored_cells() if each["speed_kmh"] == 300.0]
+    best = next(each["passes"][0] for each in cells if each["actuator"]["place"] == "frame")
+    assert best["seed"] == 0
+    assert rows[0].figures.std == pytest.approx(best["oracle"]["std"], rel=1e-6)
+    assert rows[1].figures.std > 1.01 * rows[0].figures.std
+    with pytest.raises(InputError, match="No oracle is stored for 'en50318-2002' at 351 km/h"):
+        benchmark.run(settings(policies=[ORACLE_TAPE], lines=[LINE | {"speeds_kmh": [351]}]), workers=1)
+
+
+@pytest.mark.parametrize(
+    ("source", "speeds_kmh", "spans"),
+    [
+        ("family:high-speed", (260.0, 350.0), (10, 19)),
+        ("section:main-line", (160.0,), (10, 28)),  # the shortest has 36, and its end is felt in 8 of them
+    ],
+)
+def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, spans):
+    """Policies meet the same line under a seed, at speeds for it, over spans that all runs cover."""
+    line = {"catenary": source, "speeds_kmh": speeds_kmh}
+    given = settings(lines=[line], seeds=[3], policies=["pd"])
+    found = benchmark.run(given, workers=1)
+    assert found.spans == (spans,)
+    for row in found.rows:
+        policy = None if row.policy == "passive" else row.policy
+        alone = simulate(
+            source,
+            speed_kmh=row.speed_kmh,
+            seed=3,
+            policy=policy,
+            line_condition="smooth",
+            record_droppers=False,
+        )
+        assert row.figures.std == alone.summary(spans).std
+        assert row.catenary == source

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import apart
-from panto_baselines.benchmark.controls import policy_of
 from panto_baselines.benchmark.run import evaluated_spans
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line, load_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.benchmark.statistics import compare
 from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
-from panto_env.policies import find_policy
 
 TRAIN = {"pantographs": ("dsa380", "en50318-2002"), "distances": (80.0,), "distance": 600.0}
 SPANS = (5, 9)
@@ -129,11 +127,3 @@ def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
     train = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": SPEED_KMH}
     found = {fingerprint(lone), fingerprint(train), fingerprint(train | {"controlled": 2})}
     assert len(found) == 3
-
-
-@pytest.mark.parametrize(("name", "controlled"), [("train-trailing", (2,)), ("train-both", (1, 2))])
-def test_shipped_benchmarks_of_trains_load_with_every_policy_that_they_name(name, controlled):
-    loaded = load_benchmark(f"benchmark/{name}")
-    assert [line.controlled for line in loaded.lines] == [controlled] * len(loaded.lines)
-    for policy in loaded.policies:
-        find_policy(policy_of(policy))

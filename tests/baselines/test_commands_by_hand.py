@@ -1,26 +1,18 @@
 """What commands hand on, with the work itself replaced; and the steps by which gains are fitted."""
 
-import importlib
 import json
-import pkgutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-import click
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_baselines import policies
 from panto_baselines.benchmark import command
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
-from panto_baselines.policies.lanes_law import Gain, TunableLaw
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import PACE
-from panto_env.cli import make_app
 
-from ..command import panto, whole
+from ..command import panto
 
 CONFIG = """
 policies = ["p"]
@@ -135,8 +127,8 @@ def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path
 
         return made
 
-    monkeypatch.setattr("panto_baselines.dataset.make_episodes.make_episodes", make(True))
-    monkeypatch.setattr("panto_baselines.dataset.make_designs.make_designs", make(False))
+    monkeypatch.setattr("panto_baselines.dataset.make.make_episodes", make(True))
+    monkeypatch.setattr("panto_baselines.dataset.make.make_designs", make(False))
     output = tmp_path / "data"
     words = ("--output", output, "--workers", 3)
     shown = panto("dataset", "episodes", "dataset-known-line", *words, "--episodes", 2)
@@ -155,61 +147,3 @@ def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path
     assert told == asdict(Made()) | {"folder": str(Path("data") / "it")}
     assert got[2][0].count == 4
     assert got[3][0].count != 4
-
-
-def groups(group, name="panto"):
-    yield name
-    for word, below in getattr(group, "commands", {}).items():
-        if isinstance(below, click.Group) or hasattr(below, "commands"):
-            yield from groups(below, f"{name} {word}")
-
-
-GROUPS = list(groups(whole()))
-
-
-@pytest.mark.parametrize("name", GROUPS)
-def test_a_group_of_commands_shows_its_help_where_none_is_named(name):
-    words = name.split()[1:]
-    bare, asked = (CliRunner().invoke(make_app(), [*words, *more]) for more in ([], ["--help"]))
-    assert "Usage" in bare.output
-    assert bare.output.strip() == asked.output.strip()
-
-
-def test_the_groups_are_those_with_commands_of_their_own():
-    assert {"panto", "panto dataset", "panto submission"} <= set(GROUPS)
-
-
-LAWS = {
-    name: law
-    for module in pkgutil.iter_modules(policies.__path__)
-    for name, law in vars(importlib.import_module(f"{policies.__name__}.{module.name}")).items()
-    if isinstance(law, type) and issubclass(law, TunableLaw) and hasattr(law, "TUNED")
-}
-STEPS = {
-    "TunedProportionalDerivative": (0.05, 0.001, 20.0, 1.0),
-    "TunedFeedbackFeedforward": (0.05, 2.0, 2.0, 1.0),
-    "LinearQuadraticGaussian": (0.1, 0.2, 0.2, 0.05, 0.1, 0.2),
-    "HInfinity": (0.1, 0.05, 0.1),
-    "Skyhook": (20.0, 20.0),
-    "Repetitive": (0.13, 0.002, 0.1),
-}
-"""Changes by which the effect of gains is measured: they decide what a fit finds."""
-
-
-@pytest.mark.parametrize("name", STEPS)
-def test_gains_are_fitted_by_these_steps(name):
-    assert [each.step for each in LAWS[name].TUNED.values()] == pytest.approx(STEPS[name], rel=1e-12)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_a_step_is_small_beside_what_the_fit_starts_from(name):
-    for gain in LAWS[name].TUNED.values():
-        assert isinstance(gain, Gain)
-        assert 0 < gain.step <= (0.41 * abs(gain.first) or 20.0)
-
-
-def test_repetitive_control_is_fitted_from_its_usual_pace():
-    assert {key: gain.first for key, gain in Repetitive.TUNED.items()} == PACE._asdict()
-    assert {key: gain.step / gain.first for key, gain in Repetitive.TUNED.items()} == pytest.approx(
-        dict.fromkeys(PACE._fields, 0.2)
-    )

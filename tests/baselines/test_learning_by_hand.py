@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from panto_baselines.policies.h_infinity import _stabilising
-from panto_baselines.policies.span_learner import LISTENING, Pace, SpanLearner, harmonics
+from panto_baselines.policies.model_based import _stabilising
+from panto_baselines.policies.repetitive import LISTENING, Pace, SpanLearner, harmonics
 
 PER_SPAN, LIMIT = 200, 100.0
 NUMBERS = np.arange(1.0, 4.0)

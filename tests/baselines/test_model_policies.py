@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,33 +10,29 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from panto_baselines.policies.h_infinity import central, minimum_bound, weighted
+from panto_baselines.policies.adaptive import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
-from panto_baselines.policies.lqg import ROUNDING, Disturbed, regulator
+from panto_baselines.policies.model_based import (
+    ROUNDING,
+    Disturbed,
+    central,
+    minimum_bound,
+    regulator,
+    weighted,
+)
 from panto_baselines.policies.mpc import HORIZON, Programs
-from panto_baselines.policies.periodic import HARMONICS, LEAD, Periodic
-from panto_baselines.policies.preview import Preview, preview
-from panto_baselines.policies.repetitive import Repetitive
-from panto_baselines.policies.span_learner import LISTENING
-from panto_baselines.tuning.batch import Still, run_batch
-from panto_env import InputError
+from panto_baselines.policies.preview import FrontPreview, Preview, preview
+from panto_baselines.policies.repetitive import LISTENING, Repetitive
+from panto_baselines.tuning.tune import Still, run_batch
+from panto_env import InputError, simulate
 from panto_env.control import Task
-from panto_env.control.context import Context
 from panto_env.control.settings import run_settings
 from panto_env.estimation.kalman import steady_gain
 
+from .laws import CONTEXT, MODEL, a_context, repeated
+
 Array = NDArray[np.float64]
-
-
-def a_context(speed_kmh: float = 250.0, **settings: Any) -> Context:
-    task = Task(run_settings({"speed_kmh": speed_kmh, "accuracy": "fast"} | settings), keep_samples=False)
-    task.reset(0, np.random.default_rng(0))
-    return task.context(0)
-
-
-CONTEXT = a_context()
-MODEL = line_model(CONTEXT, mean_line(CONTEXT))
 
 
 # --- the model -----------------------------------------------------------------------------------
@@ -136,44 +131,6 @@ def test_a_line_without_wires_is_refused() -> None:
 
 
 # --- repetitive control ----------------------------------------------------------------------------
-
-
-def repeated(
-    policy: Repetitive, spans: int, sign: float = 1.0, blind: bool = False, speed_error: float = 0.0
-) -> tuple[Array, Array]:
-    """Sigma of each span of the model, under a force that repeats with the span, with and without control.
-
-    blind: the place is not told. speed_error: share by which the speed is read too high.
-    """
-    context = CONTEXT
-    rate = context.speed / context.alignment.mean_length * context.control_interval
-    sampled = MODEL.sampled(context.control_interval)
-    policy.begin(context, 1)
-    state = np.zeros(sampled.size)
-    with_control, without = [], []
-    entry = context.layout.index
-    for k in range(int(spans / rate)):
-        angle = 2 * np.pi * k * rate
-        disturbance = 20 * np.cos(angle) + 15 * np.sin(2 * angle) - 8 * np.cos(3 * angle)
-        contact = 115 + disturbance + sign * float(sampled.c[0] @ state)
-        observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
-        values = {
-            "contact force": contact,
-            "sine of span position": 0.0 if blind else np.sin(angle),
-            "cosine of span position": 0.0 if blind else np.cos(angle),
-            "speed": context.speed * (1 + speed_error),
-        }
-        for name, value in values.items():
-            observation[0, entry(name)] = value / context.layout.entries[entry(name)].scale
-        force = float(policy.forces(observation)[0])
-        state = sampled.a @ state + sampled.b * force
-        with_control.append(contact)
-        without.append(115 + disturbance)
-    whole = [slice(int(np.ceil(j / rate)), int((j + 1) / rate)) for j in range(spans - 1)]
-    controlled, passive = (
-        np.array([np.std(np.array(force)[each]) for each in whole]) for force in (with_control, without)
-    )
-    return controlled, passive
 
 
 def test_repetitive_control_learns_a_force_that_repeats_to_near_zero() -> None:
@@ -314,3 +271,36 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
     seen = np.array(answer)
     assert np.std(seen) > 0.2
     assert np.std(seen - predicted[: len(seen)]) < 0.05 * np.std(seen)
+
+
+# --- preview of a pantograph behind another ----------------------------------------------------------
+
+TRAIN = {
+    "catenary": "re330", "pantographs": ["dsa380"] * 2, "distances": [100.0], "controlled": 2,
+    "speed_kmh": 250.0,
+    "line_condition": "as-built", "actuator": "realistic", "sensors": "realistic",
+}  # fmt: skip
+
+
+def behind(policy, seed, **settings):
+    return simulate(policy=policy, seed=seed, **TRAIN | settings).train[1].summary()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "better"), [("re330", 3), ("en50318-2002", 6)])
+def test_what_the_one_in_front_measured_calms_the_one_behind_on_lines_not_seen(line, better):
+    """On top of what repeats from span to span: on each seed, or, where that is nearly all, in their mean."""
+    gains = []
+    for seed in range(6):
+        passive, alone = (behind(each, seed, catenary=line) for each in (None, FrontPreview(base="")))
+        assert alone.std < 0.8 * passive.std
+        assert alone.mean == pytest.approx(passive.mean, rel=0.015)
+        both, learnt = (behind(each, seed, catenary=line) for each in (FrontPreview(), "repetitive"))
+        gains.append(1 - both.std / learnt.std)
+    assert np.mean(gains) > 0.005
+    assert np.sum(np.array(gains) > 0) >= better
+
+
+def test_a_pantograph_without_one_in_front_is_refused():
+    with pytest.raises(InputError, match="front"):
+        simulate(policy=FrontPreview(base=""), **TRAIN | {"controlled": 1})

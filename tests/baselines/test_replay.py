@@ -1,8 +1,9 @@
-"""A result keeps its actions: played again they give its rows, and nothing else does."""
+"""A result keeps its actions, from which its rows follow; submissions to the leaderboard."""
 
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,27 @@ import pytest
 from typer import Typer
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark import actions, replay_command
+from panto_baselines.benchmark import actions
+from panto_baselines.benchmark import command as replay_command
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.actions import Played
-from panto_baselines.benchmark.replay import replay
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.benchmark.single_pass import drive, run_pass
+from panto_baselines.benchmark.submission import replay
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.settings import parse
 
+TRACK = """
+actuator = "realistic"
+sensors = "realistic"
+line_condition = "as-built"
+[[lines]]
+distance = 310
+spans = [3, 5]
+speeds_kmh = [300]
+policies = ["pd"]
+"""
 LINE = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
 
 
@@ -98,12 +110,6 @@ def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
     assert called(path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
 
 
-def test_the_command_prints_json(result):
-    done = called(result, "--json", "--workers", 1, "--policy", "pd")
-    assert done.exit_code == 0
-    assert [row["difference"] for row in json.loads(done.stdout)["rows"]] == [0.0, 0.0]
-
-
 def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
     with pytest.raises(InputError, match="no policy 'p': it has passive, pd, fb"):
         replay(result, ["p"])
@@ -120,14 +126,6 @@ def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
     write_checked(alone, {"what": "else"})
     with pytest.raises(InputError, match="is no result of"):
         replay(alone)
-
-
-def test_a_salt_that_was_not_promised_is_found(result, tmp_path):
-    def other(table, passes):
-        table["salt_sha256"] = "0" * 64
-
-    with pytest.raises(InputError, match="a salt_sha256 that is not its salt's"):
-        replay(changed(result, tmp_path, other), workers=1)
 
 
 def test_a_policy_that_learns_from_earlier_passes_is_not_ranked(tmp_path):
@@ -172,3 +170,58 @@ def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
     assert done.row.saturation == 0.0 < np.mean(np.abs(done.played.actions[inside]) >= 0.999)
     again = run_pass(settings, line, spans, Leaning(), 300.0, 0, played=done.played)
     assert again.row.figures == done.row.figures
+
+
+# --- submissions -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return Path(shutil.copytree(Path(__file__).parents[2] / "examples" / "submission", tmp_path / "mine"))
+
+
+def checked(folder, *arguments):
+    (folder.parent / "track.toml").write_text(TRACK)
+    words = ["check", str(folder), "--config", str(folder.parent / "track.toml"), "--workers", "1"]
+    return CliRunner().invoke(replay_command.submission, [*words, *arguments], env={"COLUMNS": "200"})
+
+
+def test_the_example_would_be_ranked_and_one_that_presses_not(folder, result):
+    done = checked(folder, "--against", str(result))
+    assert done.exit_code == 0, done.output
+    for words in ("Damped frame by A. Author (MIT)", "It requires: numpy>=2.0", "Learnt from: nothing"):
+        assert words in done.stdout
+    assert "It would be ranked, at place 2 of " in done.stdout
+    (folder / "policy.py").write_text(
+        "import numpy as np\nclass DampedFrame:\n    def reset(self, context): pass\n"
+        "    def act(self, observation): return np.full(1, 0.2)\n"
+    )
+    done = checked(folder, "--salt", "today", "--json")
+    table = json.loads(done.stdout)
+    assert table["card"]["name"] == "Damped frame"
+    assert min(row["seed"] for row in table["result"]["rows"]) >= 2**52
+    mine, tape = table["result"]["standings"][-2:]
+    assert mine["policy"] == f"{folder}/policy.py:DampedFrame"
+    assert tape["policy"] == f"tape of {mine['policy']}"
+    assert "mean force" in mine["disqualified"]
+    assert "It would not be ranked" in checked(folder).stdout
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("name", '""', "key 'name'"),
+        ("policy", '"../policy.py:Mine"', "must be a file in the folder of the card"),
+        ("policy", '"/etc/passwd"', "must be a file in the folder of the card"),
+        ("policy", '"other.py:Mine"', "there is no file"),
+        ("policy", '"policy.py:Mine"', "has no class 'Mine'"),
+        ("colour", '"red"', "key 'colour'"),
+    ],
+)
+def test_a_card_that_is_not_whole_is_refused(folder, key, value, words):
+    card = folder / "card.toml"
+    lines = [line for line in card.read_text().splitlines() if not line.startswith(f"{key} =")]
+    card.write_text("\n".join([*lines, f"{key} = {value}"]))
+    done = checked(folder)
+    assert isinstance(done.exception, InputError)
+    assert words in str(done.exception)

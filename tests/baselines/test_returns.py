@@ -9,8 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.command import returns as command
 from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return, rank_correlation, returns
-from panto_baselines.benchmark.returns_command import returns as command
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_baselines.report.result import parse_result
@@ -23,19 +23,6 @@ from panto_env.policies import find_policy
 LINE = "en50318-2002"
 OF_RESULT = {"catenary": LINE, "pantograph": LINE, "actuator": "ideal", "sensors": "ideal"}
 SHORT = {"distance": 120.0, "accuracy": "fast", "settle": 1.0, "speed_kmh": (250.0, 300.0)}
-
-
-class Mean:
-    """Pushes all the time: without a washout it moves the mean."""
-
-    washout = 1.0
-
-    def reset(self, context):
-        self.washout_there = context.washout
-
-    def act(self, observation):
-        assert self.washout_there == 1.0
-        return np.array([0.2])
 
 
 def returned(policy, mean, change, disqualified=""):
@@ -70,11 +57,6 @@ def test_a_return_is_the_sum_of_the_rewards_of_an_episode(washout):
         total, ended = total + reward, terminated or truncated
     given = SHORT | ({"washout": washout} if washout else {})
     assert one_return("Pantograph-v0", given, policy, 5) == pytest.approx(total)
-
-
-def test_a_policy_has_the_washout_that_it_asks_for(monkeypatch):
-    monkeypatch.setattr("panto_baselines.benchmark.returns.find_policy", lambda _: Mean())
-    assert np.isfinite(one_return("Pantograph-v0", SHORT, "mean", 0))
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +110,6 @@ def test_every_ingredient_is_a_valid_change_of_the_id(name):
     usual = read_settings(IDS["Pantograph-v0"], EnvironmentSettings)
     changed = read_settings(IDS["Pantograph-v0"] | INGREDIENTS[name], EnvironmentSettings)
     assert (changed == usual) == (name == "all")
-
-
-def test_more_episodes_than_can_be_run_are_refused(read):
-    with pytest.raises(InputError, match="This comparison"):
-        returns(read, episodes=2**31)
 
 
 def test_results_of_several_lines_and_unknown_ids_are_refused():

@@ -35,7 +35,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
     "benchmark": ("benchmark", "passive", "pd", "--seeds", "2", "--speed", "250", *SMALL),
     "benchmark, realistic": (
         *("benchmark", "fb+ff", "p:gain=0.5", "--seeds", "2", "--speed", "230", *SMALL),
-        *(
+        *[
             "--actuator",
             "realistic",
             "--sensors",
@@ -44,7 +44,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
             "re250",
             "--pantograph",
             "dsa250",
-        ),
+        ],
     ),
 }
 TRAINING = """\
@@ -92,10 +92,7 @@ def _panto(arguments: tuple[str, ...], folder: str = ".") -> subprocess.Complete
 def _json(arguments: tuple[str, ...], tape: Tape, folder: str = ".") -> None:
     done = _panto((*arguments, "--json"), folder)
     tape.add("exit status", done.returncode)
-    printed = json.loads(done.stdout)
-    if arguments[0] == "sweep" and isinstance(printed, dict):
-        printed = printed["rows"]  # they once stood alone
-    tape.add("printed", printed)
+    tape.add("printed", json.loads(done.stdout))
 
 
 def _train(algorithm: str, tape: Tape) -> None:
@@ -105,8 +102,7 @@ def _train(algorithm: str, tape: Tape) -> None:
         text = TRAINING.format(algorithm=algorithm, steps=steps, hyperparameters=hyperparameters)
         (Path(folder) / "training.toml").write_text(text, encoding="utf-8")
         _panto(("train", "training.toml", "--output", "run"), folder)
-        (model,) = Path(folder).glob("run/model.*")  # earlier versions had zips
-        _json(("evaluate", f"run/{model.name}", "--seeds", "2"), tape, folder)
+        _json(("evaluate", "run/model.safetensors", "--seeds", "2"), tape, folder)
 
 
 def _reproduce(study: str, tape: Tape) -> None:
@@ -117,9 +113,7 @@ def _reproduce(study: str, tape: Tape) -> None:
         tape.add("files", [path.name for path in files])
         for path in files:
             if path.suffix == ".json":
-                numbers = json.loads(path.read_text(encoding="utf-8"))
-                numbers.pop("sha256", None)  # earlier versions had none
-                tape.add(path.stem, numbers)
+                tape.add(path.stem, json.loads(path.read_text(encoding="utf-8")))
             else:
                 tape.add(f"picture {path.stem}", path.read_bytes())
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from renamed import pantograph_named
 from single import BROKEN, LATE, MISCUT, SCATTER, WEAR
 from tape import Tape
 
@@ -16,21 +15,23 @@ from panto_env import Trajectory, simulate
 
 SPANS = (4, 9)  # after the run-in, as the benchmark
 # Lines, and the speed (km/h) of their passes: 300, or 200 where waves in the wire are too slow for that.
-LINES = {
-    "beijing-shanghai": 300.0,
-    "beijing-tianjin": 300.0,
-    "beijing-yizhuang": 300.0,
-    "benchmark-2015": 300.0,
-    "en50318-2002": 300.0,
-    "ln2": 300.0,
-    "ohl-three-span": 300.0,
-    "periodic-stiffness": 300.0,
-    "re250": 300.0,
-    "re330": 300.0,
-    "shinkansen-simple": 300.0,
-    "sweden-st15": 200.0,
-}
-PANTOGRAPHS = (
+LINES = dict.fromkeys(
+    [
+        "beijing-shanghai",
+        "beijing-tianjin",
+        "beijing-yizhuang",
+        "benchmark-2015",
+        "en50318-2002",
+        "ln2",
+        "ohl-three-span",
+        "periodic-stiffness",
+        "re250",
+        "re330",
+        "shinkansen-simple",
+    ],
+    300.0,
+) | {"sweden-st15": 200.0}
+PANTOGRAPHS = [
     "own-motor-head",
     "benchmark-2015",
     "cx",
@@ -40,7 +41,7 @@ PANTOGRAPHS = (
     "en50318-2002",
     "identified-2dof",
     "three-mass",
-)
+]
 POLICIES = (
     "passive",
     "p",
@@ -90,10 +91,6 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
-# Rigs, the pantograph on each, and the speed (km/h).
-RIGS = {"rig": ("own-motor-head", 200.0), "rig-flexible": ("own-motor-head", 200.0)}
-
-
 def cases() -> dict[str, Callable[[Tape], None]]:
     """All cases of this file by name."""
     found: dict[str, Callable[[Tape], None]] = {}
@@ -104,7 +101,7 @@ def cases() -> dict[str, Callable[[Tape], None]]:
             found[f"pass, {title}: {policy}"] = partial(_policy, title, policy)
     for title, settings in SETTINGS.items():
         found[f"pass: {title}"] = partial(_settings, settings)
-    for rig in RIGS:
+    for rig in ("rig", "rig-flexible"):
         found[f"pass on {rig}"] = partial(_rig, rig)
     found["pass: file"] = _file
     return found
@@ -114,23 +111,21 @@ def _add(tape: Tape, name: str, run: Trajectory) -> None:
     tape.add(name, run)
     if not run.terminated:
         tape.add(f"{name}.summary", run.summary(SPANS))
-    # Until the start was left out by default, no spans meant all of them.
-    tape.add(f"{name}.summary of all", run.summary("all") if hasattr(run, "spans") else run.summary())
+    tape.add(f"{name}.summary of all", run.summary("all"))
 
 
 def _every_pantograph(line: str, tape: Tape) -> None:
     for pantograph in PANTOGRAPHS:
-        _add(tape, pantograph, simulate(line, pantograph_named(pantograph), LINES[line]))
+        _add(tape, pantograph, simulate(line, pantograph, LINES[line]))
 
 
 def _rig(rig: str, tape: Tape) -> None:
-    pantograph, speed = RIGS[rig]
-    tape.add("run", simulate(rig, pantograph_named(pantograph), speed, distance=400.0))
+    tape.add("run", simulate(rig, "own-motor-head", 200.0, distance=400.0))
 
 
 def _policy(title: str, policy: str, tape: Tape) -> None:
     line, pantograph, speed, settings = PLACES[title]
-    _add(tape, "run", simulate(line, pantograph_named(pantograph), speed, policy, seed=4, **settings))
+    _add(tape, "run", simulate(line, pantograph, speed, policy, seed=4, **settings))
 
 
 def _settings(settings: dict[str, Any], tape: Tape) -> None:

@@ -34,24 +34,13 @@ def cases(quick: bool) -> dict[str, Callable[[Tape], None]]:
     return found if quick else found | commands.slow_cases()
 
 
-def origin() -> dict[str, Any]:
-    """Where the project that runs here was found: its package, its distribution and its entry points."""
-    import panto_env
-
-    points = [point for group in GROUPS for point in entry_points(group=group)]
-    return {
-        "panto_env": panto_env.__file__,
-        "distribution": str(distribution("panto-env").locate_file("")),
-        "entry_points": sorted(
-            f"{point.name}: {point.dist.locate_file('') if point.dist else None}" for point in points
-        ),
-    }
-
-
 def check_origin(site: Path) -> None:
     """End the process unless all that was imported of the project, and all it offers, lies in ``site``."""
-    told = origin()
-    places = [told["distribution"], *(point.partition(": ")[2] for point in told["entry_points"])]
+    found = [
+        distribution("panto-env"),
+        *(point.dist for group in GROUPS for point in entry_points(group=group)),
+    ]
+    places = [str(each.locate_file("")) for each in found if each]
     for name, module in sys.modules.items():
         if name.partition(".")[0] in PACKAGES and getattr(module, "__file__", None):
             places.append(str(module.__file__))
@@ -69,8 +58,6 @@ def main() -> None:
     parser.add_argument("--title", default="", help="what to call this version in the lines that it prints")
     given = parser.parse_args()
     output: Path = given.output.resolve()
-    site = Path(os.environ["PYTHONPATH"])
-    check_origin(site)
     recorded: dict[str, Any] = {}
     chosen = {name: run for name, run in cases(given.quick).items() if fnmatch.fnmatch(name, given.only)}
     for number, (name, run) in enumerate(chosen.items(), start=1):
@@ -83,8 +70,8 @@ def main() -> None:
         recorded[name] = tape.told() | {"seconds": seconds, "failure": failure}
         line = f"{given.title:>14} {number:4}/{len(chosen)} {seconds:6.1f} s  {name}"
         print(line if failure is None else f"{line}\n{failure}", file=sys.stderr, flush=True)
-    check_origin(site)
-    output.write_text(json.dumps({"origin": origin(), "cases": recorded}, indent=1), encoding="utf-8")
+    check_origin(Path(os.environ["PYTHONPATH"]))
+    output.write_text(json.dumps(recorded, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

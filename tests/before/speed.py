@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from .install import Version, installed
+from .compare import Version, installed
 from .stopwatch import ROWS, Row
 
 CHUNKS = 12  # of each version in a round

@@ -56,16 +56,12 @@ def plant(name: str, interval: float, steps: int, episodes: int) -> Chunk:
 
 def one_pass(passes: int, pantograph: str, **settings: Any) -> Chunk:
     """Whole calls of ``simulate``, set-up and record included."""
-    from renamed import pantograph_named  # beside this file, which runs as a script
-
     from panto_env import simulate
-
-    named = pantograph_named(pantograph)
 
     def run() -> NDArray[np.float64]:
         start = _now()
         for _ in range(passes):
-            simulate(record_droppers=False, pantograph=named, **settings)
+            simulate(record_droppers=False, pantograph=pantograph, **settings)
         return _now() - start
 
     return run

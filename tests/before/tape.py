@@ -35,10 +35,7 @@ class Tape:
                 if key not in IGNORED:
                     self.add(f"{name}.{key}", item)
         elif is_dataclass(value):
-            table = {each.name: getattr(value, each.name) for each in fields(value)}
-            if hasattr(value, "alignment") and "speed" in table:  # a run had these two in their place
-                table |= {"span_length": value.alignment.mean_length, "speed_kmh": value.speed_kmh}
-            self.add(name, table)
+            self.add(name, {each.name: getattr(value, each.name) for each in fields(value)})
         elif isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object):
             self._digests[name].update(b"list%d" % len(value))
             for item in value:

@@ -17,9 +17,9 @@ from panto_env.catalog import available, load_catenary, load_family, load_pantog
 from panto_env.catalog.section import LineSection
 from panto_env.plant.catenary import CatenaryData
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.periodic_stiffness import PeriodicStiffnessData
 from panto_env.plant.catenary.rig import RigData
-from panto_env.plant.catenary.three_span.schema import ThreeSpanData
+from panto_env.plant.catenary.three_span import ThreeSpanData
 from panto_env.plant.pantograph.schema import PantographData
 
 LOADERS: dict[str, Callable[[Any], Any]] = {
@@ -67,25 +67,16 @@ def test_every_entry_that_is_promised_is_there() -> None:
 
 
 @pytest.mark.parametrize(("family", "name"), ENTRIES)
-def test_entry_loads_under_its_own_name(family: str, name: str) -> None:
+def test_every_value_has_a_source(family: str, name: str) -> None:
     entry = ALL[family](name)
     assert entry.name == name
     assert entry.description
-
-
-@pytest.mark.parametrize(("family", "name"), ENTRIES)
-def test_every_value_has_a_source(family: str, name: str) -> None:
-    entry = ALL[family](name)
-    keys = {key for key, _ in values(entry)}
-    assert set(entry.sources) == keys
-    untagged = {key: text for key, text in entry.sources.items() if not TAG.match(text)}
-    assert not untagged
+    assert set(entry.sources) == {key for key, _ in values(entry)}
+    assert not {key: text for key, text in entry.sources.items() if not TAG.match(text)}
     for text in entry.sources.values():
         if reference := REFERENCE.match(text):
-            known = {*available(family), *available("catenary")} | {
-                f"family:{own}" for own in available("family")
-            }
-            assert reference[1] in {*entry.sources, *known}, text
+            families = {f"family:{own}" for own in available("family")}
+            assert reference[1] in {*entry.sources, *available(family), *available("catenary"), *families}
 
 
 @pytest.mark.parametrize("name", available("catenary"))
@@ -325,7 +316,11 @@ def refusal(family: str, source: Any) -> str:
 
 
 def test_own_file_with_plain_values(tmp_path: Path) -> None:
-    pantograph = load_pantograph(write(tmp_path, PANTOGRAPH))
+    path = write(tmp_path, PANTOGRAPH)
+    pantograph = load_pantograph(path)
+    assert load_pantograph(path) is pantograph
+    path.write_text(PANTOGRAPH.replace("static_force = 60", "static_force = 65"))
+    assert load_pantograph(path).static_force == 65  # read anew after an edit
     assert isinstance(pantograph, PantographData)
     assert pantograph.name == "mine"
     assert pantograph.masses == (7.0, 12.0)
@@ -338,24 +333,12 @@ def test_own_file_with_plain_values(tmp_path: Path) -> None:
     assert isinstance(load_catenary(write(tmp_path, SPRING)), PeriodicStiffnessData)
 
 
-def test_own_file_is_read_anew_after_an_edit(tmp_path: Path) -> None:
-    path = write(tmp_path, PANTOGRAPH)
-    before = load_pantograph(path)
-    assert load_pantograph(path) is before
-    path.write_text(PANTOGRAPH.replace("static_force = 60", "static_force = 65"))
-    assert load_pantograph(path).static_force == 65
-
-
 @pytest.mark.parametrize("family", LOADERS)
-def test_unknown_name_suggests_the_near_one(family: str) -> None:
+def test_unknown_names_missing_files_and_other_types(family: str, tmp_path: Path) -> None:
     message = refusal(family, "en50318-2020")
     assert "en50318-2020" in message
     assert "did you mean 'en50318-2002'" in message
     assert "did you mean" not in refusal(family, "qqq")
-
-
-@pytest.mark.parametrize("family", LOADERS)
-def test_missing_file_and_other_types(family: str, tmp_path: Path) -> None:
     path = tmp_path / "absent.toml"
     for source in (path, str(path)):
         assert str(path) in refusal(family, source)
@@ -375,37 +358,21 @@ MASSES = "masses = [7.0, 12.0]"
 BAD: list[tuple[str, str, str, str, str]] = [
     # family and file, text replaced, its replacement, the key, what was expected
     ("pantograph", MASSES, f"{MASSES}\nmases = 1", "mases", "did you mean 'masses'"),
-    (
-        "pantograph",
-        MASSES,
-        f"{MASSES}\ncolour = 'red'",
-        "colour",
-        "known are kind, name, description",
-    ),
     ("pantograph", MASSES, f"{MASSES}\nflexible = 1", "flexible", "known are kind"),
     ("pantograph", MASSES, "", "masses", "missing: masses, head first (kg)"),
     ("pantograph", MASSES, "masses = 7", "masses", "a list, such as [7]"),
     ("pantograph", MASSES, "masses = []", "masses", "must not be empty (given: [])"),
     ("pantograph", MASSES, "masses = [7, 'a']", "masses.2", "a number from 0.1 to 200 kg (given: 'a')"),
-    ("pantograph", MASSES, "masses = [7, -2]", "masses.2", "a number from 0.1 to 200 kg (given: -2)"),
     ("pantograph", MASSES, "masses = [7, nan]", "masses.2", "a number from 0.1 to 200 kg (given: nan)"),
     ("pantograph", MASSES, "masses = [7, 6, 5]", "stiffnesses", "3 masses are given"),
     ("pantograph", "[10, 90]", "[10]", "dampings", "but 1 dampings"),
     ("pantograph", "= 60", "= -1", "static_force", "a number from 0 to 1,000 N (given: -1)"),
-    ("pantograph", "= 60", "= inf", "static_force", "a number from 0 to 1,000 N (given: inf)"),
     ("pantograph", "= 60", "= 'big'", "static_force", "a number from 0 to 1,000 N (given: 'big')"),
     ("pantograph", "= 60", "= { valu = 60 }", "static_force", "a number"),
     ("pantograph", "= 60", "= { value = 60, sorce = 'x' }", "static_force", "'sorce'"),
-    ("pantograph", "= 60", "= { vale = 60, source = 'x' }", "static_force", "'vale'"),
     ("pantograph", "= 60", "= { source = 'x' }", "static_force", "must hold 'value'"),
     ("pantograph", "= 60", "= { value = -1, source = 'x' }", "static_force", "given: -1"),
-    (
-        "pantograph",
-        "5e4",
-        "-1",
-        "contact_stiffness",
-        "must be a number from 1,000 to 1e+06 N/m or 'rigid' (given: -1)",
-    ),
+    ("pantograph", "5e4", "-1", "contact_stiffness", "from 1,000 to 1e+06 N/m or 'rigid' (given: -1)"),
     ("pantograph", "5e4", "'rigid'\ncontact_damping = 1", "contact_damping", "must be 0"),
     ("pantograph", '"pantograph"', '"flexible"', "kind", "must be 'pantograph'"),
     ("line", '"flexible"', '"flexibel"', "kind", "'flexible', 'three_span'"),
@@ -437,12 +404,7 @@ def test_bad_value_is_named(tmp_path: Path, file: str, old: str, new: str, key: 
     said = message.removeprefix(str(path))
     assert re.search(rf"\b{re.escape(key)}\b", said), message
     assert expected in said, message
-
-
-def test_wrong_kind_is_said_alone(tmp_path: Path) -> None:
-    message = refusal("pantograph", write(tmp_path, LINE))
-    assert "key 'kind' must be 'pantograph' (given: 'flexible')" in message
-    assert "span_length" not in message
+    assert key != "kind" or "span_length" not in said  # it is said alone
 
 
 @pytest.mark.parametrize("name", available("pantograph"))

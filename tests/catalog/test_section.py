@@ -12,18 +12,18 @@ from panto_env import InputError, simulate
 from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
-from panto_env.catalog.section_parts import Bridge, Masts, lowered
+from panto_env.catalog.section import Bridge, Masts, lowered
 from panto_env.plant.catenary.flexible.overlaps import tension_lengths
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 
 NAMES = ("main-line", "fast-line")
 FIXED = {
-    "re250-curves": ("re250", (200.0, 250.0)),
-    "beijing-tianjin-viaduct": ("beijing-tianjin", (250.0, 300.0)),
-    "sweden-st15-bridge": ("sweden-st15", (160.0, 200.0)),
+    "re250-curves": ("re250", 250.0),
+    "beijing-tianjin-viaduct": ("beijing-tianjin", 300.0),
+    "sweden-st15-bridge": ("sweden-st15", 200.0),
 }
-"""Sections of the catalogue, with the line whose wires they have and the speeds of their trains (km/h)."""
+"""Sections of the catalogue, with the line whose wires they have and their highest speed (km/h)."""
 
 
 def drawn(name, seed):
@@ -67,7 +67,7 @@ def overlaps_are_described(described, line):
 def test_drawn_lines_are_what_the_section_describes(name):
     section, with_ramps = load_section(name), 0
     masts, bridges = section.masts, section.bridges
-    for seed in range(25):
+    for seed in range(15):
         line = drawn(name, seed)
         each, heights, encumbrances = spans_of(line)
         lengths = np.array([span.span_length for span in each])
@@ -96,7 +96,7 @@ def test_drawn_lines_are_what_the_section_describes(name):
             assert first[0] - 1e-9 <= x[0] <= first[1] + 1e-9
             assert 0.8 * spacing[0] < np.diff(x).min() <= np.diff(x).max() < 1.2 * spacing[1]
         overlaps_are_described(section.overlaps, line)
-    assert with_ramps > 8 or bridges.lowering[1] == 0
+    assert with_ramps > 5 or bridges.lowering[1] == 0
 
 
 @pytest.mark.slow
@@ -207,11 +207,10 @@ def test_ramps_have_as_few_spans_as_the_gradient_allows():
     [
         (
             (("[120.0, 160.0]", "[200.0, 280.0]"),),
-            "lowering must be 0, as EN 50119 allows no gradient at 280",
+            "lowering must be 0, as EN 50119 allows no gradient",
         ),
         ((('"sweden-st15"', '"re250-curves"'),), "base must not have a sequence of spans"),
         ((('"sweden-st15"', '"periodic-stiffness"'),), "'base' must be a flexible line or a family"),
-        ((('"sweden-st15"', '"section:fast-line"'),), "'base' must be a flexible line or a family"),
         (
             (('"sweden-st15"', '"swedn-st15"'),),
             "key 'base' names no line: Unknown catenary 'swedn-st15', did you mean 'sweden-st15",
@@ -226,7 +225,6 @@ def test_ramps_have_as_few_spans_as_the_gradient_allows():
             "longer span in a tighter",
         ),
         ((("[0, 2]", "2"), ("[0.0, 0.4]", "2.0")), "No line of section 'mine' was found in 100 draws"),
-        ((("value = 0.25", "value = 3.0"),), "No line of section 'mine' was found in 100 draws"),
         ((("[curves]", "[curve]"),), "curve"),
     ],
 )
@@ -289,9 +287,7 @@ def test_a_section_of_the_catalogue_has_all_values_of_its_base_line(name):
     assert 1000.0 < max(wires[:-1]) <= max(wires) <= 1400.0
 
 
-@pytest.mark.parametrize(
-    ("name", "speed"), [(name, speed) for name, (_, ends) in FIXED.items() for speed in ends]
-)
+@pytest.mark.parametrize(("name", "speed"), [(name, speed) for name, (_, speed) in FIXED.items()])
 def test_a_section_of_the_catalogue_keeps_the_standards(name, speed):
     """A passive run, gradients, and what the droppers carry at rest."""
     line = load_catenary(name)

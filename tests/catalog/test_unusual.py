@@ -10,11 +10,10 @@ from panto_env import InputError, simulate
 from panto_env.base.errors import UnusualWarning
 from panto_env.catalog import available, load_catenary, load_family, load_pantograph, unusual
 from panto_env.catalog.loader import text_of
-from panto_env.catalog.unusual import FACTOR
-from panto_env.catalog.values import values_of
+from panto_env.catalog.values import FACTOR, values_of
 from panto_env.envs import PantographEnv
 from panto_env.plant.catenary import check_line
-from panto_env.plant.pantograph.build import check_at_rest
+from panto_env.plant.pantograph.schema import check_at_rest
 from tests.command import panto
 
 ENTRIES = {
@@ -34,10 +33,8 @@ LITTLE = {
     ("aerodynamic_coefficient", 1e-3),  # the mean force is then below the standard's minimum
     # Springs to the ground are 0.1 to 612 N/m in the catalogue: 0.1 and 100 N/m are both usual.
     *(("stiffnesses 3", 1e3), ("stiffnesses 2", 1e-3)),
-    (
-        "dampings 1",
-        1e3,
-    ),  # 0.11 N s/m is the catalogue's lightest damper of a head, 110 N s/m would be one, too
+    # 0.11 N s/m is the catalogue's lightest damper of a head, 110 N s/m would be one, too.
+    ("dampings 1", 1e3),
 }
 """Slips without a word: key, with the number in a list whose numbers are changed one by one, and factor."""
 
@@ -84,7 +81,6 @@ def end_of(entry, table):
 def test_every_slip_of_a_thousand_is_refused_or_warned_of_or_does_little(name, load):
     entry = load(name.strip())
     ends = {(key, factor): end_of(entry, table) for key, factor, table in slips(entry)}
-    print("\n".join(f"{name} {key} x{factor:g}: {end}" for (key, factor), end in ends.items()))
     assert len(ends) >= 8
     silent = {slip for slip, end in ends.items() if end == "silent"}
     assert not silent - LITTLE
@@ -93,28 +89,10 @@ def test_every_slip_of_a_thousand_is_refused_or_warned_of_or_does_little(name, l
 @pytest.mark.parametrize(
     ("name", "load", "key", "value", "sentence"),
     [
-        (
-            "dsa380",
-            load_pantograph,
-            "stiffnesses",
-            [9.43, 14100, 0.1],
-            "At rest spring 1 .* compressed by 16.5 m",
-        ),
-        (
-            "dsa380",
-            load_pantograph,
-            "stiffnesses",
-            [9430, 14.1, 0.1],
-            "At rest spring 2 .* compressed by 11.1 m",
-        ),
+        ("dsa380", load_pantograph, "stiffnesses", [9.43, 14100, 0.1], "At rest spring 1 .* by 16.5 m"),
+        ("dsa380", load_pantograph, "stiffnesses", [9430, 14.1, 0.1], "At rest spring 2 .* by 11.1 m"),
         ("en50318-2002", load_catenary, "droppers.stiffness", 150.0, "dropper 1 .* stretched by 0.46 m"),
-        (
-            "benchmark-2015",
-            load_catenary,
-            "droppers.axial_stiffness",
-            200.0,
-            "dropper 1 .* stretched by 0.5 m",
-        ),
+        ("benchmark-2015", load_catenary, "droppers.axial_stiffness", 200.0, "dropper 1 .* by 0.5 m"),
         ("en50318-2002", load_catenary, "support.stiffness", 500.0, "supports .* would yield by 2.7 m"),
     ],
 )
@@ -136,9 +114,7 @@ def test_the_force_at_speed_decides_as_well_as_the_static_force():
     table = entry.model_dump() | {"stiffnesses": [450.0, 14100.0, 0.1]}
     soft = type(entry).model_validate(table)
     check_at_rest(soft)  # 70 N: 0.16 m
-    with pytest.raises(
-        InputError, match=r"At rest spring 1 of pantograph 'dsa380' would be compressed by 0\.3"
-    ):
+    with pytest.raises(InputError, match=r"At rest spring 1 of pantograph 'dsa380' .* compressed by 0\.3"):
         simulate(pantograph=soft, speed_kmh=300.0)
 
 
@@ -149,7 +125,7 @@ def test_nothing_of_the_catalogue_and_of_its_families_is_unusual():
         assert not unusual(load_pantograph(name))
     for name in available("family"):
         family = load_family(name)
-        for seed in range(200):
+        for seed in range(50):
             assert not unusual(family.draw(np.random.default_rng(seed))[0])
 
 

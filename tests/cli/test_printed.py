@@ -66,15 +66,9 @@ def record(folder):
     write_record(noisy, folder / "rig.csv")
     run = simulate("periodic-stiffness", "own-two-mass", 250.0)
     noise = 2e-5 * np.random.default_rng(1).standard_normal((2, len(run.time)))
-    columns = {"time (s)": run.time, "head (m)": run.head + noise[0], "frame (m)": run.frame + noise[1]}
-    columns["contact_force (N)"] = run.contact_force
-    np.savetxt(
-        folder / "motion.csv",
-        np.column_stack(list(columns.values())),
-        delimiter=",",
-        header=",".join(columns),
-        comments="",
-    )
+    header = "time (s),head (m),frame (m),contact_force (N)"
+    table = np.column_stack([run.time, run.head + noise[0], run.frame + noise[1], run.contact_force])
+    np.savetxt(folder / "motion.csv", table, delimiter=",", header=header, comments="")
     text = text_of("three-mass").replace("static_force = { value = 70", "static_force = { value = 900")
     (folder / "heavy.toml").write_text(text)
 

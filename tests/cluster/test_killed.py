@@ -15,10 +15,10 @@ pytest.importorskip("stable_baselines3")
 
 from panto_agents import train
 from panto_agents.model_file import read_model
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import Training, parse_training
-from panto_agents.trainings import plan, train_all
+from panto_agents.trainings import RunFolder, plan, train_all
 from panto_env import InputError
+from panto_env.base.files import alone_in
 
 from ..deadly import deadly
 from ..plugin import on_path
@@ -110,15 +110,6 @@ def test_a_training_killed_before_its_first_checkpoint_ends_as_if_it_had_not_bee
     assert steps_evaluated(resumed.path) == [128 * k for k in range(not start, 5)]
 
 
-def test_a_training_killed_after_its_last_checkpoint_tells_what_it_told(tmp_path):
-    folder = train.train(settings(), tmp_path / "run", progress=False)
-    told, _ = read_model(folder.model)
-    folder.model.unlink()
-    train.train(settings(), folder.path, resume=True, progress=False)
-    assert read_model(folder.model)[0] == told
-    assert told.ratio is not None
-
-
 def test_a_training_killed_while_its_folder_was_made_begins_anew(tmp_path):
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
@@ -130,7 +121,7 @@ def test_a_training_killed_while_its_folder_was_made_begins_anew(tmp_path):
 def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
     folder = train.train(settings(total_steps=128), tmp_path / "run", progress=False)
     before = folder.model.read_bytes(), folder.settings.read_text()
-    with folder.alone(), pytest.raises(InputError, match="Another process trains into"):
+    with alone_in(folder.path, "trains into"), pytest.raises(InputError, match="Another process trains into"):
         train.train(settings(), folder.path, resume=True, progress=False)
     assert (folder.model.read_bytes(), folder.settings.read_text()) == before
     train.train(settings(), folder.path, resume=True, progress=False)
@@ -163,17 +154,6 @@ class TestTrainings:
         assert [training.seed for training in plan(configs, None, None, Path("runs")).values()] == [5, 5]
         with pytest.raises(InputError, match="Two of the trainings would go into runs/one-ppo-seed3"):
             plan(configs, [3, 3], None, Path("runs"))
-
-    def test_command(self, tmp_path):
-        (tmp_path / "tiny.toml").write_text(CONFIG.format(more=""))
-        command = ("trainings", "tiny.toml", "--seed", 0, "--seed", 1, "--steps", 128, "--workers", 1)
-        done = panto(*command, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-        assert "runs/tiny-ppo-seed0/best.safetensors" in done.stdout
-        assert "runs/tiny-ppo-seed1/best.safetensors" in done.stdout
-        again = panto(*command, cwd=tmp_path)
-        assert (again.returncode, again.stdout) == (2, "")
-        assert "exists already" in again.stderr
 
 
 def test_without_ray_its_extra_is_named(monkeypatch):

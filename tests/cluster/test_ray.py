@@ -11,7 +11,6 @@ import time
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("ray")
@@ -25,10 +24,9 @@ from panto_agents.settings import Training, parse_training
 from panto_agents.trainings import train_all
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_baselines.tuning.parts import tune
 from panto_env import InputError
-from panto_env.cluster import spread, tasks
-from panto_env.control.settings import run_settings
+from panto_env import cluster as tasks
+from panto_env.cluster import spread
 
 from ..deadly import deadly
 from ..plugin import on_path
@@ -68,16 +66,8 @@ def later(seconds: float, result: str) -> str:
     return result
 
 
-def threads_of_linear_algebra() -> str | None:
-    return os.environ.get("OPENBLAS_NUM_THREADS")
-
-
 def fail() -> None:
     raise InputError("This job fails.")
-
-
-def divide() -> float:
-    return 1 / 0
 
 
 def die() -> None:
@@ -104,23 +94,21 @@ class TestJobs:
     def test_results_are_in_order_and_progress_counts_every_job(self, two_nodes):
         done = []
         jobs = [partial(later, 0.5, "first"), partial(later, 0.0, "second"), partial(later, 0.0, "third")]
+        jobs.append(partial(os.environ.get, "OPENBLAS_NUM_THREADS"))
         results = spread(jobs, ray=two_nodes, progress=lambda *counts: done.append(counts))
-        assert results == ["first", "second", "third"]
-        assert done == [(1, 3), (2, 3), (3, 3)]
-
-    def test_a_worker_has_one_thread_of_linear_algebra(self, two_nodes):
-        assert spread([threads_of_linear_algebra], ray=two_nodes) == ["1"]
+        assert results == ["first", "second", "third", "1"]
+        assert done == [(k, 4) for k in range(1, 5)]
 
     def test_errors_of_jobs_come_through(self, two_nodes):
         with pytest.raises(InputError) as caught:
             spread([fail, partial(later, 0.0, "never mind")], ray=two_nodes)
         assert str(caught.value) == "This job fails."
-        with pytest.raises(ZeroDivisionError):
-            spread([divide], ray=two_nodes)
 
     def test_a_job_that_always_kills_its_worker_is_given_up(self, two_nodes, monkeypatch):
         monkeypatch.setattr(tasks, "RETRIES", 1)
-        with pytest.raises(InputError, match="begun 2 times on the Ray cluster and lost each time") as caught:
+        with pytest.raises(
+            InputError, match="started 2 times on the Ray cluster and lost each time"
+        ) as caught:
             spread([die], ray=two_nodes)
         assert "\n" not in str(caught.value)
 
@@ -176,13 +164,6 @@ def test_a_machine_that_dies_loses_no_job(tmp_path):
     assert results[2:] == ["0", "1", "2", "3"]
 
 
-def test_gains_are_those_that_processes_find(two_nodes, tmp_path):
-    settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
-    given = {"speeds_kmh": (250.0, 300.0), "seeds": 1, "passes": 40}
-    on_ray = tune(tmp_path / "ray", "skyhook", settings, **given, ray=two_nodes)
-    assert on_ray == tune(tmp_path / "here", "skyhook", settings, **given, workers=1)
-
-
 def training(seed: int, **changes) -> Training:
     table = {
         "algorithm": "ppo",
@@ -195,27 +176,6 @@ def training(seed: int, **changes) -> Training:
         "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
     }
     return parse_training(table | changes, "test")
-
-
-def weights(folder: Path) -> list[np.ndarray]:
-    _, actor = read_model(folder / "model.safetensors")
-    return [*actor.weights, *actor.biases]
-
-
-def test_trainings_learn_what_they_learn_in_processes(two_nodes, tmp_path):
-    ways = {"ray": {"ray": two_nodes}, "processes": {"workers": 1}}
-    for way, given in ways.items():
-        outcomes = train_all({tmp_path / way / str(seed): training(seed) for seed in (1, 2)}, **given)
-        assert [outcome.seed for outcome in outcomes] == [1, 2]
-    for seed in ("1", "2"):
-        pairs = zip(weights(tmp_path / "ray" / seed), weights(tmp_path / "processes" / seed), strict=True)
-        for one, other in pairs:
-            np.testing.assert_array_equal(one, other)
-        tables = [(tmp_path / way / seed / "evaluations.csv").read_text() for way in ways]
-        assert tables[0] == tables[1]
-    with pytest.raises(InputError, match="exists already"):
-        train_all({tmp_path / "new": training(3), tmp_path / "ray" / "1": training(1)}, ray=two_nodes)
-    assert not (tmp_path / "new").exists()
 
 
 def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, site, tmp_path):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.catalog import available, load_catenary
-from panto_env.catalog.content import content_of
-from panto_env.catalog.loader import text_of
+from panto_env.catalog.loader import content_of, text_of
 from panto_env.control.lines import on_drawn_line, on_example
 from panto_env.control.settings import run_settings
 from panto_env.plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
@@ -56,6 +55,7 @@ def test_a_place_of_two_values_is_refused(fitted):
 
 @pytest.mark.filterwarnings("error")
 def test_runs_are_in_the_condition_that_was_found(fitted):
+    """A condition of the run comes on top."""
     settings = run_settings({"catenary": str(fitted)})
     assert settings.line_condition == (FOUND,)
     assert (
@@ -66,16 +66,11 @@ def test_runs_are_in_the_condition_that_was_found(fitted):
     same = simulate(LINE, line_condition=FOUND, **SHORT)
     np.testing.assert_array_equal(found.contact_force, same.contact_force)
 
-
-def test_a_condition_of_the_run_comes_on_top(fitted):
     smooth, worn = run_settings(
         {"catenary": str(fitted), "line_condition": ["smooth", "worn"]}
     ).line_condition
     assert smooth == FOUND.model_copy(update={"irregularity": 1.0})
     assert (worn.irregularity, worn.miscut_droppers) == (10.0, FOUND.miscut_droppers)
-    found = simulate(str(fitted), line_condition="smooth", seed=5, **SHORT)
-    same = simulate(LINE, line_condition=smooth, seed=5, **SHORT)
-    np.testing.assert_array_equal(found.contact_force, same.contact_force)
 
 
 def test_a_saved_run_on_it_is_repeated(fitted, tmp_path):
@@ -89,6 +84,8 @@ def test_a_saved_run_on_it_is_repeated(fitted, tmp_path):
     anew = simulate(seed=5, record_droppers=False, **settings)
     np.testing.assert_array_equal(anew.contact_force, run.contact_force)
     assert anew.settings == run.settings
+    same = simulate(LINE, line_condition=settings["line_condition"], seed=5, **SHORT)
+    np.testing.assert_array_equal(same.contact_force, run.contact_force)
 
 
 def test_it_is_so_too_where_it_is_one_of_several(fitted):

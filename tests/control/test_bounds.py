@@ -8,45 +8,24 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_baselines.oracle.settings import OracleSettings
+from panto_baselines.oracle.stored import OracleSettings
 from panto_env import InputError, simulate
-from panto_env.analysis.pool import in_processes, in_threads
 from panto_env.base.settings import parse
-from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
-from panto_env.control.cost import LONGEST, Cost, in_words
+from panto_env.control.length import LONGEST, Cost, in_words
 from panto_env.control.settings import run_settings
-from panto_env.estimation.motion_file import read_motion
-from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of
-from panto_env.identification.band import band_limited
-from panto_env.plant.catenary.flexible import static as static_shape
-
-
-@pytest.fixture(autouse=True)
-def quickly():
-    """None of this takes long."""
-    begun = time.monotonic()
-    yield
-    assert time.monotonic() - begun < 60
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (
-            {"speed_kmh": 0.001},
-            r"18,878,400,000 time steps .* of memory, and to compute it about \d+ days; take",
-        ),
+        ({"speed_kmh": 0.001}, r"18,878,400,000 time steps .* of memory, and to compute it about \d+ days"),
         ({"speed_kmh": 1e-6}, r"GB, but this machine has .* about [\d,]+ years; take a shorter distance"),
         ({"speed_kmh": 1e-300}, "The speed must lie above 0"),
-        ({"speed_kmh": 5e-324}, "The speed must lie above 0"),
         ({"time_step": 1e-9}, "time_step must be a number from 1e-06 to 10 s"),
-        ({"time_step": 1e300}, "time_step must be a number from 1e-06 to 10 s"),
-        ({"spacing": 1e-9}, "spacing must be a number from 0.001 to 1,000 m"),
         ({"spacing": 1e300}, "spacing must be a number from 0.001 to 1,000 m"),
         ({"window": 10**9}, "window must be a whole number from 0 to 1,000"),
         ({"spans": 10**9}, "spans must be a whole number from 3 to 1000"),
-        ({"distance": 1e300}, "distance must be a positive number"),
         ({"distance": 10**400}, "distance must be a positive number"),
         ({"distance": 1e8}, "distance must be at most"),
         ({"actuator": {"delay": 1e9}}, "delay' must be a number from 0 to 1 s"),
@@ -106,38 +85,6 @@ def test_a_number_of_lanes_that_is_none_is_refused(lanes):
         gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=lanes)
 
 
-@pytest.mark.parametrize("mass", [5.0, 30.0, 1e6])
-def test_droppers_of_any_mass_end_the_rounds_of_the_static_shape(mass):
-    line = load_catenary("en50318-2002")
-    droppers = line.droppers.model_copy(update={"mass": mass})
-    wire = line.messenger_wire.model_copy(update={"tension": 500.0})
-    with pytest.raises(InputError, match="does not settle in 200 rounds"):
-        static_shape.solve(line.model_copy(update={"droppers": droppers, "messenger_wire": wire}))
-
-
-@pytest.mark.parametrize("run", [in_processes, in_threads])
-@pytest.mark.parametrize("workers", [0, -1])
-def test_fewer_than_one_worker_are_refused(run, workers):
-    with pytest.raises(InputError, match=f"workers must be 1 or more, not {workers}"):
-        run([time.time], workers=workers)
-
-
-def test_a_band_below_what_a_record_holds_is_refused():
-    record = clean_record(FREQUENCY_SWEEP, parameters_of(load_pantograph("identified-2dof")))
-    for band in (1e-308, 1e-6):
-        with pytest.raises(InputError, match="is too short for motion up to"):
-            band_limited(record, band)
-
-
-def test_a_header_of_spaces_is_read_in_no_time(tmp_path):
-    path = tmp_path / "wide.csv"
-    path.write_text("time" + " " * 20_000 + "s),head (mm),frame (mm)\n" + "0,0,0\n" * 30)
-    begun = time.monotonic()
-    with pytest.raises(InputError):
-        read_motion(path, 0.0)
-    assert time.monotonic() - begun < 2
-
-
 @pytest.mark.parametrize(
     "table",
     [{"hops": 10**6}, {"spans": [1, 10**400]}, {"hops": 10**400}, {"seeds": [-1]}, {"starts": [["zero"]]}],
@@ -147,37 +94,22 @@ def test_an_oracle_without_an_end_is_refused(table):
         parse(OracleSettings, table, "the oracle")
 
 
-class TestTrainings:
-    """Of networks and steps."""
-
-    @pytest.fixture(autouse=True)
-    def _needed(self):
-        pytest.importorskip("stable_baselines3")
-
-    @pytest.mark.parametrize(
-        ("change", "key"),
-        [
-            ({"hyperparameters": {"net_arch": [1_000_000]}}, "net_arch"),
-            ({"hyperparameters": {"net_arch": [8] * 1000}}, "net_arch"),
-            ({"hyperparameters": {"n_epochs": 10**400}}, "n_epochs"),
-            ({"total_steps": 10**12}, "total_steps"),
-            ({"checkpoint_steps": 10**400}, "checkpoint_steps"),
-            ({"lanes": 10**9}, "lanes"),
-            ({"seed": 2**40}, "seed"),
-            ({"seed": -1}, "seed"),
-            ({"cloning": {"steps": 10**12}}, "steps"),
-            ({"algorithm": ["ppo"]}, "algorithm"),
-        ],
-    )
-    def test_one_of_absurd_size_is_refused(self, change, key):
-        from panto_agents.settings import parse_training
-
-        table = {
-            "algorithm": "ppo",
-            "total_steps": 1024,
-            "checkpoint_steps": 512,
-            "environment": {"id": "PantographStiffness-v0"},
-            "evaluation": {"interval_steps": 512},
-        }
-        with pytest.raises(InputError, match=key):
-            parse_training(table | change, "the training")
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"hyperparameters": {"net_arch": [1_000_000]}}, "net_arch"),
+        ({"hyperparameters": {"net_arch": [8] * 1000}}, "net_arch"),
+        ({"hyperparameters": {"n_epochs": 10**400}}, "n_epochs"),
+        ({"total_steps": 10**12}, "total_steps"),
+        ({"checkpoint_steps": 10**400}, "checkpoint_steps"),
+        ({"lanes": 10**9}, "lanes"),
+        ({"seed": -1}, "seed"),
+        ({"cloning": {"steps": 10**12}}, "steps"),
+    ],
+)
+def test_a_training_of_absurd_size_is_refused(change, key):
+    parse_training = pytest.importorskip("panto_agents.settings").parse_training
+    table = {"algorithm": "ppo", "total_steps": 1024, "checkpoint_steps": 512}
+    table |= {"environment": {"id": "PantographStiffness-v0"}, "evaluation": {"interval_steps": 512}}
+    with pytest.raises(InputError, match=key):
+        parse_training(table | change, "the training")

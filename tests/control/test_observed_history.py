@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.control import kept
+from panto_env.catalog import load_catenary
 from panto_env.control.task import Task
 from panto_env.envs import BARE
 
@@ -36,17 +36,15 @@ def test_harmonics_are_sines_and_cosines_of_the_place_in_the_span(name):
             assert seen[:, layout.index(entry)] == pytest.approx(function(2 * np.pi * k * turns), abs=1e-6)
 
 
-@pytest.mark.parametrize("name", [NAME, LIGHT])
-def test_blind_sensors_tell_no_harmonic_of_the_place(name):
-    env = gymnasium.make(name, harmonics=14, sensors="blind").unwrapped
+def test_blind_sensors_tell_no_harmonic_of_the_place():
+    env = gymnasium.make(LIGHT, harmonics=14, sensors="blind").unwrapped
     seen, _ = play(env, 20)
     entries = [k for k, entry in enumerate(env.context.layout.entries) if "of span position" in entry.name]
     assert len(entries) == 28
     assert not seen[:, entries].any()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", [NAME, LIGHT])
+@pytest.mark.parametrize(("name", "kind"), [(NAME, "centred"), *((LIGHT, kind) for kind in KINDS)])
 def test_history_is_what_was_seen_before(name, kind):
     env = gymnasium.make(name, history=3, observation=kind, actuator={"place": "both"}).unwrapped
     seen, _ = play(env, 30)
@@ -77,12 +75,11 @@ def test_no_history_begins_before_its_episode():
     assert begins >= 9
 
 
-@pytest.mark.parametrize("name", [NAME, LIGHT])
-def test_lanes_see_what_a_single_environment_sees(name):
+def test_lanes_see_what_a_single_environment_sees():
     given = {"harmonics": 5, "history": 2, "normalise": (250, 300), "reward": "agent", "distance": 60.0}
     given |= {"speed_kmh": (250, 300)}
-    single = gymnasium.make(name, **given).unwrapped
-    lanes = gymnasium.make_vec(name, num_envs=3, **given)
+    single = gymnasium.make(NAME, **given).unwrapped
+    lanes = gymnasium.make_vec(NAME, num_envs=3, **given)
     observations, _ = lanes.reset(seed=4)
     np.testing.assert_array_equal(single.reset(seed=5)[0], observations[1])
     for actions in np.random.default_rng(0).uniform(-1, 1, (60, 3, 1)):
@@ -94,7 +91,7 @@ def test_lanes_see_what_a_single_environment_sees(name):
             break
 
 
-@pytest.mark.parametrize("speed", [200.0, 275.0, 350.0])
+@pytest.mark.parametrize("speed", [200.0, 350.0])
 def test_normalised_readings_have_a_mean_near_0_and_a_spread_near_1(speed):
     bare = BARE | {"speed_kmh": speed, "normalise": (200, 350), "history": 1, "observation": "measured"}
     env = gymnasium.make(NAME, **bare, distance=1140.0, spans=27).unwrapped
@@ -121,9 +118,7 @@ def test_normalised_readings_have_a_mean_near_0_and_a_spread_near_1(speed):
     ("given", "message"),
     [
         ({"harmonics": 15}, "harmonics must be a whole number from 1 to 14"),
-        ({"harmonics": 0}, "harmonics must be a whole number from 1 to 14"),
         ({"history": 9}, "history must be a whole number from 0 to 8"),
-        ({"history": 1.5}, "history must be a whole number from 0 to 8"),
         ({"normalise": (300, 200)}, "The range normalise must not fall"),
         ({"normalise": "fast"}, "normalise must be a number or a range of two"),
         ({"normalise": 5000.0, "catenary": "en50318-2002"}, "wave speed"),
@@ -150,7 +145,7 @@ def test_a_policy_is_shown_what_it_asks_for():
 
 
 def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr("panto_env.backend.cache.cache_folder", lambda: tmp_path)
     runs, whole = [], Task.run_passively
     monkeypatch.setattr(
         Task, "run_passively", lambda self, watch=None: (runs.append(1), whole(self, watch))[1]
@@ -167,3 +162,5 @@ def test_the_passive_run_is_kept_and_made_anew_where_it_is_damaged(tmp_path, mon
     assert make() == first
     assert len(runs) == 2
     assert make(pantograph="own-two-mass") != first
+    line = load_catenary("periodic-stiffness")
+    assert make(catenary=line.model_copy(update={"mean_stiffness": 4100.0})) != first

@@ -13,23 +13,51 @@ from typer.testing import CliRunner
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose
-from panto_env.diagnosis.cases import BROKEN, TENSION, Defect, Track, draw_defect, drive
 from panto_env.diagnosis.diagnosis import judge
-from panto_env.diagnosis.features import OFFSETS, Sort, candidates, features
+from panto_env.diagnosis.features import (
+    KINDS,
+    OFFSETS,
+    TRAINED,
+    Classifier,
+    Evidence,
+    Sort,
+    candidates,
+    cautious_threshold,
+    features,
+    regions,
+    threshold,
+    trained,
+)
 from panto_env.diagnosis.healthy import FLOOR, Healthy, _whiten
-from panto_env.diagnosis.kinds import KINDS, TRAINED, Classifier, trained
-from panto_env.diagnosis.passes import Passes, side_by_side
-from panto_env.diagnosis.places import Evidence, regions
-from panto_env.diagnosis.threshold import cautious_threshold, threshold
-from panto_env.diagnosis.training import NEAR, examples, fit, save
+from panto_env.diagnosis.passes import Passes
+from panto_env.diagnosis.training import (
+    BEYOND,
+    BROKEN,
+    FIRST,
+    NEAR,
+    SEVERITIES,
+    SPANS,
+    TENSION,
+    Defect,
+    Track,
+    draw_defect,
+    drive,
+    every_defect,
+    examples,
+    fit,
+    save,
+)
 from panto_env.plant.alignment import Alignment
-from panto_env.studies.paper2.diagnosis_cases import within_interval
+from panto_env.plant.line_condition import LineCondition
+from panto_env.studies.paper2.diagnosis import within_interval
 from panto_env.terminal import console
 
-SPAN, PER_SPAN, SPANS = 60.0, 120, 40
+from .conftest import TRACK
+
+SPAN, PER_SPAN, COUNT = 60.0, 120, 40
 
 
-def made_up(count, random, spans=SPANS):
+def made_up(count, random, spans=COUNT):
     """Passes over a line that differ by one pattern and by coloured noise whose size goes with the span."""
     x = np.arange(spans * PER_SPAN) * SPAN / PER_SPAN
     mean, pattern = 100 + 20 * np.cos(2 * np.pi * x / SPAN), 8 * np.sin(2 * np.pi * x / 37)
@@ -81,7 +109,7 @@ def test_threshold_has_the_false_alarms_that_it_is_asked_for(rate):
     """Scores whose spans' largest are Gumbel's in the logarithm, on lines that it has not seen."""
     random = np.random.default_rng(0)
     shape = np.exp(-np.linspace(0, 8, PER_SPAN))
-    largest = np.exp(random.gumbel(0.5, 0.3, (400, SPANS)))
+    largest = np.exp(random.gumbel(0.5, 0.3, (400, COUNT)))
     seen = (largest[:20, :, None] * shape).reshape(20, -1)
     level = threshold(seen, PER_SPAN, SPAN, rate)
     measured = (largest[20:] > level).sum() / (largest[20:].size * SPAN / 1e3)
@@ -156,11 +184,6 @@ def test_healthy_passes_held_against_each_other_are_as_loud_as_further_ones():
     assert np.mean(healthy) == pytest.approx(np.mean(later), rel=0.012)
 
 
-def test_threshold_of_passes_that_do_not_differ_is_left_as_it_is():
-    seen = np.exp(np.random.default_rng(2).gumbel(0, 0.3, (12, 200)))
-    assert 1 <= cautious_threshold(seen, 1, SPAN) / threshold(seen, 1, SPAN) < 1.02
-
-
 def test_a_bump_is_found_where_it_is_and_a_healthy_pass_has_none(learned):
     passes = made_up(12, np.random.default_rng(4))
     limit = threshold(learned.scores, PER_SPAN, SPAN)
@@ -186,7 +209,7 @@ def evidence_of(score, rest=None):
     rest = np.sin(x) if rest is None else rest
     droppers = np.add.outer(np.arange(12) * SPAN, [5, 17, 30, 43, 55]).ravel()
     return Evidence(
-        x, rest, np.asarray(score, dtype=float), 5.0, Alignment.equal(SPAN, SPANS), droppers, 70.0, 120.0, 2.0
+        x, rest, np.asarray(score, dtype=float), 5.0, Alignment.equal(SPAN, COUNT), droppers, 70.0, 120.0, 2.0
     )
 
 
@@ -238,26 +261,22 @@ def test_a_classifier_s_file_cannot_hold_anything_to_run(tmp_path):
         Classifier.load(path)
 
 
-def test_an_interval_reaches_to_the_next_droppers():
-    droppers = np.array([5.0, 17.0, 30.0, 43.0, 55.0, 65.0])
-    assert within_interval(43.0, 30.0, droppers)
-    assert within_interval(17.0, 30.0, droppers)
-    assert not within_interval(43.5, 30.0, droppers)
-    assert within_interval(64.0, 55.0, droppers)
-    assert not within_interval(42.0, 55.0, droppers)
+UNEVEN = Track("en50318-2002", "dsa380", 200.0, 1, 0.0)
 
 
-TRACK = Track("en50318-2002", "dsa250", 220.0, seed=31)
-
-
-@pytest.fixture(scope="module")
-def healthy_runs():
-    return [drive(TRACK, k) for k in range(12)]
-
-
-@pytest.fixture(scope="module")
-def model(healthy_runs):
-    return Healthy.of(side_by_side(healthy_runs[:1], [*healthy_runs[1:], drive(TRACK, 19)])[1])
+@pytest.mark.parametrize(("given", "broken"), [((), 1), ((1,), 1), ((8,), 8)])
+def test_there_is_one_of_each_severity_and_as_many_broken_droppers_as_wanted(given, broken):
+    defects = every_defect(UNEVEN, np.random.default_rng(0), *given)
+    assert sum(defect.kind == BROKEN for defect in defects) == broken
+    others = [(defect.kind, defect.severity) for defect in defects if defect.kind != BROKEN]
+    assert others == [
+        (kind, each) for kind, several in SEVERITIES.items() if kind != BROKEN for each in several
+    ]
+    assert FIRST < BEYOND < SPANS
+    begin, end = (UNEVEN.data.alignment().support(each) for each in (FIRST - 1, BEYOND))
+    for defect in defects:
+        LineCondition(**defect.condition)  # can be simulated
+        assert np.isnan(defect.position) if defect.kind == TENSION else begin <= defect.position <= end + 10
 
 
 def test_broken_droppers_are_found_and_named_and_a_healthy_line_is_healthy(healthy_runs):
@@ -289,17 +308,15 @@ def test_lost_tension_changes_the_whole_line(healthy_runs):
     assert found.notes == ()
 
 
-def test_healthy_passes_over_other_lines_are_said_to_be_unlike(healthy_runs):
+def test_healthy_passes_that_are_few_or_over_other_lines_are_said_to_be(healthy_runs):
     others = [drive(replace(TRACK, seed=1000 + k), 0) for k in range(6)]
-    found = diagnose(healthy_runs[:1], others)
-    assert "differ by" in found.notes[-1]
-    assert "if they are over other lines" in found.notes[-1]
-
-
-def test_few_healthy_passes_are_said_to_be_few(healthy_runs):
-    found = diagnose(healthy_runs[:1], healthy_runs[1:4])
-    assert len(found.notes) == 2
-    assert found.notes[0].startswith("Only 3 healthy passes")
+    note = diagnose(healthy_runs[:1], others).notes[-1]
+    assert "differ by" in note
+    assert "if they are over other lines" in note
+    rare, often = (diagnose(healthy_runs[:1], healthy_runs[1:4], false_alarms=rate) for rate in (0.01, 5.0))
+    assert rare.evidence.threshold > 1.2 * often.evidence.threshold
+    assert len(rare.notes) == 2
+    assert rare.notes[0].startswith("Only 3 healthy passes")
 
 
 @pytest.mark.parametrize(
@@ -336,7 +353,7 @@ def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
     """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
     monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_EACH", 1)
     monkeypatch.setattr(
-        "panto_env.diagnosis.cases.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
+        "panto_env.diagnosis.training.SEVERITIES", {BROKEN: (1.0,), "hard spot": (5.0,), "worn wire": (0.3,)}
     )
     shown, classes = examples(TRACK)
     assert set(classes) == {0, 1, KINDS.index("hard spot") + 1, KINDS.index("worn wire") + 1}
@@ -392,9 +409,3 @@ def test_command_refuses(files, extra, message):
     told = CliRunner().invoke(make_app(), ["diagnose", files[0], *extra])
     assert isinstance(told.exception, InputError)
     assert message in str(told.exception)
-
-
-def test_threshold_that_is_asked_for_is_used(model, healthy_runs):
-    passes, _ = side_by_side(healthy_runs[:1], healthy_runs[1:])
-    rare, often = (judge(passes, model, rate).evidence.threshold for rate in (0.01, 5.0))
-    assert rare > 1.2 * often

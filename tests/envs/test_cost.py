@@ -6,7 +6,7 @@ import pytest
 
 from panto_env import InputError
 from panto_env.catalog import load_catenary
-from panto_env.control.safety import limits
+from panto_env.control.reward import limits
 from panto_env.envs import BARE
 from panto_env.metrics.low_pass import low_pass
 
@@ -90,16 +90,6 @@ def test_ending_early_costs_as_if_the_rest_were_without_contact():
     left = env.task.length.most_control_steps - steps
     assert info["cost"] == pytest.approx(1 + left, abs=1.0)
     assert total > left
-
-
-def test_the_vector_environment_gives_the_same():
-    costs, _ = episode()
-    envs = gymnasium.make_vec(NAME, num_envs=2, **STRONG)
-    envs.reset(seed=[1, 5])
-    for k, cost in enumerate(costs[:-1]):
-        *_, infos = envs.step(np.full((2, 1), np.sin(0.1 * k), dtype=np.float32))
-        assert infos["cost"][0] == cost
-        assert infos["_cost"].all()
 
 
 @pytest.mark.parametrize("cost", [{"uplift": -1}, {"upliftt": 1}, "much", {"max_force": float("nan")}])

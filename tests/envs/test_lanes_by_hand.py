@@ -13,7 +13,6 @@ import pytest
 from panto_env import InputError
 from panto_env.base.errors import AccuracyWarning
 from panto_env.base.machine import cores
-from panto_env.envs import PantographVectorEnv
 from panto_env.envs.lanes import ended_figures
 
 from .test_lines import FAMILY, make_vec, values_of
@@ -60,24 +59,7 @@ def test_a_line_that_has_had_more_than_enough_episodes_is_drawn_anew():
     for _ in range(6):
         envs.reset(options={"reset_mask": np.array([True, True, False])})
         lines.append(values_of(envs.unwrapped.context(0)))
-    assert [one == other for one, other in itertools.pairwise(lines)] == [
-        True,
-        False,
-        True,
-        False,
-        True,
-    ]
-
-
-def test_lanes_that_are_drawn_are_those_that_there_are():
-    PantographVectorEnv(num_envs=3, render_lanes=(0, 2))
-    for lanes, beyond in (((3,), 3), ((0, 5, 7), 5)):
-        with pytest.raises(InputError, match=f"render_lanes has lane {beyond}, but lanes are 0 to 2"):
-            PantographVectorEnv(num_envs=3, render_lanes=lanes)
-    with pytest.raises(InputError, match="3 lanes are too few for 4 lines; give fewer lines"):
-        PantographVectorEnv(num_envs=3, lines=4, **FAMILY)
-    assert len(PantographVectorEnv(num_envs=3, lines=3, **FAMILY)._lanes._groups) == 3
-    assert len(PantographVectorEnv(num_envs=3, **FAMILY)._lanes._groups) == 3
+    assert [one == other for one, other in itertools.pairwise(lines)] == [True, False] * 2 + [True]
 
 
 def test_a_run_that_diverged_has_no_figures_and_the_warning_is_the_caller_s():

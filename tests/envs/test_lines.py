@@ -17,7 +17,7 @@ from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
 
 from ..lanes import check_lanes_are_singles
-from .test_vector_rules import actions_of, assert_same, native, of_singles
+from .test_vector_rules import check_alike, native, of_singles
 
 SHORT = {"distance": 25.0, "settle": 0.0, "reward": "agent", "accuracy": "fast"}
 FAMILY = {"catenary": "family:high-speed"} | SHORT
@@ -94,6 +94,8 @@ def test_an_option_chooses_the_line_of_an_episode():
     observation, _ = env.reset(seed=3, options={"catenary": "ln2"})
     np.testing.assert_array_equal(observation, plain.reset(seed=3)[0])
     np.testing.assert_array_equal(run_to_end(env), run_to_end(plain))
+    plain.reset(seed=0, options={"catenary": load_catenary("re330")})
+    assert plain.unwrapped.context.catenary == load_catenary("re330")
     plain.reset(seed=3, options={"catenary": "family:high-speed"})
     assert plain.unwrapped.context.catenary == line_of(3, catenary="family:high-speed", speed_kmh=(200, 300))
 
@@ -107,14 +109,12 @@ def test_the_episode_on_a_drawn_line_is_that_on_the_same_line_given():
     np.testing.assert_array_equal(run_to_end(drawn, 0.3), run_to_end(given, 0.3))
 
 
-@drawn
-def test_gymnasium_s_checker_accepts_it(settings):
-    check_env(make(**settings).unwrapped, skip_render_check=True)
+def test_gymnasium_s_checker_accepts_it():
+    check_env(make(**FAMILY).unwrapped, skip_render_check=True)
 
 
-@drawn
-def test_copies_go_on_alike(settings):
-    env = make(**settings)
+def test_copies_go_on_alike():
+    env = make(**SECTION)
     env.reset(seed=1)
     twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
     seen = run_to_end(env)
@@ -153,24 +153,8 @@ def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
 
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_lanes_on_lines_of_their_own_answer_as_gymnasium_s_vector_environment(mode):
-    """Observations, rewards, ends, and infos with figures and masks, over the ends of episodes."""
     ours = native("Pantograph-v0", autoreset_mode=mode, **FAMILY)
-    theirs = of_singles("Pantograph-v0", mode=mode, **FAMILY)
-    (mine, my_infos), (other, infos) = ours.reset(seed=5), theirs.reset(seed=5)
-    np.testing.assert_array_equal(mine, other)
-    assert_same(my_infos, infos)
-    ends = 0
-    for action in actions_of(ours, 80):
-        mine, other = ours.step(action), theirs.step(action)
-        for k in range(4):
-            np.testing.assert_array_equal(mine[k], other[k])
-        assert_same(mine[4], other[4])
-        ended = mine[2] | mine[3]
-        ends += ended.sum()
-        if mode == AutoresetMode.DISABLED and ended.any():
-            mine, other = (envs.reset(options={"reset_mask": ended.copy()}) for envs in (ours, theirs))
-            np.testing.assert_array_equal(mine[0], other[0])
-            assert_same(mine[1], other[1])
+    ends, _ = check_alike(ours, of_singles("Pantograph-v0", mode=mode, **FAMILY), 80, mode)
     assert ends > 3
 
 
@@ -252,51 +236,18 @@ def test_options_go_to_each_group():
     np.testing.assert_array_equal(observations[0], single.step(np.zeros(1, np.float32))[0])
 
 
-@drawn
-def test_an_action_that_is_not_finite_moves_no_group(settings):
-    envs = make_vec(4, lines=2, **settings)
-    envs.reset(seed=0)
-    actions = np.zeros((4, 1), np.float32)
-    actions[3] = np.nan
-    with pytest.raises(InputError, match="The action of lane 3 must be finite"):
-        envs.step(actions)
-    fresh = make_vec(4, lines=2, **settings)
-    fresh.reset(seed=0)
-    for _ in range(3):
-        ours, theirs = (each.step(np.zeros((4, 1), np.float32)) for each in (envs, fresh))
-    np.testing.assert_array_equal(ours[0], theirs[0])
-
-
-@drawn
-def test_groups_are_copied_with_their_state(settings):
-    envs = make_vec(4, lines=2, **settings)
-    envs.reset(seed=0)
-    envs.step(np.zeros((4, 1), np.float32))
-    twin = pickle.loads(pickle.dumps(envs))
-    for actions in np.random.default_rng(0).uniform(-1, 1, (40, 4, 1)).astype(np.float32):
-        ours, theirs = envs.step(actions), twin.step(actions)
-        for k in range(4):
-            np.testing.assert_array_equal(ours[k], theirs[k])
-
-
 @pytest.mark.parametrize(
     ("lanes", "settings", "message"),
     [
         (2, {"lines": 3} | FAMILY, "2 lanes are too few for 3 lines"),
         (2, {"lines": 2} | SHORT, "lines are drawn from a list, a family or a section"),
         (2, {"episodes_per_line": 0} | FAMILY, "episodes_per_line must be a whole number from 1"),
+        (3, {"render_lanes": (3,)} | SHORT, "render_lanes has lane 3, but lanes are 0 to 2"),
     ],
 )
-def test_bad_numbers_of_lines_are_refused(lanes, settings, message):
+def test_bad_numbers_of_lines_and_lanes_are_refused(lanes, settings, message):
     with pytest.raises(InputError, match=message):
         make_vec(lanes, **settings)
-
-
-def test_a_line_given_by_value_is_an_option_too():
-    line = load_catenary("re330")
-    env = make(**FAMILY)
-    env.reset(seed=0, options={"catenary": line})
-    assert env.unwrapped.context.catenary == line
 
 
 @drawn

@@ -6,9 +6,12 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from panto_env.backend.compile import JIT, OPTIONS  # noqa: E402
+from panto_env.backend.compile import (  # noqa: E402
+    JIT,
+    KERNEL_OPTIONS,
+    OPTIONS,
+)
 from panto_env.backend.cuda import PackedTiles, in_tile  # noqa: E402
-from panto_env.backend.parts import KERNEL_OPTIONS  # noqa: E402
 from panto_env.control import on_device  # noqa: E402
 from panto_env.control.on_device import BEGUN, RESULTS, control_unless_idle  # noqa: E402
 from tests.envs.test_tensors import CASES, DEVICE, both, check_episodes, check_same  # noqa: E402

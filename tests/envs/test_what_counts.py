@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_baselines.policies.washout import Washout, WashoutSettings
+from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.control.reward import REWARDS
 from panto_env.envs import BARE
@@ -86,17 +86,10 @@ def test_an_early_end_before_anything_counts_is_charged_for_what_would_have_coun
     assert "std" not in info["figures"]  # it has none
 
 
-@pytest.mark.parametrize("lanes", [None, 3])
-def test_a_washout_is_that_of_the_policies_where_the_actuator_is_ideal(lanes):
+def test_a_washout_is_that_of_the_policies_where_the_actuator_is_ideal():
     """Independent code: what a policy's own high-pass makes of the same actions."""
     settings = {"distance": 150.0, "actuator": {"force_limit": 50.0, "place": "both"}}
-
-    def make(**more):
-        if lanes is None:
-            return gymnasium.make(LIGHT, **settings, **more).unwrapped
-        return gymnasium.make_vec(LIGHT, num_envs=lanes, **settings, **more).unwrapped
-
-    inside, outside = make(washout=0.7), make()
+    inside, outside = (gymnasium.make(LIGHT, **settings, **more) for more in ({"washout": 0.7}, {}))
     shape = inside.action_space.shape
     own = Washout(WashoutSettings(time_constant=0.7, lag=0.0, rate=1e12), 0.01, 50.0, shape)
     for each in (inside, outside):
@@ -134,16 +127,10 @@ def test_with_the_target_passive_the_cost_function_counts_from_the_passive_mean(
     by_hand = np.sum(0.5 * (deviation[1:] + deviation[:-1])) * run.stride
     assert sum(each["cost_function"] for each in terms) == pytest.approx(by_hand, rel=1e-3)
     weights = REWARDS["benchmark"]
-    expected = -(
-        weights.cost_function
-        * sum(each["cost_function"] for each in terms)
-        / run.nominal_force
-        / run.stride
-        / env.task.length.control_steps
-        + weights.low_passed * sum(each["low_passed"] for each in terms)
-        + weights.rate * sum(each["rate"] for each in terms)
-    )
-    assert rewards.sum() == pytest.approx(expected)
+    sums = {name: sum(each[name] for each in terms) for name in terms[0]}
+    relative = sums["cost_function"] / run.nominal_force / run.stride / env.task.length.control_steps
+    expected = weights.cost_function * relative + weights.rate * sums["rate"]
+    assert rewards.sum() == pytest.approx(-expected - weights.low_passed * sums["low_passed"])
 
 
 def test_where_a_mean_is_required_the_nominal_target_is_that_mean():
@@ -163,6 +150,5 @@ def test_policies_command_forces_as_they_are_unless_they_ask_for_a_washout():
     assert wishes(policy)["washout"] == 0.0
     policy.washout = 2.0
     assert wishes(policy)["washout"] == 2.0
-    assert (
-        simulate("periodic-stiffness", "three-mass", policy=policy, distance=60.0).settings["washout"] == 2.0
-    )
+    run = simulate("periodic-stiffness", "three-mass", policy=policy, distance=60.0)
+    assert run.settings["washout"] == 2.0

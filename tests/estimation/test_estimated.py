@@ -11,8 +11,7 @@ from panto_env.catalog import load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.estimation.kalman import run_filter, steady_gains
-from panto_env.estimation.model import build_model
-from panto_env.estimation.settings import EstimatorSettings
+from panto_env.estimation.model import EstimatorSettings, build_model
 from panto_env.plant.state import Row
 
 FLEXIBLE = {"catenary": "en50318-2002", "pantograph": "own-two-mass", "speed_kmh": 250.0}

@@ -8,24 +8,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from panto_env import InputError, simulate
+from panto_env import InputError
+from panto_env.base.record_columns import LENGTHS
 from panto_env.cli.estimate import _scores_table
-from panto_env.estimation.motion import measure
-from panto_env.estimation.motion_file import read_motion, write_motion
-from panto_env.estimation.score import Score
+from panto_env.estimation.estimate import Score, phases
+from panto_env.estimation.motion import FORCES, SHORTEST, SPEEDS, measure, read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
 from ..command import panto
-
-
-@pytest.fixture(scope="module")
-def run():
-    return simulate("en50318-2002", "own-two-mass", 250, time_step=5e-4, record_droppers=False)
-
-
-@pytest.fixture(scope="module")
-def motion(run):
-    return measure(run)
 
 
 @pytest.fixture(scope="module")
@@ -33,12 +23,6 @@ def record(motion, tmp_path_factory):
     path = tmp_path_factory.mktemp("train") / "record.csv"
     write_motion(motion, path)
     return path
-
-
-def shortened(motion, count):
-    """The first samples of a motion."""
-    series = {name: value[:count] for name, value in vars(motion).items() if isinstance(value, np.ndarray)}
-    return dataclasses.replace(motion, **series)
 
 
 def test_a_measurement_is_the_run_with_noise(run):
@@ -95,14 +79,6 @@ def test_a_motion_survives_its_file(motion, record):
         np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
 
 
-def test_twenty_samples_are_the_fewest_of_a_record(motion, tmp_path):
-    for count in (19, 20):
-        write_motion(shortened(motion, count), tmp_path / f"{count}.csv")
-    assert len(read_motion(tmp_path / "20.csv", 120.0).head) == 20
-    with pytest.raises(InputError, match="20"):
-        read_motion(tmp_path / "19.csv", 120.0)
-
-
 def test_the_command_prints_compares_and_writes(record, tmp_path, monkeypatch):
     monkeypatch.setattr("panto_env.terminal.console._width", 200)
     output, picture = tmp_path / "force.parquet", tmp_path / "force.png"
@@ -155,14 +131,7 @@ def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
     ("change", "options", "message"),
     [
         (lambda rows: [*rows[:3000], *rows[3100:]], (), "Time steps are not equal"),
-        (lambda rows: [*rows[:3000], rows[2000], *rows[3001:]], (), "Time does not increase at sample 3000"),
-        (lambda rows: [rows[0].replace("head (mm)", "head"), *rows[1:]], (), "Column head of .* has no unit"),
         (lambda rows: [rows[0].replace("frame (mm)", "y (mm)"), *rows[1:]], (), "has no column frame"),
-        (
-            lambda rows: [*rows[:50], rows[50].replace(",", ",x", 1), *rows[51:]],
-            (),
-            "Line 51 of .*: column head",
-        ),
         (lambda rows: rows[:15], (), "14 samples, too few to estimate a force"),
         (lambda rows: rows, ("--pantograph", "dsa380"), "aerodynamic uplift; give the speed"),
         (lambda rows: rows, ("--force-model", "shaped"), "The shaped force model needs the speed"),
@@ -185,3 +154,54 @@ def test_bad_input_to_the_command_is_one_sentence(change, options, message, reco
     assert re.search(message, " ".join(shown.stderr.split())), shown.stderr
     assert "Traceback" not in shown.stderr
     assert sorted(each.name for each in tmp_path.iterdir()) == ["mine.csv"]
+
+
+FACTORS = {"m": 1.0, "mm": 1e-3, "m/s": 1.0, "mm/s": 1e-3, "N": 1.0, "kN": 1e3}
+FACTORS |= dict.fromkeys(("um", "µm", "μm"), 1e-6)
+
+
+def file_of(path, headers, count=SHORTEST):
+    rows = [",".join(headers)]
+    rows += [
+        ",".join([f"{0.5 + 0.01 * k:.2f}", *(f"{7 + k + i}" for i in range(len(headers) - 1))])
+        for k in range(count)
+    ]
+    path.write_text("\n".join(rows))
+    return path
+
+
+@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize("force", FORCES)
+def test_each_column_is_read_in_its_unit(tmp_path, length, speed, force):
+    units = {"head": length, "frame": length, "head_velocity": speed, "frame_velocity": speed}
+    units |= dict.fromkeys(("frame_force", "head_force", "contact_force"), force)
+    path = file_of(tmp_path / "m.csv", ["time (s)", *(f"{name} ({unit})" for name, unit in units.items())])
+    motion = read_motion(path, 100.0, speed=70.0, span=60.0)
+    for i, (name, unit) in enumerate(units.items()):
+        expected = FACTORS[unit] * (7 + i + np.arange(SHORTEST))
+        np.testing.assert_allclose(getattr(motion, name), expected, rtol=1e-12)
+    assert motion.time_step == pytest.approx(0.01)
+    assert (motion.start, motion.lift, motion.speed, motion.span) == (0.5, 100.0, 70.0, 60.0)
+
+
+def test_what_is_not_measured_is_none_or_no_force(tmp_path):
+    motion = read_motion(file_of(tmp_path / "m.csv", ["time (s)", "head (m)", "frame (m)"]), 100.0)
+    assert motion.head_velocity is motion.frame_velocity is motion.contact_force is None
+    assert not motion.frame_force.any()
+    assert motion.frame_force.shape == motion.head_force.shape == (SHORTEST,)
+    with pytest.raises(InputError, match=str(SHORTEST)):
+        read_motion(file_of(tmp_path / "s.csv", ["time (s)", "head (m)", "frame (m)"], SHORTEST - 1), 100.0)
+
+
+@pytest.mark.parametrize(("seconds", "apart"), [(1.0, 2.0), (3.0, 2 / 3), (4.0, 0.5), (20.0, 0.5)])
+def test_pieces_of_a_spectrum_are_of_2_s_or_half_of_a_short_record(seconds, apart):
+    random, step = np.random.default_rng(0), 0.005
+    true = random.normal(0, 1, round(seconds / step))
+    found = phases(true, true, step)
+    assert found.frequency[0] == pytest.approx(apart)
+    np.testing.assert_allclose(np.diff(found.frequency), apart)
+    np.testing.assert_allclose(found.coherence, 1.0)
+    np.testing.assert_allclose(found.delay, 0.0, atol=1e-12)
+    unlike = phases(true, random.normal(0, 1, len(true)), step)
+    assert unlike.coherence.mean() < 0.9, "of a single piece every coherence would be 1"

@@ -7,10 +7,11 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.catalog import load_pantograph
-from panto_env.estimation.estimate import estimate, filter_motion, model_of
+from panto_env.estimation.estimate import estimate, filter_motion, model_of, tune
 from panto_env.estimation.force import RandomWalk
 from panto_env.estimation.innovations import log_likelihood
 from panto_env.estimation.kalman import steady_gains
+from panto_env.estimation.model import PAPER2, EstimatorSettings
 from panto_env.estimation.motion import Motion
 from panto_env.estimation.parameters import (
     LIFT,
@@ -20,8 +21,6 @@ from panto_env.estimation.parameters import (
     information,
     parameter_names,
 )
-from panto_env.estimation.settings import PAPER2, EstimatorSettings
-from panto_env.estimation.tuning import tune
 
 TRUE = load_pantograph("own-two-mass")
 STEP, N = 2e-3, 5000

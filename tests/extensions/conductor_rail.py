@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.ranges import Between
+from ...base.settings import Between
 from .protocol import (
+    NOTHING,
     CatenaryKind,
     StartPoint,
     look_at_contact,
@@ -17,7 +18,6 @@ from .protocol import (
     refuse_defects,
 )
 from .schema import CatenaryData
-from .view import NOTHING
 
 
 class ConductorRailData(CatenaryData):

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ...backend import implements
-from ...base.ranges import Between
+from ...base.settings import Between
 from ..state import ROW, Place
 from .base import ActuatorSettings, drive
 

@@ -17,9 +17,8 @@ from panto_env.studies.en50318.convergence import in_use
 
 from . import simulation, twin
 from .differences import at_rest
-from .figures import Run
+from .figures import Run, draw
 from .figures import figures as figures_of
-from .pictures import draw
 from .sections import Section, sections
 from .trains import cases
 from .windy import ALIKE, STRONG, WIND, by_both, compared

@@ -18,8 +18,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from panto_env.plant.pantograph.schema import PantographData
 
 from .hermite import Array, Indices
-from .newmark import Chain, Newmark
-from .solvers import complementarity, narrow
+from .newmark import Chain, Newmark, complementarity, narrow
 from .system import LineSystem
 
 
@@ -28,8 +27,7 @@ class Collector:
     """A pantograph of a train."""
 
     pantograph: PantographData
-    behind: float = 0.0
-    """Distance behind the first one (m)."""
+    behind: float = 0.0  # distance behind the first one (m)
 
 
 @dataclass(frozen=True)
@@ -38,14 +36,12 @@ class Touch:
 
     collector: int
     pair: int
-    speed: float
-    """Of the collector along the wire (m/s): 0 while it waits."""
+    speed: float  # of the collector along the wire (m/s): 0 while it waits
     unknowns: Indices
     values: Array
     slopes: Array
     height: float
-    incline: float
-    """These as ``LineSystem.contact_point`` returns them."""
+    incline: float  # these as ``LineSystem.contact_point`` returns them
 
     def wire(self, wires: Newmark) -> tuple[float, float, float]:
         """Height (m) and velocity (m/s) of the wire here, and how fast it rises along the way (m/s)."""
@@ -57,14 +53,10 @@ class Touch:
 class Step(NamedTuple):
     """What is known at the end of a step."""
 
-    forces: Array
-    """On each pair's contact wire, (n_collectors, n_pairs) (N)."""
-    heads: Array
-    """Heights of the heads, (n_collectors,) (m)."""
-    lowest: Array
-    """Heights of the lowest contact wire over each, (n_collectors,) (m)."""
-    dropper_tension: Array
-    """Shape (n_droppers,) (N)."""
+    forces: Array  # on each pair's contact wire, (n_collectors, n_pairs) (N)
+    heads: Array  # heights of the heads, (n_collectors,) (m)
+    lowest: Array  # heights of the lowest contact wire over each, (n_collectors,) (m)
+    dropper_tension: Array  # shape (n_droppers,) (N)
 
 
 class Contacts:

@@ -11,7 +11,7 @@ from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.shape import StaticShape as ShapeOfSimulator
 from panto_env.plant.catenary.flexible.static import hang
 
-from .pairs import pairs_of
+from .rest import pairs_of
 from .static import StaticShape, static_shape
 from .whole_line import ClosedLine, LineShape, designed
 
@@ -20,14 +20,10 @@ from .whole_line import ClosedLine, LineShape, designed
 class AtRest:
     """Largest differences of both codes."""
 
-    contact: float
-    """Heights of the contact wire (m)."""
-    messenger: float
-    """Heights of the messenger (m)."""
-    force: float
-    """Droppers' forces (N)."""
-    length: float
-    """Distances of the loaded wires at droppers (m), so heights of stitch wires too."""
+    contact: float  # heights of the contact wire (m)
+    messenger: float  # heights of the messenger (m)
+    force: float  # droppers' forces (N)
+    length: float  # distances of the loaded wires at droppers (m), so heights of stitch wires too
 
 
 def at_rest(line: FlexibleCatenaryData, element: float = 0.1) -> AtRest:

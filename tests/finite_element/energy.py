@@ -19,14 +19,10 @@ from .system import build
 class Balance:
     """Of a run."""
 
-    error: float
-    """Largest difference of what was given from what is stored and lost (J)."""
-    turnover: float
-    """Integral of the magnitude of the power (J)."""
-    steps_with_slack: int
-    """Number of steps in which a dropper was slack."""
-    wire_forces: Array
-    """On each pair's contact wire, (n_steps, n_collectors, n_pairs) (N)."""
+    error: float  # largest difference of what was given from what is stored and lost (J)
+    turnover: float  # integral of the magnitude of the power (J)
+    steps_with_slack: int  # number of steps in which a dropper was slack
+    wire_forces: Array  # on each pair's contact wire, (n_steps, n_collectors, n_pairs) (N)
 
 
 def balance(

@@ -38,8 +38,7 @@ BOTH = {
         for length, height, encumbrance in zip(LENGTHS, HEIGHTS, LOW, strict=True)
     ]
 }
-BESIDE_SUPPORTS = [2.5, 6.0]
-"""Where droppers hang from a stitch wire, from the support (m)."""
+BESIDE_SUPPORTS = [2.5, 6.0]  # where droppers hang from a stitch wire, from the support (m)
 STITCHED_330 = {"stitch_wire": {"length": 18.0, "tension": 3.5e3, "mass": 0.31}}
 STITCHED_250 = {"stitch_wire": {"length": 18.0, "tension": 2.8e3, "mass": 0.31}}
 BARE = {"stitch_wire": {"length": 0.0}}

@@ -27,14 +27,12 @@ def resistance(wire: Wire, wind: float, filled: float) -> float:
 class SideWind:
     """Gusts, and the matrices by which they act; of a line with one pair of wires and no stitch wires."""
 
-    gusts: Array
-    """Shape (n, 4): amplitude (m/s), frequency (Hz), wavenumber (1/m), phase (turns)."""
+    gusts: Array  # shape (n, 4): amplitude (m/s), frequency (Hz), wavenumber (1/m), phase (turns)
     nodes: Array
     by_air: sparse.csr_array
     """Force (N) of the air on all unknowns by its vertical speed (m/s) over the wires' nodes."""
     free: Array
-    before: float
-    """Time that wires are blown upon before the train starts (s)."""
+    before: float  # time that wires are blown upon before the train starts (s)
 
     def push(self, time: float) -> Array:
         """Force on all unknowns (N) at a time after the train's start (s)."""

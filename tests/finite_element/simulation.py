@@ -39,26 +39,19 @@ class Result:
     """One pass of a collector; n_times steps from the start of the first one at x = 0, heights over nominal
     contact wire height."""
 
-    time: Array
-    """Shape (n_times,) (s)."""
-    position: Array
-    """Position of the collector, shape (n_times,) (m): negative while it waits at the anchor."""
-    contact_force: Array
-    """Unfiltered, of all wires that are touched, shape (n_times,) (N)."""
-    head: Array
-    """Height of the collector head, shape (n_times,) (m)."""
-    wire: Array
-    """Height of the lowest contact wire at the contact point, shape (n_times,) (m)."""
+    time: Array  # shape (n_times,) (s)
+    position: Array  # position of the collector, shape (n_times,) (m): negative while it waits at the anchor
+    contact_force: Array  # unfiltered, of all wires that are touched, shape (n_times,) (N)
+    head: Array  # height of the collector head, shape (n_times,) (m)
+    wire: Array  # height of the lowest contact wire at the contact point, shape (n_times,) (m)
     uplift: Array
     """Contact wire in use over its static shape at the interior supports, shape (n_times, spans - 1) (m).
 
     The whole train's, like all that follows but the force on wires."""
-    support_position: Array
-    """Where these stand, shape (spans - 1,) (m)."""
+    support_position: Array  # where these stand, shape (spans - 1,) (m)
     dropper_tension: Array
     """Shape (n_times, n_droppers), droppers in order along the line, pair of wires by pair (N)."""
-    wire_forces: Array
-    """Contact force on each pair's contact wire, shape (n_times, n_pairs) (N)."""
+    wire_forces: Array  # contact force on each pair's contact wire, shape (n_times, n_pairs) (N)
 
 
 def simulate(

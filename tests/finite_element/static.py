@@ -20,22 +20,15 @@ __all__ = ["GRAVITY", "StaticShape", "static_shape"]
 class StaticShape:
     """One span of an endless line; heights over the contact wire's nominal height, up positive."""
 
-    x: Array
-    """Node positions (m), shape (n_nodes,); both supports are nodes."""
-    contact: Array
-    """Contact wire height (m), shape (n_nodes,)."""
-    contact_slope: Array
-    """Contact wire slope (-), shape (n_nodes,)."""
-    messenger: Array
-    """Messenger wire height (m), shape (n_nodes,)."""
-    messenger_slope: Array
-    """Messenger wire slope (-), shape (n_nodes,)."""
+    x: Array  # node positions (m), shape (n_nodes,); both supports are nodes
+    contact: Array  # contact wire height (m), shape (n_nodes,)
+    contact_slope: Array  # contact wire slope (-), shape (n_nodes,)
+    messenger: Array  # messenger wire height (m), shape (n_nodes,)
+    messenger_slope: Array  # messenger wire slope (-), shape (n_nodes,)
     hanger: Array
     """Height of what a dropper would hang from: a stitch wire, or the messenger (m), shape (n_nodes,)."""
-    dropper_tension: Array
-    """Tension above the contact-wire clamp (N), shape (n_droppers,)."""
-    dropper_length: Array
-    """Distance of the loaded wires at each dropper (m), shape (n_droppers,)."""
+    dropper_tension: Array  # tension above the contact-wire clamp (N), shape (n_droppers,)
+    dropper_length: Array  # distance of the loaded wires at each dropper (m), shape (n_droppers,)
 
 
 def static_shape(line: FlexibleCatenaryData, element: float = 0.25) -> StaticShape:

@@ -26,8 +26,7 @@ SAME = 1e-9  # m within which two places are one
 class Stitch:
     """A stitch wire where it hangs."""
 
-    support: float
-    """Position of the support over its middle (m)."""
+    support: float  # position of the support over its middle (m)
     wire: StitchWire
 
     @property
@@ -69,8 +68,7 @@ class Upper:
         """nodes: positions (m), (n_nodes,), the clamps' among them."""
         self.tension = np.full(nodes.size - 1, wire.tension)
         """Of the messenger in each element, (n_nodes - 1,) (N)."""
-        self.under = 2 * np.arange(nodes.size)
-        """Unknown from which a dropper at each node hangs, (n_nodes,)."""
+        self.under = 2 * np.arange(nodes.size)  # unknown from which a dropper at each node hangs, (n_nodes,)
         self.clamps = np.zeros(nodes.size)
         """Mass of stitch wires' clamps at each node of the messenger, (n_nodes,) (kg)."""
         size, strings = 2 * nodes.size, []

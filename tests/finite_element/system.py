@@ -23,28 +23,21 @@ class LineSystem:
     After those of its nodes come the heights of its stitch wires; then the next pair's.
     """
 
-    nodes: Array
-    """Node positions (m), shape (n_nodes,), pair after pair."""
-    free: Array
-    """1 for an unknown, 0 for a fixed wire end, shape (n_unknowns,)."""
-    static: Array
-    """Static height and slope of the contact wire (m, -), shape (n_nodes, 2)."""
+    nodes: Array  # node positions (m), shape (n_nodes,), pair after pair
+    free: Array  # 1 for an unknown, 0 for a fixed wire end, shape (n_unknowns,)
+    static: Array  # static height and slope of the contact wire (m, -), shape (n_nodes, 2)
     mass: sparse.csr_array
     damping: sparse.csr_array
     stiffness: sparse.csr_array
     """Matrices (kg, N s/m, N/m), shape (n_unknowns, n_unknowns); unit mass at fixed unknowns."""
     extension: sparse.csr_array
     """Height of each dropper's upper end less that of its lower one, shape (n_droppers, n_unknowns)."""
-    dropper_stiffness: Array
-    """Shape (n_droppers,) (N/m)."""
-    dropper_damping: Array
-    """Shape (n_droppers,) (N s/m)."""
-    dropper_tension: Array
-    """Static tension, shape (n_droppers,) (N)."""
+    dropper_stiffness: Array  # shape (n_droppers,) (N/m)
+    dropper_damping: Array  # shape (n_droppers,) (N s/m)
+    dropper_tension: Array  # static tension, shape (n_droppers,) (N)
     supports: Indices
     """Unknowns that are the height of the contact wire in use at the interior supports, integers."""
-    support_position: Array
-    """Where the interior supports stand, shape (spans - 1,) (m)."""
+    support_position: Array  # where the interior supports stand, shape (spans - 1,) (m)
     pairs: tuple[tuple[int, int, int], ...]
     """First node, node after the last, and first unknown of each pair of wires."""
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.static import hang
 
 from .differences import at_rest
-from .pairs import pairs_of
+from .rest import pairs_of
 from .sections import STITCHED_330, sections, stitched
 from .whole_line import ClosedLine, built
 

@@ -20,10 +20,8 @@ from .simulation import simulate
 SPANS, CHANGED, COMPARED = 36, range(9, 15), (540.0, 900.0)
 """Spans of the line, so many that no wave comes back from its end; those whose droppers are changed, and the
 stretch that is compared (m)."""
-DROPPERS = 9
-"""Of each span."""
-LOST = 0.02
-"""Share of the contact wire's tension that is missing."""
+DROPPERS = 9  # of each span
+LOST = 0.02  # share of the contact wire's tension that is missing
 SPEEDS, STEP, NOISE = (200.0, 250.0), 2e-3, 1.0
 """Of the records (km/h), their time step (s) and the rms of their noise (N)."""
 FREE_ARM = {"mass": 0.0, "stiffness": 0.0, "holds_wire": False}

@@ -12,8 +12,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from .contacts import Collector
 from .energy import balance
 from .newmark import chain_matrices
-from .pairs import pairs_of
-from .rest import at_rest, pair_at_rest
+from .rest import at_rest, pair_at_rest, pairs_of
 from .sections import STITCHED_330, line_of, sections, stitched
 from .simulation import ride, simulate
 from .system import build, joined, of_pair

@@ -1,4 +1,4 @@
-"""How both codes share the contact force between the two wires of an overlap."""
+"""How both codes share the contact force between the two wires of an overlap; and the judge is judged."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,8 @@ import pytest
 from panto_env import simulate
 from panto_env.plant.state import Row
 
+from ..marks import some_in_proofs
+from .figures import figures
 from .sections import sections
 
 
@@ -42,3 +44,15 @@ def test_wires_are_touched_at_the_same_places_by_the_same_forces(name):
 
 
 ROWS = Row.STEP, Row.CONTACT_FORCE, Row.SECOND_FORCE
+
+
+@pytest.mark.parametrize("name", some_in_proofs(sections(), ["stitched-330"]))
+def test_half_of_element_and_step_change_the_figures_little(name):
+    """Extremes by a share of the mean force: the minimum converges last."""
+    section = sections()[name]
+    runs = (section.by_finite_elements(share * section.element) for share in (1.0, 0.5))
+    coarse, fine = (figures(run, section.spans) for run in runs)
+    assert (coarse.std, coarse.mean) == pytest.approx((fine.std, fine.mean), rel=0.005)
+    extremes = coarse.maximum, coarse.minimum
+    assert extremes == pytest.approx((fine.maximum, fine.minimum), abs=0.012 * fine.mean)
+    assert coarse.uplifts_mm == pytest.approx(fine.uplifts_mm, abs=0.25)

@@ -9,8 +9,7 @@ from panto_env.plant.catenary.flexible.schema import StitchWire
 
 from .contacts import Collector
 from .energy import balance
-from .pairs import pairs_of
-from .rest import at_rest
+from .rest import at_rest, pairs_of
 from .sections import BARE, STITCHED_330, sections, stitched
 from .simulation import simulate
 from .static import GRAVITY, static_shape
@@ -146,18 +145,6 @@ def test_a_stitch_wire_of_no_tension_without_droppers_is_none():
         abs(simulate(real, load_pantograph("cx"), 250.0, spans=4).contact_force - runs[1].contact_force).max()
         > 3
     )
-
-
-def test_equal_stitched_spans_of_a_sequence_move_as_one_span_repeated():
-    """The shape of a whole line, with half a stitch wire at its ends, and of a periodic span."""
-    line = stitched("re330", CLAMPED)
-    unlike = {"sequence": [{}, {}, {"encumbrance": line.encumbrance + 1e-9}, {}, {}]}
-    many = stitched("re330", CLAMPED | unlike)
-    assert many.sequence
-    one, other = (simulate(each, load_pantograph("cx"), 250.0, spans=5) for each in (line, many))
-    for key in ("contact_force", "head", "wire", "uplift", "support_position", "dropper_tension"):
-        expected = getattr(one, key)
-        np.testing.assert_allclose(getattr(other, key), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 def test_every_support_has_its_own_span_s_stitch_wire_and_the_ends_have_none_in_motion():

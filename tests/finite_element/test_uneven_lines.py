@@ -9,25 +9,28 @@ from panto_env.plant.catenary.flexible.spans import spans_of
 from .contacts import Collector
 from .energy import balance
 from .rest import at_rest
-from .sections import line_of, sections
+from .sections import STITCHED_330, line_of, sections, stitched
 from .simulation import figures, simulate, stretch
 from .system import build
 
 SECTIONS = sections()
 
 
-@pytest.mark.parametrize("name", ["en50318-2002", "benchmark-2015"])
+@pytest.mark.parametrize("name", ["en50318-2002", "benchmark-2015", "re330, stitched"])
 def test_equal_spans_of_a_sequence_move_as_one_span_repeated(name):
-    """The shape of a whole line and of a periodic span, droppers and supports one by one and all alike."""
-    line, pantograph = load_catenary(name), load_pantograph(name)
-    unlike = {"sequence": [{}, {}, {}, {"encumbrance": line.encumbrance + 1e-9}, {}, {}, {}]}
-    one, many = (
-        simulate(each, pantograph, 250.0, spans=7)
-        for each in (line, line_of(name, unlike))  # one that is all alike would be the uniform line again
-    )
+    """The shape of a whole line, with half a stitch wire at its ends, and of a periodic span."""
+    spans, changes, make, pantograph = 7, {}, line_of, name
+    if name == "re330, stitched":
+        own = STITCHED_330["stitch_wire"] | {"clamp_mass": 0.4}
+        spans, changes, make, name, pantograph = 5, {"stitch_wire": own}, stitched, "re330", "cx"
+    line = make(name, changes)
+    unlike = [{}] * (spans - 4) + [{"encumbrance": line.encumbrance + 1e-9}] + [{}] * 3
+    many = make(name, changes | {"sequence": unlike})  # one that is all alike would be the uniform line again
+    assert many.sequence
+    one, other = (simulate(each, load_pantograph(pantograph), 250.0, spans=spans) for each in (line, many))
     for key in ("position", "contact_force", "head", "wire", "uplift", "support_position", "dropper_tension"):
         expected = getattr(one, key)
-        np.testing.assert_allclose(getattr(many, key), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+        np.testing.assert_allclose(getattr(other, key), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 def test_every_support_arm_and_dropper_is_its_own_span_s():

@@ -25,16 +25,11 @@ from .system import build
 class Trace:
     """One collector's pass by the simulator; n_steps means over steps, so places are those at mid-step."""
 
-    time: Array
-    """Shape (n_steps,) (s)."""
-    position: Array
-    """Shape (n_steps,) (m): negative while it waits."""
-    contact_force: Array
-    """Shape (n_steps,) (N)."""
-    uplift: Array
-    """The whole train's, shape (n_steps, spans - 1) (m)."""
-    support_position: Array
-    """Shape (spans - 1,) (m)."""
+    time: Array  # shape (n_steps,) (s)
+    position: Array  # shape (n_steps,) (m): negative while it waits
+    contact_force: Array  # shape (n_steps,) (N)
+    uplift: Array  # the whole train's, shape (n_steps, spans - 1) (m)
+    support_position: Array  # shape (spans - 1,) (m)
 
 
 @dataclass(frozen=True)
@@ -44,10 +39,8 @@ class Case:
     line: FlexibleCatenaryData
     collectors: tuple[Collector, ...]
     speed_kmh: float
-    spans: tuple[int, int] = (4, 11)
-    """For each collector by its own position."""
-    element: float = 0.25
-    """Of the judge (m)."""
+    spans: tuple[int, int] = (4, 11)  # for each collector by its own position
+    element: float = 0.25  # of the judge (m)
 
     @property
     def distance(self) -> float:

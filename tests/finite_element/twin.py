@@ -16,8 +16,7 @@ from panto_env.plant.catenary.schema import Wire
 from panto_env.plant.pantograph.schema import PantographData
 
 from .figures import low_passed
-from .pairs import pairs_of
-from .rest import pair_at_rest
+from .rest import pair_at_rest, pairs_of
 from .sections import Section
 from .simulation import Result, ride
 from .system import LineSystem, joined, of_pair
@@ -143,12 +142,9 @@ def on_both(pantograph: PantographData) -> PantographData:
 class Shared:
     """How a head shares its force between two wires over some spans."""
 
-    first: float
-    """Share of the force that is on the first wire (%)."""
-    alone: float
-    """Share of the way on which one wire alone is touched (%)."""
-    std: float
-    """Standard deviation of the force on the first wire, below 20 Hz (N)."""
+    first: float  # share of the force that is on the first wire (%)
+    alone: float  # share of the way on which one wire alone is touched (%)
+    std: float  # standard deviation of the force on the first wire, below 20 Hz (N)
 
 
 def shared(run: Result, spans: tuple[int, int]) -> Shared:

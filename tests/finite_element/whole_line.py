@@ -24,20 +24,14 @@ from .stitch import GRAVITY, Upper, nodes_between, stitches_at
 class LineShape:
     """The line itself, without its mirror images; heights over the nominal one."""
 
-    x: Array
-    """Node positions (m), shape (n_nodes,)."""
-    contact: Array
-    """Contact wire height (m), shape (n_nodes,)."""
-    contact_slope: Array
-    """Contact wire slope (-), shape (n_nodes,)."""
-    messenger: Array
-    """Messenger wire height (m), shape (n_nodes,)."""
+    x: Array  # node positions (m), shape (n_nodes,)
+    contact: Array  # contact wire height (m), shape (n_nodes,)
+    contact_slope: Array  # contact wire slope (-), shape (n_nodes,)
+    messenger: Array  # messenger wire height (m), shape (n_nodes,)
     hanger: Array
     """Height of what a dropper would hang from: a stitch wire, or the messenger (m), shape (n_nodes,)."""
-    dropper_tension: Array
-    """Above the contact-wire clamp, shape (n_droppers,) (N)."""
-    dropper_length: Array
-    """Distance of the loaded wires at each dropper, shape (n_droppers,) (m)."""
+    dropper_tension: Array  # above the contact-wire clamp, shape (n_droppers,) (N)
+    dropper_length: Array  # distance of the loaded wires at each dropper, shape (n_droppers,) (m)
     support_force: Array
     """With which supports carry the messenger, shape (n_spans + 1,) (N): half of it at the ends."""
 

@@ -10,7 +10,7 @@ from panto_env.catalog import load_catenary
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.side_wind import BANDS
+from panto_env.plant.wind import SIDE_BANDS
 
 from .figures import Run
 from .sections import MIXED as SPANS_THAT_DIFFER
@@ -19,12 +19,10 @@ from .side_wind import blown_upon
 from .simulation import ride
 from .system import build
 
-ALIKE = load_catenary("en50318-2002").model_copy(update={"spans": 9})
-"""Nine spans, all alike."""
+ALIKE = load_catenary("en50318-2002").model_copy(update={"spans": 9})  # nine spans, all alike
 MIXED = line_of("en50318-2002", SPANS_THAT_DIFFER)
 SPEED, WIND, ELEMENT = 250.0, 30.0, 0.35  # km/h, m/s, m
-STRONG = 5
-"""Seed of gusts that raise sigma by half on equal spans."""
+STRONG = 5  # seed of gusts that raise sigma by half on equal spans
 
 
 def compared(line: FlexibleCatenaryData) -> tuple[int, int]:
@@ -51,7 +49,7 @@ def by_both(
     rows, step, before = task.plant.model.wire.gusts.table[0].copy(), task.plant.time_step, 0.0
     task.run_passively()
     ours = task.trajectory(0)
-    gusts = rows[1:].reshape(BANDS, 4) / [step, step, 1.0, 1.0]
+    gusts = rows[1:].reshape(SIDE_BANDS, 4) / [step, step, 1.0, 1.0]
     wind = rows[0] / step
     if gusts[:, 0].any():
         air = task.plant.model.line.air

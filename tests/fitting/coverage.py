@@ -11,27 +11,27 @@ python -m tests.fitting.coverage FOLDER --table
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from panto_env import simulate
 from panto_env.base.files import write_whole
 from panto_env.catalog import load_catenary, load_pantograph, load_section
-from panto_env.fitting.fit import INTERVAL, WHITE, fit
-from panto_env.plant.catenary.flexible.attached import dropper_positions
+from panto_env.diagnosis import diagnose_records
+from panto_env.fitting.fit import INTERVAL, WHITE, Fit, fit
+from panto_env.fitting.stored import knowledge
+from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
-
-from .later import LATER, later
 
 LINE, PANTOGRAPH, SPANS, BEYOND = "en50318-2002", "dsa380", 16, 12
 SECTION, SECTION_SPANS = "fast-line", 18
@@ -172,6 +172,39 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     return rows
 
 
+SPEED = 235.0
+"""Of later passes (km/h on the uniform line), at which nothing was fitted."""
+LOST = 0.01
+"""Share of the contact wire's tension that is lost."""
+LATER = (
+    "healthy, called so",
+    "broken dropper, found in its place",
+    "1 % of tension lost, line called changed",
+)
+
+
+def later(fit: Fit, passes: Callable[..., list[Record]], seed: int) -> dict[str, bool]:
+    """Whether each of three later passes is diagnosed as what it is: over the line as it was, with one broken
+    dropper, and with less tension.
+
+    passes: records over the line of the fit, as ``coverage.records_of`` takes its last arguments. seed: of
+    which dropper is broken, of the middle half of those compared.
+    """
+    known, built = knowledge(fit, "earlier"), LINE_CONDITIONS["as-built"]
+    droppers = fit.of_kind("droppers")
+    value = droppers[int(len(droppers) * np.random.default_rng(seed).uniform(0.25, 0.75))].value
+    _, number, _, _, span = value.name.split()
+    broken = built.model_copy(update={"broken_droppers": ((int(span), int(number)),)})
+    slack = built.model_copy(update={"lost_contact_tension": LOST})
+    healthy, other, changed = (
+        diagnose_records(passes(condition=condition, speeds=(SPEED,), visit=visit), known)
+        for visit, condition in enumerate((built, broken, slack), start=1)
+    )
+    places = [(each.kind, each.span, each.dropper) for each in other.findings]
+    found = healthy.healthy, ("broken dropper", int(span), int(number)) in places, changed.changed
+    return dict(zip(LATER, found, strict=True))
+
+
 def _short(number: float) -> float:
     return float(f"{number:.3g}")
 
@@ -179,13 +212,6 @@ def _short(number: float) -> float:
 def known(path: Path) -> list[dict[str, Any]]:
     """What was found before of lines of a group."""
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
-
-
-def write(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write what was found of lines of a group, a row for each line."""
-    text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
-    with write_whole(path) as temporary:
-        temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
 
 
 def groups(folder: Path) -> Iterator[tuple[tuple[int, int, int], list[Any]]]:
@@ -213,13 +239,9 @@ def table(folder: Path) -> Iterator[str]:
             errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
             inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
             cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
-        unlike = np.mean([_unlike_noise(each) for each in own])
+        unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
         cells = [line, model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
         yield f"| {' | '.join(cells)} |"
-
-
-def _unlike_noise(row: dict[str, Any]) -> bool:
-    return bool(min(row["as_noise"]) < WHITE)
 
 
 def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
@@ -237,7 +259,7 @@ def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
             kinds["both"] = [each for own in kinds.values() for each in own]
             yield "both", number, passes, kinds["both"]
             for name, own in kinds.items():
-                good = [each for each in own if each["settled"] and not _unlike_noise(each)]
+                good = [each for each in own if each["settled"] and not min(each["as_noise"]) < WHITE]
                 if good:
                     yield f"{name}, settled and like noise", number, passes, good
 
@@ -253,30 +275,29 @@ def diagnosed(folder: Path) -> Iterator[str]:
             yield f"| {' | '.join([LINES[line], model_of(number), f'{len(own)}', *cells])} |"
 
 
-def main() -> None:
-    """Judge lines that are missing, or print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--lines", type=int, default=20)
-    parser.add_argument("--passes", type=int, default=4, choices=range(1, len(SPEEDS) + 1))
-    parser.add_argument("--line", choices=LINES, default=LINES[0])
-    parser.add_argument("--wrong", choices=WRONG, default=WRONG[0])
-    parser.add_argument("--diagnose", action="store_true")
-    parser.add_argument("--table", action="store_true")
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    if not given.table:
-        path = given.folder / f"{given.line}-{given.wrong}-{given.passes}.json"
-        done = {row["seed"] for row in known(path) if "later" in row or not given.diagnose}
-        for seed in sorted(set(range(given.lines)) - done):
-            row = judge(seed, given.passes, given.wrong, given.line, given.diagnose)
-            write(path, [*(other for other in known(path) if other["seed"] != seed), row])
-            print(f"line {seed + 1} of {given.lines}", flush=True)
-    for text in (*table(given.folder), "", *diagnosed(given.folder)):
+def main(
+    folder: Path,
+    lines: int = 20,
+    passes: int = len(SPEEDS),
+    line: str = LINES[0],
+    wrong: str = WRONG[0],
+    diagnose: bool = False,
+    only_table: Annotated[bool, typer.Option("--table")] = False,
+) -> None:
+    """Judge lines that are missing, and print the table."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{line}-{wrong}-{passes}.json"
+    done = {row["seed"] for row in known(path) if "later" in row or not diagnose}
+    for seed in [] if only_table else sorted(set(range(lines)) - done):
+        rows = [other for other in known(path) if other["seed"] != seed]
+        rows.append(judge(seed, passes, wrong, line, diagnose))
+        text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
+        with write_whole(path) as temporary:
+            temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")
+        print(f"line {seed + 1} of {lines}", flush=True)
+    for text in (*table(folder), "", *diagnosed(folder)):
         print(text)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -1,4 +1,4 @@
-"""What has changed between two fits: against least squares on both records at once, and as a command."""
+"""Fits in files: what has changed between two, against least squares on both records; where one goes on."""
 
 import json
 from dataclasses import replace
@@ -6,15 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from panto_env.base.array_file import read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.fitting.drift import SMALLER, drift
-from panto_env.fitting.stored import Stored, store, stored, turned
-from panto_env.fitting.tables import rows_of, summary_table, values_table
+from panto_env.fitting.misfit import State
+from panto_env.fitting.stored import Stored, identity_of, keep, kept, store, stored, turned
 from panto_env.fitting.values import WAVES, Value
+from panto_env.records.record import Piece, Record
 
 from ..command import panto
-from ..crafted import ODD, changed, entries
+from ..documents import ROOT
+from .coverage import diagnosed, table
 
 COUNT, TOLERANCE = 12, 5e-3
 
@@ -164,56 +165,15 @@ def test_the_command(folder):
 
 
 def test_the_command_as_json_and_without_changes(folder):
-    done = panto("drift", "month0.safetensors", "month1.safetensors", "--json", cwd=folder)
-    rows = {row["name"]: row for row in json.loads(done.stdout)["values"]}
-    assert [name for name, row in rows.items() if row["changed"]] == ["dropper 4"]
-    same = panto("drift", "month0.safetensors", "month0.safetensors", cwd=folder)
-    assert "Nothing has changed that these records would tell." in same.stdout
-    loose = panto(
-        "drift", "month0.safetensors", "month1.safetensors", "--tolerance", "dropper=0.01", cwd=folder
+    first, second = "month0.safetensors", "month1.safetensors"
+    rows = json.loads(panto("drift", first, second, "--json", cwd=folder).stdout)["values"]
+    assert [row["name"] for row in rows if row["changed"]] == ["dropper 4"]
+    assert (
+        "Nothing has changed that these records would tell."
+        in panto("drift", first, first, cwd=folder).stdout
     )
-    assert loose.returncode == 2
-    assert "--tolerance of unknown 'dropper'" in loose.stderr
-
-
-def crafted(path):
-    """Table and arrays of a fit, each with one entry that is wrong."""
-    table, arrays = read_arrays(path)
-    for place in entries(table):
-        if place[0] != "values" or len(place) == 1 or place[1] < 1:  # all values are alike
-            yield from ((changed(table, place, value), arrays) for value in (*ODD, KeyError))
-    for name, array in arrays.items():
-        first = np.arange(array.size).reshape(array.shape) == 0
-        for wrong in (
-            array[:-1], array[None], -array, 0 * array, 1e300 * array, 3 * array, array * np.nan,
-            array.astype(int), array.astype("f4"), array.astype(bool), np.where(first, np.inf, array),
-            np.where(first, 9 * array, array),
-        ):  # fmt: skip
-            yield table, arrays | {name: np.ascontiguousarray(wrong)}
-        yield table, {key: each for key, each in arrays.items() if key != name}
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_crafted_fit_is_refused_in_a_sentence_or_compared(folder):
-    """With a checksum that fits: no entry leads to anything but a result or one sentence."""
-    path, whole = folder / "crafted.safetensors", stored(folder / "month1.safetensors")
-    ends = []
-    for table, arrays in crafted(folder / "month0.safetensors"):
-        write_arrays(path, table, arrays)
-        try:
-            known = stored(path)
-            for pair in ((known, whole), (whole, known), (known, known)):
-                found = drift(*pair)
-                rows = rows_of(found.found)
-                assert np.isfinite([row["low"] for row in rows]).all()
-                assert summary_table(found.found, found.changed, "").cells
-                values_table(found.changed, "").cells  # noqa: B018
-            ends.append("compared")
-        except InputError as error:
-            ends.append("refused" if str(error).endswith(".") and "\n" not in str(error) else "rude")
-    assert "rude" not in ends
-    assert ends.count("refused") > 250
-    assert ends.count("compared") > 20
+    loose = panto("drift", first, second, "--tolerance", "dropper=0.01", cwd=folder)
+    assert (loose.returncode, "--tolerance of unknown 'dropper'" in loose.stderr) == (2, True)
 
 
 def test_waves_of_spans_that_begin_elsewhere_are_the_same_waves():
@@ -235,3 +195,56 @@ def test_waves_of_spans_that_begin_elsewhere_are_the_same_waves():
             return of[2 * k + 1] * np.cos(angle) + of[2 * k + 2] * np.sin(angle)
 
         np.testing.assert_allclose(height(seen, x), height(parts, x + 137.0), atol=1e-12)
+
+
+SETTINGS = {"free": ["droppers"], "tolerances": {"droppers": 0.01}, "line": "{}"}
+
+
+@pytest.fixture
+def record():
+    x = np.arange(100.0)
+    return Record("a", (Piece("", 0.002, 0.0, x, 120 + np.sin(x)), Piece("", 0.002, 1.0, x + 200, 120 - x)))
+
+
+@pytest.fixture
+def state():
+    random = np.random.default_rng(0)
+    return State(random.standard_normal(30), np.array([70.0, 71.0]), random.uniform(size=(2, 6)), 7)
+
+
+def test_a_state_is_read_back_and_another_fit_s_is_not_taken(tmp_path, record, state):
+    path, identity = tmp_path / "a.fit", identity_of([record], SETTINGS)
+    keep(path, state, identity)
+    keep(path, replace(state, steps=8), identity)
+    found = kept(path, identity)
+    assert found.steps == 8
+    for name in ("x", "static_forces", "noise"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(state, name))
+    one, two = record.pieces
+    force = two.force.copy()
+    force[50] += 1e-9
+    for pieces in ((one, replace(two, force=force)), (one, replace(two, position=two.position + 1)), (one,)):
+        assert kept(path, identity_of([replace(record, pieces=pieces)], SETTINGS)) is None
+    for other in ({"tolerances": {}}, {"free": ["droppers", "tensions"]}):
+        assert kept(path, identity_of([record], SETTINGS | other)) is None
+    assert kept(path, identity_of([replace(record, name="b")], SETTINGS)) is not None  # the same samples
+
+
+def test_a_damaged_file_is_not_taken(tmp_path, record, state):
+    path, identity = tmp_path / "a.fit", identity_of([record], SETTINGS)
+    assert kept(path, identity) is None
+    keep(path, state, identity)
+    whole = path.read_bytes()
+    for content in (whole[:-9], b"", whole[:-5] + bytes([whole[-5] ^ 1]) + whole[-4:]):
+        path.write_bytes(content)
+        assert kept(path, identity) is None
+
+
+STORED = ROOT / "docs" / "records-coverage"
+
+
+def test_the_documents_have_the_table_of_the_stored_lines():
+    text = (ROOT / "docs" / "records.md").read_text(encoding="utf-8")
+    for rows in (list(table(STORED)), list(diagnosed(STORED))):
+        assert len(rows) > 2
+        assert [row for row in rows if row not in text] == []

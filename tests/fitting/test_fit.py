@@ -6,10 +6,8 @@ from threadpoolctl import threadpool_limits
 
 from panto_env.base.machine import CAN_CHOOSE_CORES, on_cores
 from panto_env.fitting.fit import fit
-from panto_env.fitting.plots import plot_fit
-from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import STEPS
-from panto_env.fitting.tables import parts_table, plain
+from panto_env.fitting.tables import parts_table, plain, plot_fit
 from panto_env.fitting.values import TOLERANCES
 
 from .test_problem import moved
@@ -33,47 +31,32 @@ def fitted(record, design, pantograph, coarse, steps):
     )
 
 
-@pytest.fixture(scope="module")
-def errors(fitted, truth):
-    """Errors of each kind of value, and their standard deviations."""
-    found = {}
-    for kind in ("tensions", "droppers", "supports"):
-        own = fitted.of_kind(kind)
-        found[kind] = (
-            np.array([each.difference - truth.of(each.value) for each in own]),
-            np.array([each.deviation for each in own]),
+def test_tensions_droppers_and_supports_are_found_within_their_intervals(fitted, truth):
+    errors, deviations = (
+        {
+            kind: np.array([measure(each) for each in fitted.of_kind(kind)])
+            for kind in ("tensions", "droppers", "supports")
+        }
+        for measure in (
+            lambda each: each.difference - truth.of(each.value),
+            lambda each: each.deviation,
         )
-    return found
-
-
-def test_tensions(errors):
-    assert np.abs(errors["tensions"][0]).max() < 5e-3
-    assert (errors["tensions"][1] < 0.2 * TOLERANCES["tensions"]).all()
-
-
-def test_droppers(errors):
-    error, deviation = errors["droppers"]
-    assert len(error) == 42
-    assert np.median(np.abs(error)) < 3e-3
-    assert error.std() < 2.5e-3  # of 5 mm that they were drawn with
-    assert 0.1 < np.median(deviation) / TOLERANCES["droppers"] < 0.7
-
-
-def test_supports(errors):
-    error, deviation = errors["supports"]
-    assert len(error) == 5
-    assert np.median(np.abs(error)) < 6e-3  # hardly told by 4.6 spans
-    assert (deviation < TOLERANCES["supports"]).all()
-
-
-def test_truths_lie_within_intervals(errors):
-    inside = np.concatenate([np.abs(error) < 1.96 * deviation for error, deviation in errors.values()])
-    assert inside.mean() >= 0.8
-    shares = np.concatenate([error / deviation for error, deviation in errors.values()])
+    )
+    assert np.abs(errors["tensions"]).max() < 5e-3
+    assert (deviations["tensions"] < 0.2 * TOLERANCES["tensions"]).all()
+    assert len(errors["droppers"]) == 42
+    assert np.median(np.abs(errors["droppers"])) < 3e-3
+    assert errors["droppers"].std() < 2.5e-3  # of 5 mm that they were drawn with
+    assert 0.1 < np.median(deviations["droppers"]) / TOLERANCES["droppers"] < 0.7
+    assert len(errors["supports"]) == 5
+    assert np.median(np.abs(errors["supports"])) < 6e-3  # hardly told by 4.6 spans
+    assert (deviations["supports"] < TOLERANCES["supports"]).all()
+    shares = np.concatenate([errors[kind] / deviations[kind] for kind in errors])
+    assert np.mean(np.abs(shares) < 1.96) >= 0.8
     assert 0.4 < np.sqrt(np.mean(shares**2)) < 1.7
 
 
-def test_what_is_left_is_the_sensors_noise(fitted):
+def test_what_is_left_is_the_sensors_noise_and_the_position_error_is_found(fitted):
     """2 N at 500 samples a second are 0.63 N in a coefficient; values take some of it up."""
     ((before, after),) = fitted.left
     assert before > 20
@@ -81,9 +64,6 @@ def test_what_is_left_is_the_sensors_noise(fitted):
     (white,) = fitted.whiteness
     assert white.probability > 0.001
     assert 0.3 < np.median(fitted.solution.state.noise) < 0.9  # known from few coefficients
-
-
-def test_the_position_error_is_found(fitted):
     shift = fitted.shifts[0] + fitted.problem.shifts[0]
     deviation = np.sqrt(fitted.solution.covariance[-3, -3])
     assert shift == pytest.approx(-WRONG, abs=4 * deviation)
@@ -133,12 +113,6 @@ def test_tables_and_picture(fitted):
     assert len(force.lines) == 2 + 5  # and five supports
     assert "dropper" in droppers.get_ylabel()
     assert "support" in supports.get_ylabel()
-
-
-def test_a_search_of_half_a_span_is_far_enough(record, design, pantograph):
-    assert problem([moved(record, 12.3)], design, pantograph, free=("tensions",)).shifts[0] == pytest.approx(
-        -12.3, abs=0.3
-    )
 
 
 @pytest.mark.skipif(not CAN_CHOOSE_CORES, reason="a process cannot choose its cores here")

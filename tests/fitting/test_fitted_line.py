@@ -1,5 +1,7 @@
 """The fitted line and pantograph as files: the design's text, what was found, and where it comes from."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -8,13 +10,15 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import text_of
 from panto_env.catalog.values import values_of
-from panto_env.fitting.fitted_line import write_line, write_pantograph
+from panto_env.fitting.fit import Fit
+from panto_env.fitting.fitted_line import with_table, with_value, write_line, write_pantograph
+from panto_env.fitting.misfit import State
 from panto_env.fitting.problem import problem
+from panto_env.fitting.solve import Solution
 from panto_env.fitting.tables import remarks, rows_of, summary_table, values_table
 from panto_env.plant.line_condition import LineCondition
 
 from .conftest import LINE, PANTOGRAPH
-from .made_up import made_up
 
 FOUND = {
     "dropper 4 of span 12": 0.003,
@@ -31,6 +35,22 @@ CONDITION = LineCondition(
     lost_messenger_tension=0.02,
 )
 SHORT = {"distance": 780.0, "spans": 20, "accuracy": "fast", "record_droppers": False}
+
+
+def made_up(ready, differences, shift=0.0, silent=()):
+    """A fit that found differences of values by name, and tells them, but for silent ones."""
+    fitting = ready.fitting
+    start = fitting.start()
+    x, deviation = start.x.copy(), fitting.prior.copy()
+    for k, value in enumerate(fitting.values.all):
+        if value.name in differences:
+            x[k] = differences[value.name]
+            deviation[k] *= 1.0 if value.name in silent else 0.1
+    x[len(fitting.values) :][: len(fitting.parts)] = shift
+    state = State(x, start.static_forces, np.ones_like(start.noise), 3)
+    random = np.random.default_rng(0)
+    left = tuple(random.standard_normal(len(part.measured.kept)) for part in fitting.parts)
+    return Fit(ready, Solution(state, np.diag(deviation**2), (), left, True))
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +99,13 @@ def test_runs_on_it_are_those_on_the_design_in_that_condition(written):
     assert np.abs(found.contact_force - plain.contact_force).max() > 1
 
 
-def test_a_fit_of_a_fitted_line_adds_to_it(written, record, pantograph, tmp_path):
+def test_a_fit_of_a_fitted_line_begins_with_what_the_first_ended_with_and_adds_to_it(
+    written, record, pantograph, done, tmp_path
+):
     again = problem([record], load_catenary(written), pantograph)
+    fitting, x = done.problem.fitting, done.solution.state.x[: len(done.problem.fitting.values)]
+    (after,) = fitting.sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
+    np.testing.assert_allclose(again.fitting.as_designed()[0], after, atol=0.2)
     assert again.fitting.values.design.condition.miscut_droppers == CONDITION.miscut_droppers
     more = {"dropper 4 of span 12": -0.001, "dropper 2 of span 12": 0.005, "support 13": 0.001}
     write_line(
@@ -99,16 +124,6 @@ def test_a_fit_of_a_fitted_line_adds_to_it(written, record, pantograph, tmp_path
     assert text.count("[as_found]") == 1
 
 
-def test_a_fitted_line_s_force_is_its_fit_s_and_goes_on_from_there(written, record, pantograph, done):
-    """What the second fit begins with is what the first one ended with."""
-    again = problem([record], load_catenary(written), pantograph)
-    (before,) = again.fitting.as_designed()
-    fitting = done.problem.fitting
-    x = done.solution.state.x[: len(fitting.values)].copy()
-    (after,) = fitting.sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
-    np.testing.assert_allclose(before, after, atol=0.2)
-
-
 def test_damping_and_pantograph(record, design, pantograph, tmp_path):
     ready = problem([record], design, pantograph, free=("damping", "pantograph"))
     found = {"damping beta": 0.2, "masses 2 of the pantograph": 0.05, "masses 3 of the pantograph": -0.1}
@@ -124,13 +139,10 @@ def test_damping_and_pantograph(record, design, pantograph, tmp_path):
     assert riding.stiffnesses == pantograph.stiffnesses
     assert riding.sources["masses"].startswith("number 2, 3 fitted to run.csv")
     assert (tmp_path / "p.toml").read_text(encoding="utf-8").startswith("# DSA 380.\n")
-
-
-def test_where_nothing_is_told_the_line_is_the_design(ready, tmp_path):
-    write_line(made_up(ready, {}), LINE, tmp_path / "a.toml", "run.csv")
-    found = simulate(str(tmp_path / "a.toml"), PANTOGRAPH, 250.0, **SHORT)
-    plain = simulate(LINE, PANTOGRAPH, 250.0, **SHORT)
-    np.testing.assert_array_equal(found.contact_force, plain.contact_force)
+    wrong = made_up(ready, {"masses 2 of the pantograph": -1.2})
+    with pytest.raises(InputError, match=r"no pantograph may have, so none is written: .*q\.toml is not"):
+        write_pantograph(wrong, PANTOGRAPH, tmp_path / "q.toml", "run.csv")
+    assert not (tmp_path / "q.toml").exists()
 
 
 def test_a_file_that_cannot_be_written_leaves_none(done, tmp_path):
@@ -143,22 +155,12 @@ def test_a_file_that_cannot_be_written_leaves_none(done, tmp_path):
     assert not (tmp_path / "a.toml").exists()
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"tension of the contact wire": 0.12}, {"dropper 4 of span 12": 0.21}, {"support 12": -0.3}]
-)
+@pytest.mark.parametrize("wrong", [{"tension of the contact wire": 0.12}, {"dropper 4 of span 12": 0.21}])
 def test_values_that_no_line_may_have_are_not_written(ready, tmp_path, wrong):
     """So no file is left that the next command would refuse."""
     with pytest.raises(InputError, match=r"no line may have, so none is written: .*a\.toml is not"):
         write_line(made_up(ready, wrong), LINE, tmp_path / "a.toml", "run.csv")
     assert not (tmp_path / "a.toml").exists()
-
-
-def test_values_that_no_pantograph_may_have_are_not_written(record, design, pantograph, tmp_path):
-    ready = problem([record], design, pantograph, free=("pantograph",))
-    wrong = made_up(ready, {"masses 2 of the pantograph": -1.2})
-    with pytest.raises(InputError, match=r"no pantograph may have, so none is written: .*p\.toml is not"):
-        write_pantograph(wrong, PANTOGRAPH, tmp_path / "p.toml", "run.csv")
-    assert not (tmp_path / "p.toml").exists()
 
 
 def test_tables_say_what_was_found(done):
@@ -178,3 +180,107 @@ def test_tables_say_what_was_found(done):
     notes = remarks(done)
     assert "Lengths of droppers: the records tell 2 of 42." in notes
     assert not [note for note in notes if "settled" in note]
+
+
+TEXT = """\
+# A line.
+kind = "flexible"
+spans = 10 # as surveyed
+alpha = 7.0
+
+[damping] # of Rayleigh
+  alpha = { value = 0.0125, source = "seen" }
+beta = 1e-4  # recalled
+
+[droppers]
+alpha = 3.0
+positions = [
+  5.0,
+  10.0,
+]
+"""
+PLACES = [[12, 4, 0.003], [13, 1, -0.002]]
+
+
+def changed(text, number, line):
+    """The text with another line of this number."""
+    lines = text.splitlines()
+    return "\n".join([*lines[:number], line, *lines[number + 1 :]]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "number", "line"),
+    [
+        ("spans", 24, 2, 'spans = { value = 24, source = "why" }'),
+        ("alpha", 0.5, 3, 'alpha = { value = 0.5, source = "why" }'),
+        ("damping.alpha", 0.02, 6, 'alpha = { value = 0.02, source = "why" }'),
+        ("damping.beta", [1.0, 2.5], 7, 'beta = { value = [1.0, 2.5], source = "why" }'),
+        ("droppers.alpha", -1.0, 10, 'alpha = { value = -1.0, source = "why" }'),
+    ],
+)
+def test_one_line_is_replaced_in_its_section(key, value, number, line):
+    assert with_value(TEXT, key, value, "why", "a.toml") == changed(TEXT, number, line)
+
+
+def test_sources_may_hold_anything():
+    source = 'fitted to "a\\1.csv"; ±2 %\n{'
+    found = with_value(TEXT, "damping.beta", 2e-4, source, "a.toml")
+    assert "±" in found
+    assert tomllib.loads(found)["damping"]["beta"] == {"value": 2e-4, "source": source}
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (TEXT, "droppers.positions"),  # spans lines
+        (TEXT, "droppers.beta"),  # stands in another section only
+        (TEXT, "damping.gamma"),
+        (TEXT, "beta"),
+        (TEXT, "nothing.alpha"),
+        ("damping = { alpha = 1.0, beta = 2.0 }\n", "damping.alpha"),
+        ("damping.alpha = 1.0\n", "damping.alpha"),
+        ('note = """\nspans = 3\n"""\nspans = 3\n', "spans"),  # a line of a text looks like one
+    ],
+)
+def test_a_value_without_a_line_of_its_own_is_refused(text, key):
+    last = key.rpartition(".")[2]
+    with pytest.raises(
+        InputError, match=rf"{key} of a\.toml cannot be replaced: write {last} in a line of its"
+    ):
+        with_value(text, key, 5.0, "why", "a.toml")
+
+
+def table(text, **values):
+    return with_table(text, "as_found", values, {"miscut_droppers": "±1 mm", "ice": "seen"}, "a.toml")
+
+
+def test_a_table_comes_to_the_end():
+    found = table(TEXT, miscut_droppers=PLACES, ice=0.1)
+    assert found.startswith(TEXT)
+    assert found[len(TEXT) :] == (
+        "\n[as_found]\n"
+        'miscut_droppers = { value = [[12, 4, 0.003], [13, 1, -0.002]], source = "±1 mm" }\n'
+        'ice = { value = 0.1, source = "seen" }\n'
+    )
+    assert tomllib.loads(found)["droppers"]["positions"] == [5.0, 10.0]
+
+
+HEADERS = ["[as_found] # by hand, see [1]", "  [ as_found ]"]
+ROWS = "miscut_droppers = [\n  [1, 2, 0.003],\n  [3, 4, 0.001]\n]\n"
+
+
+@pytest.mark.parametrize("header", HEADERS)
+@pytest.mark.parametrize("own", ["ice = 0.2\n", ROWS])
+def test_a_table_is_replaced_wherever_and_however_it_stands(header, own):
+    begin, end = TEXT.split("[droppers]")
+    for text in (f"{begin}{header}\n{own}\n[droppers]{end}", f"{TEXT}\n{header}\n{own}"):
+        assert tomllib.loads(table(text, ice=0.1)) == tomllib.loads(TEXT) | {
+            "as_found": {"ice": {"value": 0.1, "source": "seen"}}
+        }
+    assert table(f"{header}\n{own}", ice=0.1).count("[") == 1
+
+
+@pytest.mark.parametrize("own", ["as_found = { ice = 0.2 }", "as_found.ice = 0.2"])
+def test_what_is_no_table_of_its_own_is_refused(own):
+    with pytest.raises(InputError, match=r"as_found of a\.toml cannot be replaced: write it as a table"):
+        table(f"{own}\n{TEXT}", ice=0.1)

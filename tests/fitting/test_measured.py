@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.measured import BANDS, HIGHEST, PER_SECOND, Measured, between, measured
+from panto_env.fitting.passes import BANDS, HIGHEST, PER_SECOND, Measured, between, measured
 from panto_env.records.record import Piece
 
 SPEED, SPAN = 60.0, 60.0
@@ -49,18 +49,6 @@ def test_coefficients_of_white_noise_are_white_with_equal_variance():
     noise = np.random.default_rng(1).standard_normal((4000, len(own.place)))
     found = own.coefficients(noise)
     np.testing.assert_allclose(np.cov(found, rowvar=False), np.eye(len(own.kept)), atol=0.12)
-
-
-def test_a_sensor_s_noise_is_white_up_to_the_low_pass():
-    """Noise of 2 N at 500 samples a second is 2 sqrt(50 / 500) N in each coefficient, where it passes."""
-    found = []
-    for seed in range(300):
-        own = taken(piece(noise=2.0, seed=seed))
-        found.append(own.coefficients(own.force()))
-    std, passed = np.std(found, axis=0), own.kept * PER_SECOND / (2 * len(own.place)) < 10
-    assert std[passed].mean() == pytest.approx(2 * np.sqrt(PER_SECOND / 500), rel=0.05)
-    # Linear interpolation between samples takes a little, by chance of where places lie.
-    assert np.corrcoef(np.transpose(found)[passed])[0, 1:].max() < 0.25
 
 
 def test_back_inverts():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from panto_env.fitting.measured import BANDS
-from panto_env.fitting.normal import QUIET, noise_of, normal
+from panto_env.fitting.passes import BANDS
+from panto_env.fitting.solve import QUIET, noise_of, normal
 
 NOISE = np.array([3.0, 1.0, 0.5, 2.0, 0.8, 5.0])
 """Of each band (N)."""

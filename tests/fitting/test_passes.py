@@ -41,24 +41,20 @@ def test_they_give_what_whole_passes_give(passes):
     span = own.alignment.mean_length
     which = np.flatnonzero(own.droppers > 4.5 * span)[[0, 5, 16, -25]]
     support = int(np.flatnonzero(own.supports > 7 * span)[0])
-    variants = [variant(), *(variant(dropper=k) for k in which), variant(support=support)]
-    places = [*(own.droppers[which] - DROPPER_SPANS * span), own.supports[support] - SUPPORT_SPANS * span]
+    variants = [variant(), *(variant(dropper=k) for k in which), variant(support=support), variant()]
+    places = [
+        *(own.droppers[which] - DROPPER_SPANS * span),
+        own.supports[support] - SUPPORT_SPANS * span,
+        350.0,
+    ]
     begins = np.array([0.0, *places])
     assert (begins[1:] > 0).all()
     whole, late = own.forces(variants), own.forces(variants, begins)
-    np.testing.assert_array_equal(late[0], whole[0])
+    for same in (0, -1):  # the same line goes on bit for bit
+        np.testing.assert_array_equal(late[same], whole[0])
     change = np.abs(whole - whole[0]).max(axis=1)
     assert (change > 1).sum() >= 4  # in an overlap, the train may not touch the wire of one
     assert (np.abs(late - whole).max(axis=1) <= 2e-4 * np.maximum(change, 1)).all()
-
-
-def test_the_same_line_goes_on_bit_for_bit(passes):
-    line, pantograph, own = passes
-    drawn = DrawnLine(ROOM, np.zeros((0, 3)), np.zeros(len(own.droppers)), np.zeros(len(own.supports)))
-    same = Variant(line, drawn, pantograph, pantograph.static_force)
-    force = own.forces([same] * 3, np.array([0.0, 200.0, 350.0]))
-    np.testing.assert_array_equal(force[1], force[0])
-    np.testing.assert_array_equal(force[2], force[0])
 
 
 def test_lines_of_other_damping_have_plants_of_their_own_on_the_same_grid(passes):

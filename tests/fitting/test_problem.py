@@ -10,13 +10,12 @@ from panto_env.base.errors import InputError
 from panto_env.catalog import load_catenary
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.fit import fit
-from panto_env.fitting.problem import END, problem
-from panto_env.fitting.start import LEAD
+from panto_env.fitting.problem import END, LEAD, problem
 from panto_env.fitting.stored import knowledge
 from panto_env.fitting.tables import remarks
 from panto_env.fitting.values import TOLERANCES
+from panto_env.metrics.figures import FIRST_SETTLED
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.spans import FIRST_SETTLED
 from panto_env.plant.line_condition import LineCondition
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
@@ -79,7 +78,6 @@ def test_too_few_coefficients_for_so_many_values_are_noted(ready, record, design
     told = sum(len(part.measured.kept) for part in ready.fitting.parts)
     assert told < 2 * len(ready.fitting.values)
     assert f"{told} coefficients for {len(ready.fitting.values)} values" in ready.notes[-1]
-    assert problem([record], design, pantograph, free=("tensions",)).notes == ()
 
 
 def test_records_of_several_tension_lengths_are_noted(pantograph):
@@ -127,16 +125,6 @@ def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
     assert np.linalg.norm(derivatives[0][:, number] - actual) < 0.02 * np.linalg.norm(actual)
 
 
-def test_derivatives_of_a_shift(ready, derivatives):
-    """What is left falls by the derivative times the shift."""
-    (part,) = ready.fitting.parts
-    target = part.measured.coefficients(part.measured.force(0.02))
-    change = part.measured.coefficients(part.measured.force(-0.02)) - target
-    column = derivatives[0][:, -3]
-    assert np.linalg.norm(column - change / 0.04) < 0.05 * np.linalg.norm(column)
-    assert part.measured.std(column) > 1
-
-
 @pytest.mark.parametrize("which", [-2, -1])
 def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     """What is left falls by the derivative times either, with the static force that follows the mean."""
@@ -150,7 +138,7 @@ def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     assert np.linalg.norm(column) > 3
 
 
-@pytest.mark.parametrize("by", [3.2, -7.5])
+@pytest.mark.parametrize("by", [-7.5, 12.3])
 def test_a_position_error_is_found(record, ready, design, pantograph, by):
     """Roughly, before any step; steps find the rest (``test_fit``)."""
     found = problem([moved(record, by)], design, pantograph, free=("tensions",))
@@ -193,35 +181,6 @@ def test_a_measured_pass_has_settled_at_the_line_s_first_support(pantograph, des
         assert found.before + found.stretch[0] == pytest.approx(begins, abs=1.0)
 
 
-def test_a_pass_that_is_given_twice_is_refused(record, design, pantograph):
-    with pytest.raises(InputError, match="run and copy hold the same forces; give each pass once"):
-        problem([record, replace(record, name="copy")], design, pantograph)
-
-
-def test_positions_in_whole_decimetres_are_no_changes_of_speed(record, design, pantograph):
-    (piece,) = record.pieces
-    coarse = replace(piece, position=np.round(piece.position, 1))
-    (part,) = problem(
-        [replace(record, pieces=(coarse,))], design, pantograph, free=("tensions",)
-    ).fitting.parts
-    assert part.measured.piece is coarse
-
-
-def test_what_a_record_says_of_itself_is_among_the_notes(record, design, pantograph):
-    said = replace(record, name="May", notes=("Positions are the integral of the speed.",))
-    found = problem([said], design, pantograph, free=("tensions",))
-    assert found.of_records == ("May: Positions are the integral of the speed.",)
-
-
-def test_a_filter_that_is_taken_for_granted_is_named(record, design, pantograph):
-    (piece,) = record.pieces
-    behind = replace(piece, force=low_pass(piece.force, piece.time_step))
-    found = problem([replace(record, pieces=(behind,))], design, pantograph, free=("tensions",))
-    (note,) = found.of_records
-    assert note.startswith("run was low-passed before it was recorded, and is taken as behind EN 50317's")
-    assert problem([record], design, pantograph, free=("tensions",)).of_records == ()
-
-
 @pytest.mark.parametrize("short_of", [25.0, -25.0])
 def test_an_end_of_a_record_is_not_compared_though_it_is_moved(pantograph, design, short_of):
     """A record from the midst of a line, whose odometer is 25 m off."""
@@ -251,7 +210,26 @@ def test_what_was_found_before_is_moved_with_the_spans(record, design, pantograp
     assert condition.tension_scatter == TOLERANCES["tensions"]
 
 
+def test_what_a_record_says_of_itself_and_a_filter_taken_for_granted_are_among_the_notes(
+    record, design, pantograph
+):
+    """Of a record whose positions are in whole decimetres, which are no changes of speed."""
+    (piece,) = record.pieces
+    behind = low_pass(piece.force, piece.time_step)
+    coarse = replace(piece, position=np.round(piece.position, 1), force=behind)
+    said = Record("May", (coarse,), ("Positions are the integral of the speed.",))
+    found = problem([said], design, pantograph, free=("tensions",))
+    assert found.fitting.parts[0].measured.piece is coarse
+    note, filtered = found.of_records
+    assert note == "May: Positions are the integral of the speed."
+    assert filtered.startswith("May was low-passed before it was recorded, and is taken as behind EN 50317's")
+
+
 def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
+    with pytest.raises(InputError, match="run and copy hold the same forces; give each pass once"):
+        problem([record, replace(record, name="copy")], design, pantograph)
+    with pytest.raises(InputError, match=r"at most 0\.1 of the design's, not 0\.3"):
+        problem([record], design, pantograph, tolerances={"tensions": 0.3})
     with pytest.raises(
         InputError, match="Only flexible lines can be fitted, and 'periodic-stiffness' is none"
     ):
@@ -266,19 +244,10 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     short = replace(piece, position=piece.position[:half], force=piece.force[:half])
     with pytest.raises(InputError, match=r"No record can be compared\. run is left out: It has only 0 m"):
         problem([replace(record, pieces=(short,))], design, pantograph)
-    both = problem(
-        [record, replace(record, name="b", pieces=(short,))], design, pantograph, free=("tensions",)
-    )
-    assert both.of_records[0].startswith("b is left out: It has only")
     named = replace(record, name="b", pieces=(replace(short, run="May"),))
-    notes = problem([record, named], design, pantograph, free=("tensions",)).of_records
-    assert notes[0].startswith("b (run 'May') is left out: It has only")
-    assert len(both.fitting.parts) == 1
-
-
-def test_a_tolerance_of_tensions_beyond_what_one_grid_bears_is_refused(record, design, pantograph):
-    with pytest.raises(InputError, match=r"at most 0\.1 of the design's, not 0\.3"):
-        problem([record], design, pantograph, tolerances={"tensions": 0.3})
+    both = problem([record, named], design, pantograph, free=("tensions",))
+    assert both.of_records[0].startswith("b (run 'May') is left out: It has only")
+    assert len(both.of_records) == len(both.fitting.parts) == 1  # and nothing is said of the other one
 
 
 def test_a_record_of_another_line_is_called_strange_in_the_file_of_the_fit_too(record, pantograph):

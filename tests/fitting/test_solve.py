@@ -5,13 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from panto_env.fitting import problem as preparing
-from panto_env.fitting.fit import WHITE
-from panto_env.fitting.measured import BANDS
-from panto_env.fitting.normal import normal
-from panto_env.fitting.problem import problem
-from panto_env.fitting.solve import SURE, Solution
-from panto_env.plant.numerics import Numerics
+from panto_env.fitting.passes import BANDS
+from panto_env.fitting.solve import SURE, Solution, normal
 
 LEFT = 0.7
 """Noise of a coefficient (N), as a record of these tests has it."""
@@ -49,26 +44,6 @@ def test_no_dropper_jumps_where_that_makes_nothing_better(ready, true):
     assert ready.fitting._jumped(ended(ready.fitting, true), lambda doing: None) is None
 
 
-def test_derivatives_from_other_passes_are_like_those_from_fine_ones(record, design, pantograph):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "NUMERICS", Numerics())
-        fitting = problem([record], design, pantograph, free=("tensions", "supports")).fitting
-    small, found, left = np.diag(0.1 * fitting.values.tolerances), {}, {}
-    for grid in ("fine", "fair", "coarse"):
-        _, (found[grid],), (left[grid],) = fitting.derivatives(
-            fitting.start(), small, grid, lambda doing: None
-        )
-        np.testing.assert_array_equal(left[grid], left["fine"])  # of the fine passes
-        np.testing.assert_array_equal(found[grid][:, -3], found["fine"][:, -3])  # by the shift
-    assert np.linalg.norm(left["fine"]) > 0
-    away = {
-        grid: np.linalg.norm(found[grid] - found["fine"], axis=0) / np.linalg.norm(found["fine"], axis=0)
-        for grid in ("fair", "coarse")
-    }
-    fair, coarse = (np.median(away[grid][:-3]) for grid in ("fair", "coarse"))
-    assert 0.0 < fair < 0.7 * coarse < 0.36
-
-
 def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     """Its whole return, alone, would make it worse."""
     fitting = ready.fitting
@@ -92,19 +67,6 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     assert after > before
 
 
-def test_droppers_are_looked_at_where_what_is_left_is_like_noise(ready, true, monkeypatch):
-    """Part of what a dropper leaves that is off goes into the noise, and looks like it."""
-    fitting, looked = ready.fitting, []
-    end = ended(fitting, true)
-    noise = tuple(np.random.default_rng(0).normal(0.0, LEFT, len(left)) for left in end.left)
-    end = replace(end, left=noise)
-    assert min(white.probability for white in end.whiteness(fitting.bands)) > WHITE
-    monkeypatch.setattr(fitting, "_settle", lambda *arguments: end)
-    monkeypatch.setattr(fitting, "_jumped", lambda solution, working: looked.append(solution))
-    assert fitting.run(fitting.start()) is end
-    assert looked == [end]
-
-
 def test_differences_never_become_so_small_that_rounding_is_all_that_is_left(ready):
     """Where two values together are known far too well, which rounding may make a negative variance, too."""
     fitting = ready.fitting
@@ -119,8 +81,3 @@ def test_differences_never_become_so_small_that_rounding_is_all_that_is_left(rea
         gram = found.T @ found
         np.testing.assert_allclose(gram[2:], 0.01 * np.eye(count)[2:], atol=1e-12)
         assert np.linalg.eigvalsh(gram).min() == pytest.approx(SURE**2, rel=1e-3)
-
-
-def test_no_dropper_jumps_where_none_is_free(record, design, pantograph):
-    fitting = problem([record], design, pantograph, free=("tensions",)).fitting
-    assert fitting._jumped(ended(fitting, np.zeros(5)), lambda doing: None) is None

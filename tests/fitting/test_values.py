@@ -42,15 +42,9 @@ def test_names_and_places(plan):
     assert by_name["tension of the messenger wire"].place is None
     # The DSA 380's upper dampers are 0, so no share of them can be found.
     assert {name for name in by_name if name.startswith("dampings")} == {"dampings 3 of the pantograph"}
+    along = {value.name: value.index for value in everything(replace(plan, first_span=40)).all}
+    assert (along["dropper 4 of span 52"], along["support 53"]) == ((11 * 9 + 3,), (12,))
     assert [value.kind for value in values.all] == sorted((v.kind for v in values.all), key=FREE.index)
-
-
-def test_names_count_along_the_whole_line(plan):
-    values = everything(replace(plan, first_span=40))
-    names = {value.name: value.index for value in values.all}
-    assert names["dropper 4 of span 52"] == (11 * 9 + 3,)
-    assert names["support 53"] == (12,)
-    assert "dropper 4 of span 12" not in names
 
 
 def test_only_those_within_the_stretch_are_freed(plan):
@@ -77,49 +71,22 @@ def test_tolerances(plan):
     assert own["sine of waves of 5 m"] == WAVES[1][1] / np.sqrt(2)
 
 
-def test_the_design_is_the_variant_of_zeros(plan):
-    values = everything(plan)
-    variant = values.variant(np.zeros(len(values)), 70.0)
-    assert variant.catenary == plan.catenary
-    assert variant.pantograph == plan.pantograph
-    assert variant.static_force == 70.0
-    assert variant.line.tensions == (1.0, 1.0)
-    assert not variant.line.scatter.any()
-    assert not variant.line.heights.any()
-    assert not variant.line.waves[:, 0].any()
-
-
-def test_a_variant_has_each_value_in_its_place(plan):
+def test_a_variant_has_damping_and_pantograph_and_that_of_zeros_is_the_design(plan):
+    """Values of the line are where they should: ``test_problem`` has the true ones."""
     values = everything(plan)
 
     def variant(name, difference):
         return values.variant(at(values, name, difference), 70.0)
 
-    scatter = variant("dropper 4 of span 12", 3e-3).line.scatter
-    assert (np.flatnonzero(scatter).tolist(), scatter[102]) == ([102], 3e-3)
-    heights = variant("support 13", -2e-3).line.heights
-    assert (np.flatnonzero(heights).tolist(), heights[12]) == ([12], -2e-3)
-    assert variant("tension of the contact wire", 0.01).line.tensions == (1.01, 1.0)
-    assert variant("tension of the messenger wire", -0.02).line.tensions == (1.0, 0.98)
     damping = variant("damping beta", 0.5).catenary.damping
     assert (damping.alpha, damping.beta) == (plan.catenary.damping.alpha, 1.5 * plan.catenary.damping.beta)
     masses = variant("masses 2 of the pantograph", 0.1).pantograph.masses
     assert masses == pytest.approx((7.12, 6.6, 5.8))
     assert variant("stiffnesses 1 of the pantograph", -0.1).pantograph.stiffnesses[0] == pytest.approx(8487)
-    for name in ("masses 2 of the pantograph", "damping beta"):
-        assert not variant(name, 0.1).line.scatter.any()
-
-
-def test_waves_have_their_cosine_and_sine_parts(plan):
-    """The wire's height is the sum of amplitude cos(2 pi (x / length + phase)), as ``Plant.start`` has it."""
-    values = everything(plan)
-    x = np.linspace(0, 30, 200)
-    differences = at(values, "cosine of waves of 5 m", 2e-4) + at(values, "sine of waves of 12 m", -3e-4)
-    waves = values.variant(differences, 70.0).line.waves
-    assert waves.shape == (len(WAVES), 3)
-    height = sum(a * np.cos(2 * np.pi * (x * turns + phase)) for a, turns, phase in waves)
-    expected = 2e-4 * np.cos(2 * np.pi * x / 5) - 3e-4 * np.sin(2 * np.pi * x / 12)
-    np.testing.assert_allclose(height, expected, atol=1e-12)
+    bare = values.variant(np.zeros(len(values)), 70.0)
+    assert (bare.catenary, bare.pantograph, bare.static_force) == (plan.catenary, plan.pantograph, 70.0)
+    assert bare.line.tensions == (1.0, 1.0)
+    assert not any(each.any() for each in (bare.line.scatter, bare.line.heights, bare.line.waves[:, 0]))
 
 
 def test_waves_are_those_of_a_line_as_built(plan):
@@ -128,16 +95,6 @@ def test_waves_are_those_of_a_line_as_built(plan):
     amplitudes, turns, _ = drawn.waves.T
     np.testing.assert_allclose(WAVES, np.stack([1 / turns, amplitudes], axis=1))
     assert everything(plan).variant(np.zeros(len(everything(plan))), 70.0).line.waves.shape == (4, 3)
-
-
-def test_but_for_damping_usual_values_leave_line_and_pantograph_as_they_are(plan):
-    """So one plant serves all variants that share their damping."""
-    values = Values(plan, USUAL, (0.0, 900.0))
-    differences = values.tolerances.copy()
-    differences[values.of_kind("damping")] = 0.0
-    variant = values.variant(differences, 70.0)
-    assert variant.catenary is plan.catenary
-    assert variant.pantograph is plan.pantograph
 
 
 def test_damping_comes_first_of_what_acts_everywhere(plan):

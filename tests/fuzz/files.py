@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import warnings
 from pathlib import Path
@@ -11,13 +12,12 @@ import numpy as np
 from panto_agents.stored import FOLDER as MODELS
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.dataset.checksums import write_checksums
+from panto_baselines.dataset.make import write_checksums
 from panto_env import simulate
 from panto_env.catalog import load_pantograph
 from panto_env.catalog.loader import text_of
-from panto_env.estimation.motion import measure
-from panto_env.estimation.motion_file import write_motion
-from panto_env.fitting.measured import BANDS
+from panto_env.estimation.motion import measure, write_motion
+from panto_env.fitting.passes import BANDS
 from panto_env.fitting.stored import Stored, store
 from panto_env.fitting.values import Value
 from panto_env.identification import FREQUENCY_SWEEP, clean_record, parameters_of, write_record
@@ -88,8 +88,6 @@ seeds = "5"
 total_steps = "many"
 """
 POLICIES = """
-import numpy as np
-
 class Nothing:
     action = None
     def reset(self, context):
@@ -106,12 +104,6 @@ class Complex(Nothing):
 class Words(Nothing):
     action = "up"
 
-class Marked(Nothing):
-    action = ["[/bold]"]
-
-class Masked(Nothing):
-    action = np.ma.masked_array([0.5], mask=[True])
-
 class Endless(Nothing):
     def __init__(self, depth):
         self.__init__(depth)
@@ -120,7 +112,6 @@ class Endless(Nothing):
 
 def write_files(folder: Path) -> None:
     """Write all of them into a folder."""
-    stiffness = text_of("periodic-stiffness")
     texts = {
         "training.toml": TRAINING.format(steps=128, widths=8),
         "million.toml": TRAINING.format(steps=128, widths=1_000_000),
@@ -134,12 +125,10 @@ def write_files(folder: Path) -> None:
         "bad.json": "{",
         "deep.toml": "a = " + "[" * 20_000,
         "deep.json": "[" * 200_000,
-        "huge.toml": "seed = 1" + "0" * 5000,
         "lists.toml": LISTS,
         "strings.toml": STRINGS,
-        "nul.toml": 'catenary = "\\u0000"\nkind = "\\u0000"\nalgorithm = "\\u0000"\n',
-        "markup.toml": marked(stiffness, "a [bold]line[/] of [/] its own", "[/]line[bold]"),
-        "marked.toml": marked(text_of("three-mass"), "[red", "[/b]"),
+        "markup.toml": marked("periodic-stiffness", "a [bold]line[/] of [/] its own", "[/]line[bold]"),
+        "marked.toml": marked("three-mass", "[red", "[/b]"),
         "heavy.toml": text_of("en50318-2002").replace("[droppers]", "[droppers]\nmass = 30.0"),
         "empty.csv": "",
         "wide.csv": "time (s)" + " " * 20_000 + ",head (mm),frame (mm)\n" + "0,0,0\n" * 30,
@@ -165,8 +154,10 @@ def write_made_files(folder: Path) -> None:
         run = simulate("en50318-2002", "dsa250", speed, accuracy="fast", distance=1200.0)
         run.save(folder / "passes" / f"{k}.parquet")
     write_measured(measured(run, position_error=0.3), folder / "measured.csv")
+    values = tuple(Value("droppers", f"dropper {k}", "mm", 1e3, 5e-3, 6e2 + 6 * k, (k,)) for k in range(10))
+    known = np.zeros(10), 1e-6 * np.eye(10), (540.0, 900.0), np.ones(BANDS), ()
     for name in ("month1", "month2"):
-        store(made_up_fit(name), folder / f"{name}.safetensors")
+        store(Stored(name, "{}", "{}", values, *known), folder / f"{name}.safetensors")
     shutil.copy(next(MODELS.glob("*.safetensors")), folder / "agent.safetensors")
     shutil.copy(DOCS / "benchmark" / "head.json", folder / "benchmark.json")
     run_benchmark(load_benchmark(folder / "small.toml"), workers=1).save(folder / "result.json")
@@ -177,18 +168,7 @@ def write_made_files(folder: Path) -> None:
     write_checksums(folder / "set")
 
 
-def made_up_fit(name: str) -> Stored:
-    """What a fit knows of ten droppers."""
-    values = tuple(
-        Value("droppers", f"dropper {k}", "mm", 1e3, 5e-3, 600.0 + 6.0 * k, (k,)) for k in range(10)
-    )
-    known = np.zeros(10), 1e-6 * np.eye(10), (540.0, 900.0), np.ones(BANDS), ()
-    return Stored(name, "{}", "{}", values, *known)
-
-
-def marked(text: str, description: str, name: str) -> str:
+def marked(entry: str, description: str, name: str) -> str:
     """The TOML file of an entry with another description, and with a name of its own."""
-    first, _, rest = text.partition("description = ")
-    quote = '"""' if rest.startswith('"""') else '"'
-    _, _, after = rest.removeprefix(quote).partition(quote)
-    return f'{first}name = "{name}"\ndescription = "{description}"{after}'
+    new = f'name = "{name}"\ndescription = "{description}"'
+    return re.sub(r'^description = ".*"', new, text_of(entry), count=1, flags=re.MULTILINE)

@@ -12,26 +12,25 @@ import numpy as np
 
 from panto_agents.ablation import load_ablation
 from panto_agents.model_file import read_model
-from panto_agents.run_folder import RunFolder
 from panto_agents.settings import load_training
 from panto_agents.stored import FOLDER as MODELS
+from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark import actions
 from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import load_benchmark
-from panto_baselines.dataset.designs_settings import load_designs
+from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.episodes import Episode, read_episodes
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
-from panto_baselines.policies.gains import load_gains
+from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
-from panto_env.base.array_file import write_arrays
-from panto_env.base.checksums import read_checked
+from panto_env.base.checksums import read_checked, write_arrays
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import load_family, load_section, text_of
 from panto_env.catalog.masts import line_from_masts
-from panto_env.estimation.motion_file import read_motion
-from panto_env.identification.record_file import read_record
+from panto_env.estimation.motion import read_motion
+from panto_env.identification.record import read_record
 from panto_env.rig.computer import load_rig
 from panto_env.studies import Comparison, Outcome
 from panto_env.studies import write as write_study
@@ -60,18 +59,17 @@ def subjects(folder: Path) -> dict[str, Subject]:
     run.evaluations.write_text(
         "steps,speed_kmh,seed,policy_sigma\n" + "".join(f"{128 * k},300,1,{20.5 - k}\n" for k in range(1, 9))
     )
-    found = {
-        f"line {name}": Subject("TOML", _entry(name, folder), _line) for name in available("catenary")
-    } | {
-        f"pantograph {name}": Subject("TOML", _entry(name, folder), _pantograph)
-        for name in ("three-mass", "own-two-mass")
-    }
-    drawn = (("family", load_family), ("section", load_section))
-    found |= {
-        f"{kind} {name}": Subject("TOML", _entry(name, folder), load)
-        for kind, load in drawn
-        for name in available(kind)
-    }
+    found = {}
+    for kind, names, load in (
+        ("line", available("catenary"), _line),
+        ("pantograph", ("three-mass", "own-two-mass"), _pantograph),
+        ("family", available("family"), load_family),
+        ("section", available("section"), load_section),
+    ):
+        for name in names:
+            path = folder / f"{name}.toml"
+            path.write_text(text_of(name), encoding="utf-8")
+            found[f"{kind} {name}"] = Subject("TOML", path, load)
     configs = ROOT / "configs"
     found |= {
         "training": Subject("TOML", configs / "agent-high-speed.toml", load_training),
@@ -93,17 +91,9 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "study": Subject("JSON", _study(folder), read_checked, checked=True),
         "part of a data set": _part(folder),
     }
-    models = {
-        f"model {path.stem}": Subject("model", path, read_model, True)
-        for path in MODELS.glob("*.safetensors")
-    }
-    return found | models
-
-
-def _entry(name: str, folder: Path) -> Path:
-    path = folder / f"{name}.toml"
-    path.write_text(text_of(name), encoding="utf-8")
-    return path
+    for path in MODELS.glob("*.safetensors"):
+        found[f"model {path.stem}"] = Subject("model", path, read_model, checked=True)
+    return found
 
 
 def _line(path: Path) -> Any:

@@ -81,14 +81,11 @@ def replace(row, old, new):
         (broken(replace(0, "y_p1 (mm)", "y_p1")), "y_p1 of .* has no unit"),
         (broken(replace(0, "y_p1 (mm)", "y_p1 (furlong)")), "'furlong'; known units are m, mm"),
         (broken(replace(0, "force (N)", "y1 (mm)")), "y_p1 twice"),
-        (broken(replace(5, ",30,", ",nan,")), "Line 6 of .*: column force holds 'nan'"),
         (broken(replace(5, ",30,", ",lost,")), "Line 6 of .*: column force holds 'lost'"),
         (broken(replace(5, ",30,", ",,")), "Line 6 of .*: column force is empty"),
-        (broken(lambda rows: rows.__setitem__(9, rows[9].rsplit(",", 1)[0])), "Line 10 .* y_p3 is empty"),
         (broken(lambda rows: rows.pop(20)), "Time steps are not equal"),
         (broken(lambda rows: rows.insert(20, rows[20])), "Time does not increase at sample 21"),
         (lines(8), "8 samples, too few"),
-        ([HEADER], "0 samples, too few"),
         ([], "is empty"),
         (
             [HEADER, *(f"{k},1,{k % 3},5,{k % 2}" for k in range(30))],
@@ -129,11 +126,11 @@ def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
     [
         ["--measured", "k1T=32992", "--measured", "m2=5", "--measured", "k2=14544"],
         ["--measured", "k1T=32992, m2=5 k2=14544"],
-        MEASURED,
     ],
 )
-def test_measured_values_in_three_spellings_print_one_table(measured, sweep):
-    result = panto("identify", sweep, *measured)
+def test_measured_values_in_other_spellings_print_one_table(measured, tmp_path):
+    write_record(clean_record(FREQUENCY_SWEEP, TRUTH, duration=5.0), tmp_path / "short.csv")
+    result = panto("identify", tmp_path / "short.csv", *measured)
     assert result.returncode == 0, result.stderr
     assert "condition number" in result.stdout
     assert "fitting performance" in result.stdout

@@ -1,4 +1,4 @@
-"""Figures span by span, and droppers one by one, where spans differ."""
+"""Figures span by span, droppers one by one where spans differ, and figures of overlaps."""
 
 import warnings
 from dataclasses import replace
@@ -9,12 +9,14 @@ import pytest
 from panto_env import simulate
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
-from panto_env.metrics.by_span import by_span
-from panto_env.metrics.droppers import moving_droppers
+from panto_env.metrics.by_span import by_span, by_stretch, moving_droppers
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.run_tables import droppers, of_spans
+from panto_env.metrics.run_tables import droppers, of_spans, of_stretches
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
+
+from .test_compliance import by_key
+from .test_summary import RUN, SPAN
 
 LENGTHS = (50, 60, 55, 65, 45, 62, 50, 65, 60, 40, 60, 55, 64)
 
@@ -125,3 +127,57 @@ def long_run():
         for count in (30, 54)
     ]
     return [simulate(line, "dsa380", 250, record_droppers=False) for line in lines]
+
+
+def test_figures_of_overlaps_and_behind_them_are_those_of_their_places():
+    run = simulate("sweden-st15-bridge", "dsa250", 160, accuracy="fast")
+    assert by_stretch(run, (10, 12)) == []
+    line = load_catenary("sweden-st15-bridge")
+    supports, (first, last) = np.array(line.alignment().supports), run.spans()
+    limits = [(supports[each.first_span - 1], supports[each.first_span + 2]) for each in line.overlaps]
+    found = by_stretch(run)
+    assert [each.stretch for each in found] == ["overlaps", "up to 200 m behind an overlap", "elsewhere"]
+    force, x = low_pass(run.contact_force, run.time_step), run.position
+    evaluated = (x >= supports[first - 1]) & (x < supports[last])
+    overlaps = sum((x >= begin) & (x < end) for begin, end in limits).astype(bool)
+    behind = sum((x >= end) & (x < end + 200) for _, end in limits).astype(bool)
+    for each, there in zip(found, (overlaps, behind, ~overlaps & ~behind), strict=True):
+        own = force[there & evaluated]
+        assert (each.mean, each.std, each.max, each.min) == (own.mean(), own.std(), own.max(), own.min())
+    whole = run.summary()
+    assert sum(each.distance for each in found) == pytest.approx(whole.distance, abs=1.0)
+    weights = [each.distance for each in found]
+    assert np.average([each.mean for each in found], weights=weights) == pytest.approx(whole.mean, rel=1e-4)
+    table = of_stretches(run)
+    assert table.columns["stretch"] == [each.stretch for each in found]
+    assert table.titles[table.titles.index("where") + 1] == "distance (m)"
+
+
+def test_forces_are_those_of_the_evaluated_spans_over_the_whole_evaluated_run():
+    forces = np.full((40, 4), 50.0)
+    forces[12:14, 2] = 90.0  # ahead of the train, which is in span 2
+    forces[22:27, 1] = 0.0  # behind the train, which is in span 3
+    forces[15, 1] = 0.0  # while the train is there
+    forces[15, 0], forces[15, 3] = 500.0, 400.0  # in spans that are not evaluated
+    forces[5, 1], forces[35, 2] = 300.0, 300.0  # before and after the evaluated run
+    made_up = replace(RUN, dropper_force=forces, dropper_position=SPAN * np.array([0.5, 1.5, 2.5, 3.5]))
+    (found,) = moving_droppers(made_up, (2, 3))
+    assert found.position == pytest.approx(SPAN / 2)
+    assert (found.largest, found.smallest) == (90.0, 0.0)
+    assert found.slack == pytest.approx(100 * 1 / 20)
+    (whole,) = moving_droppers(made_up, "all")
+    assert whole.largest == 500.0
+    required = by_key(made_up.compliance((2, 3)))
+    assert (required["dropper force"].value, required["slack"].value) == (90.0, pytest.approx(100 * 1 / 20))
+
+
+def test_the_maximum_of_a_real_run_is_that_of_the_requirements():
+    """Of droppers beside a support it is reached while the train is in a span beside theirs."""
+    run = simulate("re250", "dsa250", 200.0)
+    largest = max(each.largest for each in moving_droppers(run))
+    assert largest == by_key(run.compliance())["dropper force"].value
+    train, own = run.alignment.span_of(run.position), run.alignment.span_of(run.dropper_position)
+    evaluated = run.dropper_force[run.inside()]
+    near = (train[:, None] == own)[run.inside()]
+    assert largest == evaluated[:, (own >= 10) & (own <= 19)].max()
+    assert largest > 1.1 * evaluated[near].max(), "the run does not show the difference"

@@ -10,10 +10,9 @@ from panto_env.control.task import Task
 from panto_env.fitting.values import Design, Values
 from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.dropper_table import dropper_table
+from panto_env.plant.catenary.flexible.static import dropper_table
 from panto_env.plant.line_condition import LINE_CONDITIONS
-from panto_env.records.compare import compare
-from panto_env.records.compared import spans_table
+from panto_env.records.compare import compare, spans_table
 from panto_env.records.judge import judge
 from panto_env.records.measured import measured
 from panto_env.report.findings import Findings

@@ -5,9 +5,8 @@ import pytest
 from scipy import signal
 
 from panto_env import InputError
-from panto_env.metrics.figures import Figures, contact_loss, cost_function
-from panto_env.metrics.labels import LABELS
-from panto_env.metrics.low_pass import low_pass, low_pass_sections
+from panto_env.metrics.figures import LABELS, Figures, contact_loss, cost_function
+from panto_env.metrics.low_pass import amplitudes, band_rms, in_band, low_pass, low_pass_sections
 from panto_env.plant.alignment import Alignment
 
 
@@ -34,11 +33,8 @@ def test_low_pass_keeps_slow_and_stops_fast_waves():
     assert low_pass(edge, 1e-3)[steady].std() == pytest.approx(edge.std() / 2**0.5, rel=1e-2)
 
 
-def test_low_pass_starts_settled():
+def test_series_are_low_passed_one_by_one_from_a_settled_start():
     assert low_pass(np.full(100, 120.0), 1e-3) == pytest.approx(120.0)
-
-
-def test_series_are_low_passed_one_by_one():
     forces = np.random.default_rng(0).normal(100, 20, (3, 2, 200))
     together = low_pass(forces, 1e-3)
     for own, expected in zip(together.reshape(6, 200), forces.reshape(6, 200), strict=True):
@@ -56,14 +52,15 @@ def test_cost_function_is_eq_14_written_out():
         speed_kmh / 3.6 * step / 2 * (abs(force[i] - nominal) + abs(force[i + 1] - nominal)) for i in range(3)
     )
     assert cost_function(force, nominal, speed_kmh / 3.6 * step) == pytest.approx(expected)
-
-
-def test_contact_loss_is_a_share_of_distance():
     assert contact_loss(np.array([0.0, 1.0, 0.0, 5.0])) == 50.0
 
 
-def test_every_figure_has_its_label():
+def test_every_figure_has_its_label_in_its_unit():
+    per_si = {"N": 1.0, "N/s": 1.0, "N m": 1.0, "%": 1.0, "m": 1.0, "mm": 1e3}
     assert list(LABELS) == [field.name for field in fields(Figures)]
+    assert {name: label.scale for name, label in LABELS.items()} == {
+        name: per_si[label.unit] for name, label in LABELS.items()
+    }
     assert LABELS["max_uplift"].heading == "maximum uplift at the supports (mm)"
     assert LABELS["contact_loss"].column == "CL\n(%)"
 
@@ -82,3 +79,25 @@ def test_last_whole_span_takes_nearly_whole_ones_only_where_asked():
     assert line.last_whole_span(540.0) == 9
     nearly = 540.0 * (1 - 1e-12)
     assert (line.last_whole_span(nearly), line.last_whole_span(nearly, tolerance=1e-9)) == (8, 9)
+
+
+STEP = 1e-3
+
+
+TIME = STEP * np.arange(4000)
+SLOW, FAST = 3 * np.sin(2 * np.pi * 4 * TIME), 2 * np.sin(2 * np.pi * 15 * TIME)
+
+
+def test_a_band_holds_what_swings_in_it():
+    assert in_band(7 + SLOW + FAST, STEP, 0, 10) == pytest.approx(SLOW, abs=1e-9)
+    assert in_band(7 + SLOW + FAST, STEP, 4, 15) == pytest.approx(FAST, abs=1e-9)
+    assert band_rms(7 + SLOW + FAST, STEP, 0, 15) == pytest.approx(np.std(SLOW + FAST))
+
+
+def test_a_peak_is_as_high_as_its_harmonic_wherever_the_record_ends():
+    for length in (4000, 3911):
+        frequency, amplitude = amplitudes((SLOW + FAST)[:length], STEP)
+        for wanted, height in ((4, 3), (15, 2)):
+            near = np.abs(frequency - wanted) < 0.5
+            assert amplitude[near].max() == pytest.approx(height, rel=0.08)
+    assert amplitudes(SLOW, STEP)[1].max() == pytest.approx(3, rel=1e-3)

@@ -4,12 +4,13 @@ import pandas
 import pytest
 
 from panto_env import InputError, Trajectory, simulate
+from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import FOLDERS
-from panto_env.metrics.droppers import moving_droppers
-from panto_env.metrics.labels import LABELS
+from panto_env.metrics.by_span import moving_droppers
+from panto_env.metrics.figures import LABELS
 from panto_env.metrics.low_pass import low_pass
 from panto_env.metrics.run_tables import save_droppers, save_figures
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 
 from ..command import panto
 from .test_summary import RUN, replace
@@ -57,9 +58,11 @@ def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
         assert figures.loc[key, "unit"] == label.unit
     for key, criterion in criteria.items():
         row = figures.loc[key]
-        assert row["verdict"] == "kept" if criterion.kept else pandas.isna(row["verdict"])
-        if criterion.highest is not None:
-            assert row["highest"] == pytest.approx(criterion.highest)
+        assert row["verdict"] == criterion.verdict if criterion.verdict else pandas.isna(row["verdict"])
+        for name in ("lowest", "highest"):
+            if (limit := getattr(criterion, name)) is not None:
+                assert row[name] == pytest.approx(limit)
+                assert row["margin"] == pytest.approx(criterion.margin)
     assert figures["speed (km/h)"].eq(160).all()
     about = book["about"].set_index("name")["value"]
     assert about["catenary"] == "re250"
@@ -68,18 +71,12 @@ def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
 
 def test_droppers_at_rest_and_in_the_run_stand_side_by_side(run, book):
     frame = book["droppers"]
-    moving, resting = moving_droppers(run), droppers_at_rest(run_line(run))
+    moving, resting = moving_droppers(run), droppers_at_rest(load_catenary(run.catenary))
     assert frame["number"].tolist() == list(range(1, 8))
     assert frame["maximum force (N)"].tolist() == pytest.approx([each.largest for each in moving])
     assert frame["static force (N)"].tolist() == pytest.approx([each.static_force for each in resting])
     assert frame["length, unloaded (m)"].tolist() == pytest.approx([each.length for each in resting])
     assert (frame["maximum force (N)"] > frame["static force (N)"]).all()
-
-
-def run_line(run):
-    from panto_env.catalog import load_catenary
-
-    return load_catenary(run.catenary)
 
 
 def test_tables_of_several_runs_have_a_column_for_each_fact(run, tmp_path):
@@ -88,8 +85,12 @@ def test_tables_of_several_runs_have_a_column_for_each_fact(run, tmp_path):
     frame = pandas.read_csv(tmp_path / "figures.csv")
     assert sorted(set(frame["speed (km/h)"])) == pytest.approx([80, 160])
     assert set(frame["spans"]) == {"10-12"}
-    save_droppers([run, slower], tmp_path / "droppers.csv")
+    ended = replace(run, terminated=True, ending="It ended.", seed=5)
+    save_droppers([run, ended, slower], tmp_path / "droppers.csv")
     assert len(pandas.read_csv(tmp_path / "droppers.csv")) == 14
+    for choice, seeds in ((None, {0}), ("all", {0, 5})):
+        save_figures([run, ended], tmp_path / "figures.csv", choice)
+        assert set(pandas.read_csv(tmp_path / "figures.csv")["seed"]) == seeds
 
 
 def test_a_run_without_figures_is_saved_with_the_reason(tmp_path):
@@ -130,15 +131,13 @@ def test_commands_write_them(tmp_path):
 
 def test_a_sweep_has_units_in_its_headings(tmp_path):
     light = ("catenary.mean_stiffness=3000,4000", "--catenary", "periodic-stiffness", "--speed", 250)
-    for suffix, read in ((".csv", pandas.read_csv), (".xlsx", pandas.read_excel)):
-        path = tmp_path / f"sweep{suffix}"
-        result = panto("sweep", *light, "--pantograph", "three-mass", "--output", path)
-        assert result.returncode == 0, result.stderr
-        frame = read(path)
-        assert frame["catenary.mean_stiffness (N/m)"].tolist() == [3000, 4000]
-        assert frame["speed (km/h)"].tolist() == [250, 250]
-        assert {"mean (N)", "std (N)", "contact_loss (%)", "max_uplift (m)", "time_step (s)"} <= set(frame)
-        assert frame["mean (N)"].notna().all()
+    result = panto("sweep", *light, "--pantograph", "three-mass", "--output", tmp_path / "sweep.xlsx")
+    assert result.returncode == 0, result.stderr
+    frame = pandas.read_excel(tmp_path / "sweep.xlsx")
+    assert frame["catenary.mean_stiffness (N/m)"].tolist() == [3000, 4000]
+    assert frame["speed (km/h)"].tolist() == [250, 250]
+    assert {"mean (N)", "std (N)", "contact_loss (%)", "max_uplift (m)", "time_step (s)"} <= set(frame)
+    assert frame["mean (N)"].notna().all()
 
 
 def test_a_run_that_ends_early_still_ends_with_1_and_writes_no_figures(tmp_path):

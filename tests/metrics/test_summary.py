@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from panto_env import InputError, Trajectory
+from panto_env.metrics import compliance as en50367
 from panto_env.plant.alignment import Alignment
 
 STEP, SPEED_KMH, SPAN, NOMINAL = 0.01, 180.0, 5.0, 100.0
@@ -123,3 +124,19 @@ def test_spans_up_to_the_last_sample_are_covered_and_no_more():
     }
     with pytest.raises(InputError, match="end at 20 m"):
         replace(RUN, **short).summary((1, 4))
+
+
+def test_limits_are_those_of_the_mean_speed_over_the_spans():
+    """A train that speeds up from 40 m/s by 20 m/s in the 0.4 s of the run."""
+    speeding = replace(
+        RUN, position=40 * RUN.time + 25 * RUN.time**2, settings={"speed_drift": 5.0}, speed=50.0
+    )
+    assert speeding.drifts
+    inside = speeding.inside((1, 1))
+    mean = 40 + 50 * speeding.time[inside].mean()
+    limits = {each.key: each for each in speeding.compliance((1, 1))}
+    assert limits["mean"].highest == pytest.approx(en50367.largest_mean(float(mean), "AC"))
+    steady = {each.key: each for each in RUN.compliance((1, 1))}
+    assert steady["mean"].highest == pytest.approx(en50367.largest_mean(50.0, "AC"))
+    assert steady["mean"].highest - limits["mean"].highest > 1.0
+    assert np.ptp(speeding.speeds) == pytest.approx(50 * 0.39)

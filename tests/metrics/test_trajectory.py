@@ -50,29 +50,21 @@ def test_line_without_supports_or_droppers_survives_parquet(tmp_path):
     assert np.isnan(again.summary("all").max_uplift)
 
 
-def test_half_written_file_is_refused_in_one_sentence(run, tmp_path):
+def test_half_written_other_and_missing_files_are_refused(run, tmp_path):
     path = tmp_path / "run.parquet"
     run.save(path)
     path.write_bytes(path.read_bytes()[:5000])
-    with pytest.raises(InputError, match="is not a whole trajectory file"):
-        Trajectory.load(path)
-
-
-def test_other_parquet_files_and_missing_files_are_refused(tmp_path):
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     pq.write_table(pa.table({"a": [1]}), tmp_path / "other.parquet")
-    with pytest.raises(InputError, match="is not a whole trajectory file"):
-        Trajectory.load(tmp_path / "other.parquet")
+    for each in (path, tmp_path / "other.parquet"):
+        with pytest.raises(InputError, match="is not a whole trajectory file"):
+            Trajectory.load(each)
     with pytest.raises(InputError, match="does not exist"):
         Trajectory.load(tmp_path / "missing.parquet")
 
 
-@pytest.mark.parametrize("other", [trajectory.FORMAT - 1, trajectory.FORMAT + 1])
-def test_files_of_another_format_are_refused(run, tmp_path, monkeypatch, other):
+def test_files_of_another_format_are_refused(run, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory, "FORMAT", other)
+        patch.setattr(trajectory, "FORMAT", trajectory.FORMAT + 1)
         run.save(tmp_path / "run.parquet")
     with pytest.raises(InputError, match="it has another format"):
         Trajectory.load(tmp_path / "run.parquet")
@@ -99,7 +91,7 @@ def test_a_crafted_run_is_refused_in_a_sentence_or_shown(tmp_path):
     """With a checksum that fits: no entry leads to anything but figures or one sentence."""
     path, ends = tmp_path / "run.parquet", []
     simulate("en50318-2002", "dsa250", 250, accuracy="fast", distance=190.0).save(path)
-    for facts, columns in list(crafted(path))[::3]:
+    for facts, columns in list(crafted(path))[::6]:
         stored = json.dumps(with_checksum(facts, columns))
         try:
             table = pa.table(columns, metadata={trajectory.KEY: stored})
@@ -108,23 +100,17 @@ def test_a_crafted_run_is_refused_in_a_sentence_or_shown(tmp_path):
             again.compliance((1, 2))
             assert len(run_tables.figures([again], (1, 2)).columns) > 5
             run_tables.droppers([again], (1, 2))
-            assert report(Findings.of(again, "run.parquet")[0]) is not None
+            (found,) = Findings.of(again, "run.parquet")
+            _ = found.criteria, found.remarks, found.by_span
             ends.append("shown")
         except InputError as error:
             ends.append("refused" if str(error).endswith(".") and "\n" not in str(error) else "rude")
     assert "rude" not in ends
-    assert ends.count("refused") > 100
-    assert ends.count("shown") > 20
-
-
-def report(found):
-    """What a report asks of a run."""
-    return found.criteria, found.remarks, found.by_span
+    assert ends.count("refused") > 50
+    assert ends.count("shown") > 10
 
 
 def test_failed_save_leaves_the_old_file(run, tmp_path, monkeypatch):
-    import pyarrow.parquet as pq
-
     path = tmp_path / "run.parquet"
     run.save(path)
     before = path.read_bytes()

@@ -151,10 +151,3 @@ def test_a_grid_is_stable_under_the_largest_tension_that_may_be_drawn():
     assert Task(run_settings(given)).plant.time_step == step
     with pytest.raises(InputError, match="unstable on a grid"):
         Task(run_settings(given | {"line_condition": {"tension_scatter": 0.1}}))
-
-
-@pytest.mark.parametrize("scatter", [{"support_scatter": 1e-3}, {"tension_scatter": 1e-3}])
-def test_only_a_flexible_line_scatters(scatter):
-    settings = run_settings({"catenary": "ohl-three-span", "line_condition": scatter})
-    with pytest.raises(InputError, match="Only a flexible catenary has droppers and supports"):
-        Task(settings)

@@ -8,8 +8,7 @@ from panto_env.plant.line_condition import LINE_CONDITIONS, draw
 from panto_env.studies.en50318 import conditions
 
 LEVELS = ("smooth", "fair", "worn")
-TOLERANCE = 10e-3
-"""By which heights at neighbouring droppers may differ (m): EN 50119, recalled."""
+TOLERANCE = 10e-3  # by which heights at neighbouring droppers may differ (m): EN 50119, recalled
 
 
 def heights(level, seed, x):
@@ -74,7 +73,7 @@ def test_at_low_speed_the_same_short_waves_reach_sigma():
 
 
 def test_the_table_of_conditions_has_every_preset_and_is_of_simulated_passes(monkeypatch):
-    monkeypatch.setattr(conditions, "SEEDS", 2)
+    monkeypatch.setattr(conditions, "LEVEL_SEEDS", 2)
     checks = conditions.check_conditions("en50318-2002", "en50318-2002", 250.0)
     assert [check.condition for check in checks] == list(LINE_CONDITIONS)
     assert [check.seeds for check in checks] == [1, 2, 2, 2, 2]

@@ -1,9 +1,17 @@
+"""The contact law, plain arithmetic of kernels, and what every kind of catenary promises a kernel."""
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from panto_env.backend import kernel
-from panto_env.plant.contact import contact_force
+from panto_env.catalog import load_catenary
+from panto_env.plant.catenary import CATENARIES
+from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact
+from panto_env.plant.functions import cosine_of_turns, sine_of_turns, stencil
+from panto_env.plant.line_condition import DrawnLine, LineCondition
+from panto_env.plant.numerics import Numerics, Runs
+from panto_env.plant.pantograph.step import contact_force
 
 pytestmark = pytest.mark.plain
 
@@ -58,3 +66,52 @@ def test_mass_bouncing_on_a_spring_matches_scipy_and_keeps_its_energy():
         energy.append(mass * v**2 / 2 + stiffness * max(z, 0.0) ** 2 / 2 - weight * z)
     assert z == pytest.approx(exact.y[0, -1], abs=3e-5)
     assert max(energy) / min(energy) - 1 < 0.02
+
+
+@kernel
+def sine_and_cosine(turns):
+    return sine_of_turns(turns), cosine_of_turns(turns)
+
+
+def test_cubics_are_interpolated_exactly():
+    positions, spacing = np.random.default_rng(0).uniform(1, 9, 50), 0.25
+    nodes = spacing * np.arange(60)
+    first, weights = stencil(positions, spacing)
+    for cubic in np.polynomial.Polynomial([1, -2, 0.5, 0.1]), np.polynomial.Polynomial([0, 0, 0, 1]):
+        four = cubic(nodes)[first[:, None] + np.arange(4)]
+        assert (weights * four).sum(axis=1) == pytest.approx(cubic(positions))
+    between = positions / spacing - first
+    assert ((between >= 1) & (between < 2)).all()
+
+
+@pytest.mark.parametrize("name", ["sine", "cosine"])
+def test_turns_are_numpy_s(name):
+    theirs = {"sine": np.sin, "cosine": np.cos}[name]
+    turns = np.random.default_rng(0).uniform(-3, 50, 200)
+    assert [sine_and_cosine(each)[name == "cosine"] for each in turns] == pytest.approx(
+        theirs(2 * np.pi * turns), abs=1e-13
+    )
+
+
+@kernel
+def press(line, wire, x, force, seen):
+    """Wire height and its yield at x before a force is applied there, and the height afterwards."""
+    place_contact(line, wire, 0, 0, x)
+    advance_wire(line, wire, 0)
+    seen[0], seen[1], _, _ = look_at_contact(line, wire, 0, 0, x)
+    apply_force(line, wire, 0, 0, x, force)
+    seen[2], _, _, _ = look_at_contact(line, wire, 0, 0, x)
+
+
+@pytest.mark.parametrize("x", [40.17, 40.5])
+@pytest.mark.parametrize("name", ["en50318-2002", "ohl-three-span"])
+def test_the_wire_yields_to_a_force_as_it_was_said_to(name, x):
+    """The contact law solves for the force with this yield: or else gap and force would not agree."""
+    data, condition = load_catenary(name), LineCondition()
+    numerics = Numerics(precision="double", window=3) if data.kind == "flexible" else Numerics()
+    model = CATENARIES[data.kind].model(data, lanes=1, collectors=1, spans=10, numerics=numerics, runs=Runs())
+    model.settle(0, DrawnLine(condition), 150.0)
+    force, seen = 90.0, np.zeros(3)
+    press(model.line, model.wire, x, force, seen)
+    assert seen[1] != 0
+    assert seen[2] - seen[0] == pytest.approx(seen[1] * force, rel=1e-8)

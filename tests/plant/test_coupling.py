@@ -7,8 +7,8 @@ from scipy.linalg import eigvalsh
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible.grid import point_gain, stencil_weights
-from panto_env.plant.catenary.three_span.build import ThreeSpan
-from panto_env.plant.interpolation import stencil
+from panto_env.plant.catenary.three_span import ThreeSpan
+from panto_env.plant.functions import stencil
 from panto_env.plant.numerics import Numerics, Runs
 
 from ..finite_element import simulation as finite_element
@@ -37,17 +37,17 @@ def test_the_stiffest_explicit_contact_is_that_of_the_eigenvalues(dx, step):
             2 * np.eye(size) - np.roll(np.eye(size), shift, 0) - np.roll(np.eye(size), -shift, 0)
         )
     room = 4 * np.eye(size) - stiffness * (1 + 2 * beta / step)
-    largest = 0.0
-    for place in np.linspace(0, dx, 50):
-        first, weights = stencil([100 * dx + place], dx)
-        force = np.zeros(size)
-        force[first[0] : first[0] + 4] = weights[0]
-        largest = max(largest, float(force @ np.linalg.solve(room, force)))
+    first, weights = stencil(100 * dx + np.linspace(0, dx, 50), dx)
+    forces = np.zeros((size, 50))
+    forces[first[:, None] + np.arange(4), np.arange(50)[:, None]] = weights
+    largest = float((forces * np.linalg.solve(room, forces)).sum(axis=0).max())
     largest *= step**2 / (wire.mass * dx)
     assert point_gain(wire, dx, step, beta) == pytest.approx(largest, rel=0.01)
     # There the leapfrog with this contact has an eigenvalue of 4 / dt^2, and its fastest motion grows.
     touched = stiffness * (1 + 2 * beta / step)
-    touched += step**2 / (wire.mass * dx) / point_gain(wire, dx, step, beta) * np.outer(force, force)
+    touched += (
+        step**2 / (wire.mass * dx) / point_gain(wire, dx, step, beta) * np.outer(forces[:, -1], forces[:, -1])
+    )
     assert eigvalsh(touched).max() <= 4 * 1.001
 
 
@@ -100,7 +100,7 @@ def test_a_stiff_contact_loses_no_contact_by_grid_or_step(catenary, pantograph, 
 
 
 @pytest.mark.filterwarnings("ignore:A grid of")
-@pytest.mark.parametrize("stiffness", [50e3, 200e3, 500e3, 1e6])
+@pytest.mark.parametrize("stiffness", [50e3, 1e6])
 @pytest.mark.parametrize("settings", [{"accuracy": "fast"}, {"time_step": 5e-3}, {}], ids=str)
 def test_a_contact_that_may_pull_never_grows(stiffness, settings):
     run = simulate("en50318-2002", stiff(stiffness), 300, bilateral=True, record_droppers=False, **settings)

@@ -11,9 +11,9 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
-from panto_env.metrics.en50367 import largest_mean
-from panto_env.plant.drift import draw_drift
+from panto_env.metrics.compliance import largest_mean
 from panto_env.plant.state import Row
+from panto_env.plant.train import draw_drift
 
 from ..pantograph_alone import means, replay
 

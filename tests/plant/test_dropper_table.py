@@ -7,46 +7,29 @@ import pandas
 import pytest
 
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.dropper_table import as_rows, droppers_at_rest
-from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
+from panto_env.plant.catenary.flexible.static import RestingDropper, as_rows, dropper_table, droppers_at_rest
 
 from ..command import panto
-from ..finite_element.static import GRAVITY, static_shape
+from ..finite_element.sections import line_of
+from ..finite_element.static import static_shape
 from ..uniform_lines import UNIFORM
 
-
-@pytest.mark.parametrize("name", UNIFORM)
-def test_forces_carry_the_contact_wire(name):
-    """Less clamps and half of the droppers, they add up to its weight, with what a steady arm holds."""
-    line = load_catenary(name)
-    table, other = droppers_at_rest(line), static_shape(line, element=0.1)
-    own = sum(each.length * line.droppers.mass / 2 + line.droppers.contact_clamp_mass for each in table)
-    weight = GRAVITY * (line.contact_wire.mass * line.span_length + own)
-    carried = sum(each.static_force for each in table)
-    if not line.steady_arm.holds_wire:
-        assert carried == pytest.approx(weight, rel=1e-9)
-    assert carried == pytest.approx(other.dropper_tension.sum(), rel=1e-3)
-    assert [each.static_force for each in table] == pytest.approx(other.dropper_tension, rel=1e-3, abs=0.2)
+LINES = {"ohl-three-span": "own-two-mass", "periodic-stiffness": "three-mass", "en50318-2002": "en50318-2002"}
 
 
 @pytest.mark.parametrize("name", UNIFORM)
 def test_lengths_and_stretches_fill_the_room_between_the_wires(name):
     """As finite elements give it, with the messenger's supports yielding under all that they carry."""
     line = load_catenary(name)
-    table, other = droppers_at_rest(line), static_shape(line, element=0.1)
-    droppers = line.droppers
-    loaded = [each.length + each.stretch for each in table]
-    assert loaded == pytest.approx(other.dropper_length, abs=5e-4)
+    table, other, droppers = droppers_at_rest(line), static_shape(line, element=0.1), line.droppers
+    forces = [each.static_force for each in table]
+    assert sum(forces) == pytest.approx(other.dropper_tension.sum(), rel=1e-3)
+    assert forces == pytest.approx(other.dropper_tension, rel=1e-3, abs=0.2)
+    assert [each.length + each.stretch for each in table] == pytest.approx(other.dropper_length, abs=5e-4)
     stiffness = [droppers.stiffness or droppers.axial_stiffness / each.length for each in table]
-    stretch = np.array([each.static_force for each in table]) / stiffness
-    assert [each.stretch for each in table] == pytest.approx(stretch, rel=1e-9)
-
-
-def test_published_lengths_are_in_the_table():
-    """Of the benchmark of 2015, within 3 mm."""
-    half = [1.017, 0.896, 0.810, 0.758, 0.741]
-    found = [each.length for each in droppers_at_rest(load_catenary("benchmark-2015"))]
-    assert found == pytest.approx(half + half[-2::-1], abs=3e-3)
+    assert [each.stretch for each in table] == pytest.approx(np.array(forces) / stiffness, rel=1e-9)
 
 
 def test_the_command_lists_them_and_writes_them_with_units(tmp_path):
@@ -84,9 +67,46 @@ def test_a_rig_has_those_of_its_line():
 
 
 def test_the_table_numbers_spans_only_where_they_differ():
-    table = load_catenary("re250").model_dump(exclude={"sources", "spans"}, exclude_none=True)
     given = {"sequence": ["a", "a", {"span_length": 60.0}], "span_types": {"a": {}}}
-    differ = as_rows(droppers_at_rest(FlexibleCatenaryData.model_validate(table | given)))
+    differ = as_rows(droppers_at_rest(line_of("re250", given)))
     assert [row["span"] for row in differ] == [1] * 7 + [2] * 7 + [3] * 6  # 60 m
     alike = as_rows(droppers_at_rest(load_catenary("re250")))
     assert alike[0].keys() == differ[0].keys() - {"span"}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_tension_is_recorded_of_every_dropper_and_only_on_request(name):
+    given = {"catenary": name, "pantograph": LINES[name], "distance": 120.0}
+    plant = Task(run_settings(given), lanes=2).plant
+    droppers = len(plant.model.droppers)
+    assert (droppers > 0) == (name == "en50318-2002")
+    assert plant.samples(5).tension.shape == (2, 5, 0)
+    assert plant.samples(5, tension=True).tension.shape == (2, 5, droppers)
+    assert plant.samples(5).uplift.shape == (2, 5, len(plant.model.supports))
+    assert plant.samples(5).rows.shape[:2] == (2, 5)
+    if name != "periodic-stiffness":  # a massless line keeps no tension at all
+        plant.start(np.arange(2), 50.0)
+        tension = plant.model.rest_tension(0)
+        assert tension.shape == (droppers,)
+        assert (tension > 0).all()
+
+
+def dropper(span, number):
+    return RestingDropper(number, 5.0 * number, 0.0124, 1.23456, 123.44, 0.001234, span)
+
+
+def test_a_line_is_drawn_below_the_last_dropper_of_each_span():
+    places = [(1, 1), (1, 2), (1, 3), (2, 1), (3, 1), (3, 2)]
+    made = dropper_table([dropper(*place) for place in places])
+    assert made.section_ends == (2, 3)
+    assert [row[:3] for row in made.rows[:2]] == [("1", "1", "5.000"), ("1", "2", "10.000")]
+    assert made.rows[-1] == ("3", "2", "10.000", "12.4", "1.2346", "123.4", "1.23")
+    assert made.title == "Droppers of all spans at rest, as designed"
+    assert made.headings[:2] == ("span", "dropper")
+    alike = dropper_table([dropper(1, 1), dropper(1, 2)])
+    assert alike.section_ends == ()
+    assert alike.rows[0] == ("1", "5", "12.4", "1.2346", "123.4", "1.23")
+    assert alike.title == "Droppers of a span at rest, as designed"
+    assert len(alike.headings) == len(made.headings) - 1 == 6
+    assert "sag (mm)" in alike.headings
+    assert "stretch at rest (mm)" in alike.headings

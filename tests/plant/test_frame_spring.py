@@ -5,19 +5,20 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
 from panto_env.metrics.trajectory import Trajectory
-from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.pantograph.step import Part
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train
+
+from ..finite_element.sections import line_of
 
 UP = (0.0,) * 8 + (0.1, 0.2, 0.3, 0.4) + (0.5,) * 10
 BRIDGE = (0.0,) * 8 + (-0.05, -0.1, -0.15) + (-0.2,) * 11
@@ -29,9 +30,8 @@ TABLE = ((-0.3, 82.0), (0.0, 70.0), (0.25, 66.0), (0.6, 80.0))
 
 def line_over(heights, name="en50318-2002"):
     """A line with these heights at its supports (m)."""
-    table = load_catenary(name).model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table |= {"sequence": [{"contact_height": height} for height in heights[:-1]]}
-    return FlexibleCatenaryData.model_validate(table | {"end_support": {"contact_height": heights[-1]}})
+    spans, end = [{"contact_height": height} for height in heights[:-1]], {"contact_height": heights[-1]}
+    return line_of(name, {"sequence": spans, "end_support": end})
 
 
 def with_table(pantograph=DSA250, **changes):

@@ -1,4 +1,6 @@
-"""What a grid leaves out of a wire's yield to a force at a point."""
+"""What a grid leaves out of a wire's yield to a force at a point, and the waves ahead that it carries."""
+
+import math
 
 import numpy as np
 import pytest
@@ -6,14 +8,21 @@ import pytest
 from panto_env import simulate
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.build import constants
-from panto_env.plant.catenary.flexible.grid import missing_between, missing_yield, stencil_weights
+from panto_env.plant.catenary.flexible.grid import (
+    carrying_grid,
+    missing_between,
+    missing_yield,
+    stencil_weights,
+    wave_ahead,
+)
 from panto_env.plant.catenary.flexible.on_grid import STIFFEST
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.interpolation import stencil
+from panto_env.plant.functions import stencil
 from panto_env.plant.numerics import Numerics, Runs
 
 LINE = load_catenary("en50318-2002")
+WIRE = LINE.contact_wire
 
 
 def yield_of_beam(wire, length, at, read=None):
@@ -104,3 +113,31 @@ def test_a_grid_of_half_a_metre_is_within_two_per_cent(speed):
     ours = simulate(spacing=0.5, time_step=2e-3, **given).summary((4, 9))
     assert ours.std == pytest.approx(true.std, rel=0.01)
     assert ours.max == pytest.approx(true.max, abs=0.015 * true.mean)
+
+
+def limp(line):
+    return line.model_copy(update={"contact_wire": WIRE.model_copy(update={"bending_stiffness": 0.0})})
+
+
+@pytest.mark.parametrize("share", [0.1, 0.6, 0.95])
+def test_without_bending_the_wave_ahead_has_a_closed_form(share):
+    wire = limp(LINE).contact_wire
+    speed = share * wire.wave_speed
+    assert 2 * math.pi / wave_ahead(wire, speed, 20.0) == pytest.approx((wire.wave_speed - speed) / 20.0)
+
+
+def test_bending_makes_waves_longer():
+    k, soft = (wave_ahead(each.contact_wire, 100.0, 20.0) for each in (LINE, limp(LINE)))
+    assert k < soft
+    omega = np.sqrt((WIRE.tension * k**2 + WIRE.bending_stiffness * k**4) / WIRE.mass)
+    assert omega == pytest.approx(2 * math.pi * 20.0 + 100.0 * k)
+
+
+def test_the_grid_goes_by_what_makes_waves_short():
+    at = 0.7 * WIRE.wave_speed
+    usual = carrying_grid(LINE, at)
+    assert carrying_grid(LINE, 0.9 * WIRE.wave_speed) < usual
+    assert carrying_grid(limp(LINE), at) < usual
+    clamps = LINE.droppers.model_copy(update={"contact_clamp_mass": 0.4})
+    assert carrying_grid(LINE.model_copy(update={"droppers": clamps}), at) < usual
+    assert carrying_grid(LINE, WIRE.wave_speed) == 0

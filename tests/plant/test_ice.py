@@ -9,18 +9,16 @@ from scipy.sparse.linalg import spsolve
 
 from panto_env import InputError, simulate
 from panto_env.backend import python_function
-from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.catalog import load_catenary
+from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
 
-from ..finite_element import simulation as finite_element
 from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY
 from ..finite_element.system import _placement, build
-from .test_flexible import WHOLE
+from .test_flexible import under_a_train
 from .test_uneven import MIXED, line_of
 
 of_defects = python_function(rise_by_defects)
@@ -106,28 +104,19 @@ def test_both_wires_together_carry_the_ice_between_droppers():
 
 
 def test_under_a_train_it_is_the_finite_elements_line(monkeypatch):
-    data, condition, speed = load_catenary(EN50318), LineCondition(ice=0.4), 250.0
-    monkeypatch.setattr(
-        finite_element, "build", lambda data, spans, element: iced(data, spans, element, condition.ice)
-    )
-    other = finite_element.simulate(
-        data, load_pantograph(EN50318), speed, element=0.5, time_step=5e-4, distance=361.0
-    )
-    fine = {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE
-    near = np.linspace(3.05 * 60, 360, 3000)
-    runs = [
-        simulate(speed_kmh=speed, line_condition=c, distance=361.0, spans=10, **fine)
-        for c in (condition, "new")
-    ]
-    ours, bare = (np.interp(near, run.position, run.contact_force) for run in runs)
-    theirs = np.interp(near, other.position, other.contact_force)
+    ice, mass = 0.4, load_catenary(EN50318).contact_wire.mass
+
+    def changed(data, spans, element):
+        return iced(data, spans, element, ice)
+
+    condition = LineCondition(ice=ice)
+    ours, theirs, bare, run, other = under_a_train(monkeypatch, changed, condition, 250.0, 3.05 * 60, 361.0)
     assert (ours - theirs).std() < 3.0
     assert (bare - theirs).std() > 9.0
     assert ours.std() == pytest.approx(theirs.std(), rel=0.02)
-    uplift = other.uplift.max(axis=0)[3:5]
-    np.testing.assert_allclose(runs[0].uplift.max(axis=0)[3:5], uplift, atol=1e-3)
-    mass = data.contact_wire.mass
-    assert runs[0].line.wave_speed == pytest.approx(runs[1].line.wave_speed * np.sqrt(mass / (mass + 0.4)))
+    np.testing.assert_allclose(run.uplift.max(axis=0)[3:5], other.uplift.max(axis=0)[3:5], atol=1e-3)
+    dry = load_catenary(EN50318).contact_wire.wave_speed
+    assert run.line.wave_speed == pytest.approx(dry * np.sqrt(mass / (mass + ice)))
 
 
 def test_what_cannot_hang_or_has_no_wires_is_refused():
@@ -135,8 +124,6 @@ def test_what_cannot_hang_or_has_no_wires_is_refused():
         InputError, match=r"would differ by 0.\d+ m in height, more than 0.5 m, in this line_c"
     ):
         simulate(EN50318, speed_kmh=100.0, line_condition={"ice": 3.0}, distance=100.0)
-    with pytest.raises(InputError, match="and wires that bear ice"):
-        simulate("periodic-stiffness", "three-mass", line_condition={"ice": 1.0})
     with pytest.raises(InputError, match=r"must not differ in .* ice or temp"):
         simulate(line_condition=["new", {"ice": 0.3}])
 

@@ -2,7 +2,6 @@
 
 import math
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -11,16 +10,16 @@ from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
 from panto_env.plant.actuators.motor import MotorActuator
-from panto_env.plant.actuators.motor.arrays import MotorRow
-from panto_env.plant.actuators.motor.current import age, decay
-from panto_env.plant.actuators.motor.power import motor_power
+from panto_env.plant.actuators.motor.schema import motor_power
+from panto_env.plant.actuators.motor.step import MotorRow, age, decay
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.plant.pantograph.build import matrices
+from panto_env.plant.pantograph.schema import matrices
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train
 
+from ..lanes import check_lanes_are_singles
 from ..motor_reference import Rig
 
 pytestmark = pytest.mark.plain
@@ -331,22 +330,12 @@ def test_power_is_refused_where_it_cannot_be_told():
 # --- lanes ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{"backlash": 0.0}, {"backlash": 0.014}])
-def test_lanes_of_a_batch_are_single_environments(changes):
+@pytest.mark.parametrize("backlash", [0.0, 0.014])
+def test_lanes_of_a_batch_are_single_environments(backlash):
     """With motors at both places, and pantographs that differ."""
-    settings = {
-        "actuator": {"kind": "motor", "place": "both", **changes},
-        "pantograph_scatter": 0.1,
-        "distance": 30.0,
-    }
-    envs = gymnasium.make_vec("PantographStiffness-v0", num_envs=3, **settings)
-    single = gymnasium.make("PantographStiffness-v0", **settings)
-    together, tape = [envs.reset(seed=5)[0]], np.random.default_rng(0).uniform(-1, 1, (20, 3, 2))
-    together += [envs.step(actions.astype(np.float32))[0] for actions in tape]
-    for lane in range(3):
-        alone = [single.reset(seed=5 + lane)[0]]
-        alone += [single.step(actions[lane].astype(np.float32))[0] for actions in tape]
-        np.testing.assert_array_equal(alone, np.array(together)[:, lane])
+    actuator = {"kind": "motor", "place": "both", "backlash": backlash}
+    settings = {"actuator": actuator, "pantograph_scatter": 0.1, "distance": 30.0}
+    check_lanes_are_singles("PantographStiffness-v0", settings, steps=20, actions=2)
 
 
 # --- settings ---------------------------------------------------------------------------------

@@ -5,10 +5,10 @@ import pytest
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible import near_build
-from panto_env.plant.catenary.flexible.attached import dropper_positions
+from panto_env.plant.catenary.flexible import near as near_build
+from panto_env.plant.catenary.flexible.arrays import NONE, REACH
 from panto_env.plant.catenary.flexible.build import constants
-from panto_env.plant.catenary.flexible.near_arrays import NONE, REACH
+from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.numerics import Numerics, Runs

@@ -20,10 +20,8 @@ SLOW, SLOW_SPANS, USUAL_SPANS = 100.0, (2, 3), (4, 6)
 """Speed (km/h) below which fewer spans are evaluated, and spans."""
 DRAWN = 1 / 6
 """Share of cases whose line is drawn from a section of the catalogue, with curves, bridges and ramps."""
-BLOWN = 1 / 6
-"""Share of cases in a wind across the track."""
-SPANS = 20
-"""Spans of a line whose spans differ: enough for a window that travels."""
+BLOWN = 1 / 6  # share of cases in a wind across the track
+SPANS = 20  # spans of a line whose spans differ: enough for a window that travels
 
 
 def scaled(data, factors):
@@ -199,8 +197,7 @@ def energy(run, pantograph, line):
     return left, run.time_step * np.abs(gained).sum() + stored.max()
 
 
-SHORTEST = 1e-6
-"""Shortest time step that a run may have (s)."""
+SHORTEST = 1e-6  # shortest time step that a run may have (s)
 
 
 def finer(line, pantograph, case, run, **numbers):

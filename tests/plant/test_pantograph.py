@@ -7,7 +7,7 @@ from panto_env import simulate
 from panto_env.backend import JIT, kernel
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
-from panto_env.plant.pantograph import build as pantograph
+from panto_env.plant.pantograph import schema as pantograph
 from panto_env.plant.pantograph.step import move_freely
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import ROW, Row

@@ -42,15 +42,10 @@ def exact_force(speed_kmh, position, unilateral):
 
 
 @pytest.mark.parametrize("unilateral", [True, False])
-@pytest.mark.parametrize("speed", [160, 200, 250, 300, 350])
+@pytest.mark.parametrize("speed", [160, 250, 350])
 def test_contact_force_matches_scipy(speed, unilateral):
     run = simulate("periodic-stiffness", "three-mass", speed, bilateral=not unilateral)
     exact = exact_force(speed, run.position, unilateral)
     assert np.abs(run.contact_force - exact).max() < 0.005 * np.abs(exact).max()
-
-
-def test_bilateral_contact_pulls_where_unilateral_lets_go():
-    pulls = simulate("periodic-stiffness", "three-mass", 350, bilateral=True)
-    pushes = simulate("periodic-stiffness", "three-mass", 350)
-    assert pulls.contact_force.min() < 0
-    assert pushes.contact_force.min() == 0
+    if speed == 350:  # contact is lost, or pulls
+        assert (run.contact_force.min() < 0) == (not unilateral)

@@ -7,7 +7,6 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.grid import stable
 from panto_env.plant.catenary.flexible.resolution import Resolution, fine_enough, resolution
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
@@ -15,6 +14,7 @@ from panto_env.plant.numerics import Numerics, Runs
 from panto_env.studies.en50318 import lines
 
 from ..command import panto
+from ..finite_element.sections import line_of
 
 LINE = load_catenary("en50318-2002")
 
@@ -144,9 +144,8 @@ def test_lines_outside_the_catalogue_are_as_accurate(seed, speed):
 
 def test_a_pantograph_behind_another_on_unlike_spans_is_as_accurate():
     """On the grid of a single one its minimum was wrong by 2.9 % of the mean force, its maximum by 3.1 %."""
-    table = load_catenary("benchmark-2015").model_dump(exclude={"sources", "spans"}, exclude_none=True)
     spans = [{"span_length": 65.0 if each == "l" else 30.0} for each in "lsllllllllsllsllllllllls"]
-    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans})
+    line = line_of("benchmark-2015", {"sequence": spans})
     train = {"pantographs": ["dsa380"] * 2, "distances": [120.0], "speed_kmh": 290, "mean_force": "en50367"}
     chosen, fine, coarse = (
         [each.summary() for each in simulate(line, **train, **own, record_droppers=False).train]

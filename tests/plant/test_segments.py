@@ -7,9 +7,11 @@ from panto_env import simulate
 from panto_env.backend import JIT, WIDTH, kernel, load_row
 from panto_env.plant.catenary.flexible.arrays import PAD
 from panto_env.plant.catenary.flexible.on_grid import Sets
-from panto_env.plant.catenary.flexible.segments import (
+from panto_env.plant.catenary.flexible.wires import (
     along,
     lay_out,
+    leapfrog,
+    leapfrog_weakened,
     move,
     node_after,
     places,
@@ -18,7 +20,6 @@ from panto_env.plant.catenary.flexible.segments import (
     shift_nodes,
     window_nodes,
 )
-from panto_env.plant.catenary.flexible.wires import leapfrog, leapfrog_weakened
 
 pytestmark = pytest.mark.plain
 ROWS = 7
@@ -147,13 +148,13 @@ def test_what_hangs_in_the_same_rows_goes_abreast():
 
 
 @pytest.mark.skipif(not JIT, reason="slow in plain Python")
-@pytest.mark.parametrize("window", [3, 4, 5, 7, 9, 12, 16, 0])
-def test_any_window_that_has_not_travelled_gives_the_same_run(window):
+def test_any_window_that_has_not_travelled_gives_the_same_run():
     """However its segments lie to spans and droppers."""
     given = {"spans": 20, "distance": 55.0, "precision": "double"}
     reference = simulate(window=8, **given)
-    run = simulate(window=window, **given)
-    assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3
+    for window in (3, 4, 5, 7, 9, 12, 16, 0):
+        run = simulate(window=window, **given)
+        assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3, window
 
 
 @pytest.mark.parametrize("loaded", [False, True])

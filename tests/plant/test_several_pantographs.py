@@ -8,7 +8,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.catenary.flexible import build
 from panto_env.plant.catenary.flexible.model import FlexibleCatenary
-from panto_env.plant.catenary.flexible.near_build import near_droppers
+from panto_env.plant.catenary.flexible.near import near_droppers
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row

@@ -7,16 +7,15 @@ from scipy.signal import welch
 
 from panto_env import InputError, simulate
 from panto_env.plant.catenary.flexible.blown import diameter
-from panto_env.plant.side_wind import (
+from panto_env.plant.wind import (
     DECAY,
     HEIGHT,
     QUICKEST_GUST,
     SHORTEST_WAVE,
     SLOWEST_GUST,
-    SideWind,
+    Wind,
     draw_side_wind,
-    resolved,
-    side_winds_at,
+    side_resolved,
 )
 
 from ..finite_element.figures import figures
@@ -31,7 +30,7 @@ def panofsky(frequency, wind, deviation):
 
 
 def table(seed, wind=20.0, turbulence=0.17, step=1.0):
-    return draw_side_wind(SideWind(wind, turbulence), step, np.random.default_rng(seed))
+    return draw_side_wind(Wind(wind, turbulence), step, np.random.default_rng(seed))
 
 
 def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
@@ -39,8 +38,8 @@ def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
     assert whole == pytest.approx(2.0**2, rel=1e-6)
     limits = SLOWEST_GUST * 12 / HEIGHT, QUICKEST_GUST * 12 / HEIGHT
     band, _ = quad(lambda n: panofsky(n, 12.0, 2.0), *limits, limit=200)
-    assert resolved() == pytest.approx(band / 2.0**2, rel=1e-6)
-    assert 0.90 < resolved() < 0.92
+    assert side_resolved() == pytest.approx(band / 2.0**2, rel=1e-6)
+    assert 0.90 < side_resolved() < 0.92
 
 
 def test_gusts_at_a_place_have_panofsky_s_spectrum_less_what_is_short_along_the_track():
@@ -170,3 +169,11 @@ def test_a_wind_where_none_blows_is_refused():
     }.items():  # fmt: skip
         with pytest.raises(InputError, match=message):
             simulate(line_condition={"side_wind": 10.0}, distance=100.0, **settings)
+
+
+def side_winds_at(rows, x, steps):
+    """Vertical gusts (m per step), upward, at places x (m) after numbers of steps, (n,); rows: a lane's."""
+    amplitude, frequency, wavenumber, phase = rows[1:].reshape(-1, 4).T
+    place, step = np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(steps))
+    turns = frequency * step[:, None] + wavenumber * place[:, None] + phase
+    return np.cos(2 * np.pi * turns) @ amplitude

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from panto_env import InputError, simulate
+from panto_env import InputError
 from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
-from panto_env.plant.catenary.flexible.overlaps import tension_lengths
+from panto_env.plant.catenary.flexible.overlaps import stitches_of, tension_lengths
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang, solve
-from panto_env.plant.catenary.flexible.stitches import stitches_of
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 
+from ..finite_element.sections import line_of
 from ..uniform_lines import UNIFORM
 
 FILE = """
@@ -95,15 +95,6 @@ def test_values_of_a_sequence_have_the_source_of_their_table(tmp_path):
     assert [found[f"sequence.{number}"] for number in (1, 2, 3)] == 3 * ["masts.csv"]
     assert found["droppers.mass"] == BY_DEFAULT
     assert found["droppers.stiffness"] == ""
-
-
-def test_equal_spans_written_out_run_as_the_uniform_line():
-    name = "en50318-2002"
-    written = FlexibleCatenaryData.model_validate(spelt_out(name))
-    uniform = load_catenary(name).model_copy(update={"spans": 6})
-    runs = [simulate(line, name, 250.0, distance=60.0) for line in (uniform, written)]
-    np.testing.assert_array_equal(runs[0].contact_force, runs[1].contact_force)
-    np.testing.assert_array_equal(runs[0].dropper_force, runs[1].dropper_force)
 
 
 def test_what_a_type_leaves_out_is_the_line_s_own(tmp_path):
@@ -239,9 +230,8 @@ def test_the_example_of_the_document_hangs(tmp_path):
 def test_the_examples_of_stitch_wires_and_overlaps_hang():
     page = (Path(__file__).parents[2] / "docs" / "own-section.md").read_text()
     *_, stitch, overlap = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    table = load_catenary("re330-stitched").model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table |= {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
-    line = FlexibleCatenaryData.model_validate(table)
+    own = {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
+    line = line_of("re330-stitched", own)
     hang(line)
     assert [round(part.end) for part in tension_lengths(line)] == [17 * 65, 20 * 65]
     assert stitches_of(line).support.tolist() == list(range(1, 21))

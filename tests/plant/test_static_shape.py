@@ -7,8 +7,7 @@ from pydantic import ValidationError
 
 from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change, change_together
-from panto_env.base.explanation import explain
-from panto_env.base.ranges import ranges_of
+from panto_env.base.settings import explain, ranges_of
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary import check_line
 from panto_env.plant.catenary.flexible import static as static_shape
@@ -29,13 +28,12 @@ def test_dropper_lengths_of_the_2015_benchmark_within_3_mm():
 
 @pytest.mark.parametrize("name", UNIFORM)
 def test_agrees_with_finite_elements(name):
+    """Smooth elements round the kinks at the droppers, at first order. Forces: ``test_dropper_table``."""
     line = load_catenary(name)
     shape, other = static_shape.solve(line), finite_element.static_shape(line, element=0.1)
     inner = (other.x >= 0) & (other.x <= line.span_length)
-    # Smooth elements round the kinks at the droppers, at first order.
     np.testing.assert_allclose(shape.contact.height(other.x[inner]), other.contact[inner], atol=2e-4)
     np.testing.assert_allclose(shape.messenger.height(other.x[inner]), other.messenger[inner], atol=2e-4)
-    np.testing.assert_allclose(shape.dropper_tension, other.dropper_tension, rtol=1e-3, atol=0.2)
 
 
 def check_against_the_closed_form(line, shape, tolerance):
@@ -150,12 +148,6 @@ def test_a_parameter_with_which_a_line_can_t_hang_is_refused_in_the_same_words()
         change(LINE, "catenary.encumbrance", 0.5)
     with pytest.raises(InputError, match=f"do not go together: {message}"):
         change_together(LINE, {"catenary.encumbrance": 0.5})
-
-
-def test_droppers_too_heavy_for_any_shape_end_the_rounds():
-    heavy = LINE.model_copy(update={"droppers": LINE.droppers.model_copy(update={"mass": 30.0})})
-    with pytest.raises(InputError, match="does not settle in 200 rounds: its droppers"):
-        static_shape.solve(heavy)
 
 
 def test_too_many_unknowns_are_refused_before_any_is_made():

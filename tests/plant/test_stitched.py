@@ -10,20 +10,18 @@ from panto_env import InputError, simulate
 from panto_env.analysis.parameters import change
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
-from panto_env.plant.catenary.flexible.build import at_rest
+from panto_env.plant.catenary.flexible.arrays import CONTACT, HUNG, LINK, MESSENGER, PAD, STITCH
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
-from panto_env.plant.catenary.flexible.scattered_arrays import HUNG, LINK, STITCH
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.overlaps import moving, stitches_of
 from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
-from panto_env.plant.catenary.flexible.stitches import moving, stitches_of
+from panto_env.plant.catenary.flexible.wires import along, window_nodes
 from panto_env.plant.line_condition import NEW, LineCondition
-from panto_env.plant.numerics import Numerics
 
 from .. import line_energy
-from .test_flexible import constants_of, travel, undamped
+from ..finite_element.sections import line_of as changed
+from .test_flexible import PULSES, swing, undamped
 from .test_uneven import energy as energy_of_wires
 
 STITCH_WIRE = {"length": 18.0, "tension": 3500.0, "mass": 0.31, "clamp_mass": 0.4}
@@ -44,11 +42,6 @@ def line_of(spans=SPANS, droppers=DROPPERS, **changes):
 def written_out(height=1e-9, spans=SPANS, **changes):
     """Span by span, and not uniform for a height that does not matter."""
     return line_of(sequence=[{}] * 7 + [{"contact_height": height}] + [{}] * (spans - 8), **changes)
-
-
-def test_equal_spans_written_out_are_the_uniform_line():
-    written = line_of(sequence=[{}] * SPANS)
-    assert written == line_of().model_copy(update={"sources": written.sources})
 
 
 def test_shape_at_rest_is_that_of_each_span_written_out():
@@ -153,26 +146,16 @@ def energy(line, wire, data, step):
     return total
 
 
-@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
-def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
-    step = 2.5e-4 if goes_slack else 1e-3
-    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision="double")
-    data = undamped(line_of(spans=9))
-    built = constants_of(data, 9, numerics)
-    wire = at_rest(built, 1, 1)
-    pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 190) / 4) ** 2))
-    wire.displacement[0] = lay_out(pulse, built.rows, float)
-    steps = np.zeros(round(0.1 / step))
-    travel(built, wire, 260.0, 0.0, 0.0, steps[:1])
-    first, largest, slack, moved = energy(built, wire, data, step), 0.0, False, 0.0
-    for _ in range(100):
-        travel(built, wire, 260.0, 0.0, 0.0, steps)
-        largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
-        slack |= bool((wire.change[0] <= -wire.static[0]).any())
-        moved = max(moved, np.abs(wire.scattered.displacement).max())
-    assert largest < (0.01 if goes_slack else 1e-6)
-    assert slack == goes_slack
-    assert moved > 0.2 * height
+@PULSES
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
+    moved = []
+
+    def watched(line, wire, data, step):
+        moved.append(np.abs(wire.scattered.displacement).max())
+        return energy(line, wire, data, step)
+
+    assert swing(undamped(line_of(spans=9)), 9, 190.0, height, goes_slack, watched)[0] < bar
+    assert max(moved) > 0.2 * height
 
 
 @pytest.mark.parametrize("settings", [{}, {"window": 0}, {"line_condition": "as-built", "seed": 3}], ids=str)
@@ -187,16 +170,6 @@ def test_uniform_and_written_out_lines_move_alike(settings):
     np.testing.assert_allclose(other.contact_force[after], one.contact_force[after], atol=0.02)
     np.testing.assert_allclose(other.uplift, one.uplift, atol=1e-5)
     assert one.contact_force.std() > 10
-
-
-def test_default_grid_is_fine_enough():
-    settings = {"catenary": line_of(), "pantograph": "dsa380", "speed_kmh": 300, "record_droppers": False}
-    ours, fine = (
-        simulate(**settings, distance=780, **own).summary((4, 10)) for own in ({}, {"spacing": 0.1})
-    )
-    assert ours.std == pytest.approx(fine.std, rel=0.01)
-    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
-    assert ours.max_uplift == pytest.approx(fine.max_uplift, abs=5e-4)
 
 
 def test_a_slight_stitch_wire_without_droppers_changes_little():
@@ -230,20 +203,6 @@ def test_stitch_wires_that_reach_each_other_are_refused():
         hang(short)
 
 
-ALMOST = {
-    "positions": [2.5, 6.5, 12.5, 19.1667, 25.8333, 32.500000000000004, 39.1667, 45.8333, 52.5, 58.5, 62.5]
-}
-"""The sixth dropper 4e-15 m off the middle of the span."""
-
-
-def test_a_dropper_almost_at_mid_span_hangs_as_one_there():
-    droppers = ALMOST | {"sag": [0.0] * 11}
-    exact = droppers | {"positions": [*ALMOST["positions"][:5], 32.5, *ALMOST["positions"][6:]]}
-    almost, there = (hang(line_of(droppers=each)) for each in (droppers, exact))
-    np.testing.assert_allclose(almost.dropper_length, there.dropper_length, atol=1e-9)
-    np.testing.assert_allclose(almost.dropper_tension, there.dropper_tension, atol=1e-6)
-
-
 def test_droppers_almost_at_places_of_a_stitched_line_hang_as_droppers_there():
     """Near mid-span, a clamp, or the least distance from it: up to 1e-5 m they were metres too long."""
     random = np.random.default_rng(7)
@@ -274,9 +233,7 @@ def test_spans_of_another_length_keep_their_droppers_on_the_stitch_wire(name):
     """In a sequence, and where all spans are changed."""
     base = load_catenary(name)
     for length in (40.0, 45.0, 50.0, 54.0, 55.0, 58.0, 60.0, 63.0, 64.0, 70.0, 75.0):
-        table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
-        sequence = [{}, {}, {"span_length": length}, {"span_length": length}, {}, {}]
-        line = FlexibleCatenaryData.model_validate(table | {"sequence": sequence})
+        line = changed(name, {"sequence": [{}, {}, *[{"span_length": length}] * 2, {}, {}]})
         hang(line)
         for droppers in (
             spans_of(line).each[2].droppers,

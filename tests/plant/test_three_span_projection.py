@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
-from tests.plant.test_three_span_motion import Wire
+from tests.plant.test_three_span import Wire
 
 SPEED_KMH, STEP, SPANS, SETTLED = 150.0, 2.5e-3, 9, 5
 """km/h; s between samples; spans that are solved; those that are left out at the start."""

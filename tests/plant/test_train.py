@@ -9,9 +9,8 @@ from panto_env import InputError
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control.settings import run_settings
 from panto_env.plant.actuators import actuator_settings
-from panto_env.plant.drift import draw_drift
 from panto_env.plant.plant import Plant
-from panto_env.plant.train import Collector, Train
+from panto_env.plant.train import Collector, Train, draw_drift
 
 ONE = Train.of(load_pantograph("dsa380"))
 

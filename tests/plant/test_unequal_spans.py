@@ -13,17 +13,16 @@ from rich.console import Console
 
 from panto_baselines.oracle.problem import Problem
 from panto_baselines.oracle.search import span_periodic
-from panto_baselines.policies.skyhook import Skyhook
-from panto_baselines.tuning.batch import Still, run_batch
+from panto_baselines.policies.feedback import Skyhook
+from panto_baselines.tuning.tune import Still, run_batch
 from panto_env import Trajectory, simulate
 from panto_env.analysis.plots import plot_run
 from panto_env.analysis.sweep import sweep
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.diagnosis.features import candidates
-from panto_env.diagnosis.places import Evidence, Region
+from panto_env.diagnosis.features import Evidence, Region, candidates
 from panto_env.plant.alignment import Alignment
-from panto_env.plant.catenary.periodic_stiffness.schema import PeriodicStiffnessData
+from panto_env.plant.catenary.periodic_stiffness import PeriodicStiffnessData
 from panto_env.render.moment import moment_of
 from panto_env.render.strip import Strip
 from panto_env.report.findings import Findings
@@ -49,13 +48,6 @@ def share(x):
 
 def between(x, first, last):
     return (x >= SUPPORTS[first - 1]) & (x < SUPPORTS[last])
-
-
-def test_the_wire_is_stiffest_at_each_support():
-    run, line = simulate(**WHOLE), run_settings(LINE).catenary
-    stiffness = line.mean_stiffness * (1 + line.stiffness_variation * np.cos(2 * np.pi * share(run.position)))
-    touching = run.contact_force > 0
-    np.testing.assert_allclose(run.contact_force[touching], (stiffness * run.wire)[touching], rtol=1e-8)
 
 
 def test_figures_and_their_spans_file_and_sweep(tmp_path):

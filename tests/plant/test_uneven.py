@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.backend import WIDTH
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD
-from panto_env.plant.catenary.flexible.build import at_rest
-from panto_env.plant.catenary.flexible.scattered_arrays import LINK
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.arrays import CONTACT, LINK, MESSENGER, PAD
+from panto_env.plant.catenary.flexible.wires import along
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.train import Train
 
 from .. import line_energy
-from .test_flexible import constants_of, travel, undamped
+from ..finite_element.sections import line_of as changed
+from ..lanes import check_lanes_are_singles
+from .test_flexible import PULSES, swing, undamped
 
 NAME, SPANS = "en50318-2002", 30
 UNIFORM = load_catenary(NAME).model_copy(update={"spans": SPANS})
@@ -60,15 +59,6 @@ def alike(runs, force=2e-3):
     assert rms(other.uplift - one.uplift) < 5e-3 * rms(one.uplift)
     assert rms(other.dropper_force - one.dropper_force) < 5e-3 * rms(one.dropper_force)
     assert one.contact_force.std() > 10
-
-
-def test_equal_spans_written_out_are_the_uniform_line():
-    written = line_of([60.0] * SPANS)
-    assert written == UNIFORM.model_copy(update={"sources": written.sources})
-    runs = [
-        simulate(catenary=each, pantograph=NAME, speed_kmh=250, distance=300) for each in (UNIFORM, written)
-    ]
-    np.testing.assert_array_equal(runs[0].contact_force, runs[1].contact_force)
 
 
 @pytest.mark.parametrize("window", [None, 0])
@@ -129,9 +119,10 @@ def plant_of(line, lanes=1, kmh=(250.0,), **numerics):
     return plant
 
 
-def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
-    """Each with a window that travels at its own time."""
-    line, speeds = line_of(MIXED), (150.0, 200.0, 250.0)
+@pytest.mark.parametrize("line", [UNIFORM, line_of(MIXED)], ids=["uniform", "mixed"])
+def test_lanes_of_a_batch_equal_single_runs_bit_for_bit(line):
+    """Each with a window that travels at its own time; a pickled copy goes on as the original would."""
+    speeds = (150.0, 200.0, 250.0)
     together = plant_of(line, 3, speeds, window=8)
     samples = together.samples(6001, tension=True)
     together.clear(samples, np.arange(3))
@@ -149,8 +140,9 @@ def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
             np.testing.assert_array_equal(getattr(own, name)[0], getattr(samples, name)[lane])
 
 
-def test_restarted_lane_forgets_the_run_before():
-    plant, runs = plant_of(line_of(MIXED), window=5), []
+@pytest.mark.parametrize("line", [UNIFORM, line_of(MIXED)], ids=["uniform", "mixed"])
+def test_restarted_lane_forgets_the_run_before(line):
+    plant, runs = plant_of(line, window=5), []
     for _ in range(2):
         samples = plant.samples(4001)
         plant.start(0, 250 / 3.6)
@@ -161,57 +153,34 @@ def test_restarted_lane_forgets_the_run_before():
     np.testing.assert_array_equal(runs[0].uplift, runs[1].uplift)
 
 
-def test_default_grid_is_fine_enough_where_spans_differ():
-    line = line_of(MIXED)
-    settings = {"catenary": line, "pantograph": NAME, "speed_kmh": 250, "record_droppers": False}
-    ours = simulate(**settings).summary((4, 13))
-    fine = simulate(**settings, spacing=0.1).summary((4, 13))
-    assert ours.std == pytest.approx(fine.std, rel=0.01)
-    assert (ours.max, ours.min) == pytest.approx((fine.max, fine.min), abs=0.01 * fine.mean)
-
-
 def energy(line, wire, data, step):
-    """Energy (J) of the discrete line at mid-step; each node has a mass of its own."""
+    """Energy (J) of the discrete line at mid-step, of all pairs of wires; each node has a mass of its own."""
     old, move = along(wire.displacement[0]), along(wire.increment[0])
     now, middle, total = old + move, old + move / 2, 0.0
-    for w, own in enumerate(data.wires):
-        inner, mass = slice(PAD + 1, PAD + line.rows * WIDTH), np.zeros(now.shape[1])
-        mass[inner] = step**2 / line.scattered.mobility[w, inner]
-        bare = own.mass * line.spacing
+    for w in range(len(old)):
+        mobility = line.scattered.mobility[w, : now.shape[1]]
+        mass = step**2 / np.where(mobility > 0, mobility, np.inf)
+        bare = data.wires[w % 2].mass * line.spacing
         total += line_energy.of_wire(old[w], now[w], line.stencil[0, w], mass, bare, step)
 
-    def at(things, w, u=middle):
-        four = u[w, PAD + things.first + np.arange(4)]
+    def at(things, above, u=middle):
+        four = u[things.wire[:, None] + above, PAD + things.first + np.arange(4)]
         return (things.constants[:, :4] * four).sum(axis=1)
 
-    total += (data.support.stiffness * at(line.scattered.masts, MESSENGER) ** 2).sum() / 2
-    links = line.scattered.links
+    masts, links = line.scattered.masts, line.scattered.links
+    total += (data.support.stiffness * at(masts, MESSENGER) ** 2).sum() / 2
     extensions = [at(links, MESSENGER, u) - at(links, CONTACT, u) for u in (old, now)]
     stiffness = links.constants[:, LINK.PULL : LINK.PULL + 3].sum(axis=1)
     return total + line_energy.of_droppers(*extensions, stiffness, line.link_static[0, links.number])
 
 
-@pytest.mark.parametrize(("height", "goes_slack"), [(1e-3, False), (0.1, True)])
-def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack):
+@PULSES
+def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     """Supports and droppers lie between nodes, and clamps make some nodes heavier."""
-    step = 2.5e-4 if goes_slack else 1e-3
-    numerics = Numerics(spacing=0.25, time_step=step, window=0, precision="double")
     line = undamped(UNIFORM)
     heavy = line.droppers.model_copy(update={"contact_clamp_mass": 0.3, "messenger_clamp_mass": 0.2})
     data = line_of(MIXED[:10], line.model_copy(update={"droppers": heavy}))
-    built = constants_of(data, 10, numerics)
-    wire = at_rest(built, 1, 1)
-    pulse = height * np.exp(-(((built.spacing * window_nodes(built.rows) - 300) / 4) ** 2))
-    wire.displacement[0] = lay_out(pulse, built.rows, float)
-    steps = np.zeros(round(0.1 / step))
-    travel(built, wire, 300.0, 0.0, 0.0, steps[:1])
-    first, largest, slack = energy(built, wire, data, step), 0.0, False
-    for _ in range(100):
-        travel(built, wire, 300.0, 0.0, 0.0, steps)
-        largest = max(largest, abs(energy(built, wire, data, step) / first - 1))
-        slack |= bool((wire.change[0] <= -wire.static[0]).any())
-    assert largest < (0.01 if goes_slack else 1e-6)
-    assert slack == goes_slack
+    assert swing(data, 10, 300.0, height, goes_slack, energy)[0] < bar
 
 
 def test_a_sequence_has_its_own_number_of_spans_and_an_end():
@@ -250,12 +219,9 @@ APPLIED = load_pantograph("dsa380").model_copy(update={"force": "applied"})
 
 def climbing(slope):
     """A line whose contact wire rises by so much per metre from the tenth support on."""
-    line, supports = load_catenary("benchmark-2015"), np.arange(26) * 55.0
-    heights = np.interp(supports, [550.0, 1375.0], [0.0, slope * 825.0])
-    spans = [{"contact_height": float(height)} for height in heights[:-1]]
-    table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    end = {"contact_height": float(heights[-1])}
-    return FlexibleCatenaryData.model_validate(table | {"sequence": spans, "end_support": end})
+    heights = np.interp(np.arange(26) * 55.0, [550.0, 1375.0], [0.0, slope * 825.0]).tolist()
+    spans, end = [{"contact_height": height} for height in heights[:-1]], {"contact_height": heights[-1]}
+    return changed("benchmark-2015", {"sequence": spans, "end_support": end})
 
 
 def test_a_climb_costs_the_damping_to_ground_times_its_speed():
@@ -269,26 +235,15 @@ def test_a_climb_costs_the_damping_to_ground_times_its_speed():
 
 def test_a_high_wire_is_no_end_of_a_run():
     heights = [0.0] * 8 + [0.1, 0.2, 0.3, 0.4] + [0.5] * 8
-    line = load_catenary("benchmark-2015").model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    line |= {"sequence": [{"contact_height": height} for height in heights]}
-    run = simulate(FlexibleCatenaryData.model_validate(line), APPLIED, 160)
+    line = changed("benchmark-2015", {"sequence": [{"contact_height": height} for height in heights]})
+    run = simulate(line, APPLIED, 160)
     assert not run.terminated
     assert run.head[-1] > 0.45
 
 
 def test_lanes_of_a_vector_environment_equal_single_ones():
     settings = {"catenary": line_of(MIXED), "line_condition": "as-built", "speed_kmh": (200, 260)}
-    envs = gymnasium.make_vec("Pantograph-v0", num_envs=2, **settings)
-    singles = [gymnasium.make("Pantograph-v0", **settings) for _ in range(2)]
-    seen = [env.reset(seed=5 + lane)[0] for lane, env in enumerate(singles)]
-    np.testing.assert_array_equal(envs.reset(seed=5)[0], seen)
-    for step in range(300):
-        actions = np.full((2, 1), 0.2 * np.sin(step / 5), dtype=np.float32)
-        observations, rewards, *_ = envs.step(actions)
-        for env, action, observation, reward in zip(singles, actions, observations, rewards, strict=True):
-            alone, own, *_ = env.step(action)
-            np.testing.assert_array_equal(alone, observation)
-            assert own == reward
+    check_lanes_are_singles("Pantograph-v0", settings, steps=300, lanes=2)
 
 
 def test_longest_distance_counts_the_spans_before_a_run():

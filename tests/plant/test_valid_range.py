@@ -10,14 +10,14 @@ from panto_env.analysis.sweep import sweep
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import FOLDERS
-from panto_env.metrics.spans import LAST_USUAL
+from panto_env.metrics.figures import LAST_USUAL
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER
-from panto_env.plant.catenary.flexible.segments import places
+from panto_env.plant.catenary.flexible.wires import places
 from panto_env.plant.catenary.protocol import ending_by_wire
 from panto_env.plant.line_condition import DrawnLine, LineCondition
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.plant.valid_range import FREE_UPLIFT, Ending
+from panto_env.plant.state import FREE_UPLIFT, Ending
 
 from ..command import panto
 

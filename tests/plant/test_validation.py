@@ -3,9 +3,11 @@ import json
 import pytest
 
 from panto_env import simulate
-from panto_env.cli import validate
+from panto_env.cli import studies as validate
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318 import convergence, reference, tables, wear
+from panto_env.studies.en50318 import conditions as wear
+from panto_env.studies.en50318 import convergence, reference
+from panto_env.studies.en50318 import study as tables
 from panto_env.studies.en50318.lines import LineCheck
 
 from ..finite_element import __main__ as comparison

@@ -7,16 +7,16 @@ import pytest
 from pydantic import ValidationError
 
 from panto_env import InputError
-from panto_env.base.explanation import explain
+from panto_env.base.settings import explain
 from panto_env.catalog import load_catenary
-from panto_env.plant.catenary.flexible.dropper_table import dropper_table, droppers_at_rest
-from panto_env.plant.catenary.flexible.elasticity import elasticity
+from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.spans import spans_of
-from panto_env.plant.catenary.flexible.static import GRAVITY, hang, solve
+from panto_env.plant.catenary.flexible.static import GRAVITY, dropper_table, droppers_at_rest, hang, solve
 from panto_env.plant.catenary.flexible.whole_line import settle_line
 
 from ..finite_element import whole_line as judge
+from ..finite_element.sections import line_of
 from ..uniform_lines import UNIFORM
 
 SHORT = {
@@ -48,11 +48,6 @@ BRIDGE = {
     ],
 }
 """A bridge: lower supports, the contact wire comes down on a gradient and goes up again."""
-
-
-def line_of(name, changes):
-    usual = load_catenary(name).model_dump(exclude_none=True)
-    return FlexibleCatenaryData.model_validate({k: v for k, v in usual.items() if k != "spans"} | changes)
 
 
 def judged(line, element=0.1):

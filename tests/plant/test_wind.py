@@ -13,7 +13,7 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.diagnosis.force import estimated_force
+from panto_env.diagnosis.passes import estimated_force
 from panto_env.plant.state import Row
 from panto_env.plant.wind import LONGEST_GUST, SHORTEST_GUST, Wind, draw_wind, resolved, winds_at
 

@@ -4,30 +4,23 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.backend import kernel
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.arrays import CONTACT
 from panto_env.plant.catenary.flexible.build import at_rest, constants
-from panto_env.plant.catenary.flexible.clear import clear_spans
-from panto_env.plant.catenary.flexible.resolution import resolution
-from panto_env.plant.catenary.flexible.segments import along, lay_out, window_nodes
+from panto_env.plant.catenary.flexible.resolution import (
+    STITCHED_ERROR,
+    STITCHED_SHARE,
+    clear_spans,
+    resolution,
+)
 from panto_env.plant.catenary.flexible.static import solve
-from panto_env.plant.catenary.flexible.window import STITCHED_ERROR, STITCHED_SHARE
-from panto_env.plant.catenary.protocol import advance_wire, end_step, place_contact
+from panto_env.plant.catenary.flexible.wires import along, lay_out, window_nodes
 from panto_env.plant.catenary.schema import CLEAR
 from panto_env.plant.numerics import Numerics, Runs
-from panto_env.studies.en50318 import window as windows
+from panto_env.studies.en50318 import lines as windows
 
-
-@kernel
-def wait(line, wire, x, steps):
-    """Let a line swing for itself; x (m): anywhere in the window's middle."""
-    for _ in range(steps):
-        place_contact(line, wire, 0, 0, x)
-        advance_wire(line, wire, 0)
-        end_step(line, wire, 0)
-
+from .test_flexible import travel
 
 STEP = 2e-3
 
@@ -59,9 +52,11 @@ def test_ends_let_waves_out(precision):
     pulse = 0.05 * np.exp(-(((built.spacing * window_nodes(built.rows) - 210) / 5) ** 2))
     wire.displacement[0, CONTACT] = lay_out(pulse, built.rows, float)
     middle = 13.5 * line.span_length
-    wait(built, wire, middle, 1)
+    travel(built, wire, middle, 0.0, 0.0, np.zeros(1))
     before = swinging(built, wire)
-    wait(built, wire, middle, round(2.5 / STEP))  # 2.5 s: the pulse has met each end once
+    travel(
+        built, wire, middle, 0.0, 0.0, np.zeros(round(2.5 / STEP))
+    )  # 2.5 s: the pulse has met each end once
     assert swinging(built, wire) < 1e-5 * before
 
 

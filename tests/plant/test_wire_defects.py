@@ -9,22 +9,20 @@ from scipy.sparse.linalg import spsolve
 
 from panto_env import InputError, simulate
 from panto_env.backend import python_function
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_catenary
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import zero_phase_low_pass
-from panto_env.plant.catenary.flexible.defects import DefectiveLine
+from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.resolution import HARD_SPOT_GRID
-from panto_env.plant.catenary.flexible.tension import with_tension_left
 from panto_env.plant.catenary.flexible.wire_defects import RAMP, worn_depth
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
 
-from ..finite_element import simulation as finite_element
 from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.system import _placement, build
-from .test_flexible import WHOLE
+from .test_flexible import under_a_train
 
 of_defects = python_function(rise_by_defects)
 EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
@@ -123,21 +121,12 @@ def test_static_state_agrees_with_finite_elements(name, defects):
 
 @pytest.mark.parametrize("defects", CONDITIONS.values(), ids=CONDITIONS)
 def test_contact_force_agrees_with_finite_elements(monkeypatch, defects):
-    data, condition = load_catenary(EN50318), LineCondition(**defects)
-    monkeypatch.setattr(
-        finite_element, "build", lambda data, spans, element: defective(data, spans, element, condition)
-    )
-    other = finite_element.simulate(
-        data, load_pantograph(EN50318), 250.0, element=0.5, time_step=5e-4, distance=241.0
-    )
-    fine = {"spacing": 0.125, "time_step": 2.5e-4} | WHOLE
-    near = np.linspace(2.05 * 60, 240, 2000)
-    runs = [
-        simulate(speed_kmh=250.0, line_condition=c, distance=241.0, spans=10, **fine)
-        for c in (condition, "new")
-    ]
-    ours, intact = (np.interp(near, run.position, run.contact_force) for run in runs)
-    theirs = np.interp(near, other.position, other.contact_force)
+    condition = LineCondition(**defects)
+
+    def changed(data, spans, element):
+        return defective(data, spans, element, condition)
+
+    ours, theirs, intact, *_ = under_a_train(monkeypatch, changed, condition, 250.0, 2.05 * 60, 241.0)
     assert (ours - theirs).std() < 3.0
     assert (intact - theirs).std() > 9.0
 
@@ -189,34 +178,32 @@ def test_a_defect_of_no_size_changes_nothing(defects):
 
 
 def test_lanes_share_what_is_wrong_with_the_wires_and_draw_the_rest():
-    settings = {"line_condition": SPOT | {"dropper_scatter": 0.005}, "distance": 300.0, "spans": 8}
-    batch = Task(run_settings(settings), lanes=2)
+    condition = SPOT | {"irregularity": 1.0, "dropper_scatter": 0.005}
+    settings = {"line_condition": condition, "distance": 300.0, "spans": 8}
+    batch = Task(run_settings(settings), lanes=2, record_droppers=True)
     for lane in range(2):
         batch.reset(lane, np.random.default_rng(lane))
     batch.run_passively()
     alone = [simulate(seed=seed, **settings) for seed in range(2)]
     for lane in range(2):
-        np.testing.assert_array_equal(batch.trajectory(lane).contact_force, alone[lane].contact_force)
+        run = batch.trajectory(lane)
+        np.testing.assert_array_equal(run.contact_force, alone[lane].contact_force)
+        np.testing.assert_array_equal(run.dropper_force, alone[lane].dropper_force)
     assert (alone[0].contact_force - alone[1].contact_force).std() > 1.0
 
 
-def test_less_tension_is_a_slower_line():
-    run = simulate(line_condition={"lost_contact_tension": 0.19}, distance=200.0)
-    intact = simulate(distance=200.0)
-    assert run.line.wave_speed == pytest.approx(0.9 * intact.line.wave_speed)
-    with pytest.raises(InputError, match="below the wave speed of the contact wire, 394 km/h"):
-        simulate(line_condition={"lost_contact_tension": 0.19}, speed_kmh=400.0)
-
-
-def test_more_tension_is_a_faster_line():
+def test_less_tension_is_a_slower_line_and_more_a_faster_one():
     """A loss below 0 is a gain, of up to a tenth: a train may then be faster than on the line as designed."""
-    gained = {"lost_contact_tension": -0.1}
-    run, intact = simulate(line_condition=gained, distance=200.0), simulate(distance=200.0)
-    assert run.line.wave_speed == pytest.approx(np.sqrt(1.1) * intact.line.wave_speed)
-    fast = 3.6 * 1.02 * intact.line.wave_speed
+    lost, gained = {"lost_contact_tension": 0.19}, {"lost_contact_tension": -0.1}
+    slower, faster, intact = (
+        Task(run_settings({"line_condition": each})).plant.model.wave_speed for each in (lost, gained, "new")
+    )
+    assert (slower, faster) == pytest.approx((0.9 * intact, np.sqrt(1.1) * intact))
+    with pytest.raises(InputError, match="below the wave speed of the contact wire, 394 km/h"):
+        Task(run_settings({"line_condition": lost, "speed_kmh": 400.0}))
     with pytest.raises(InputError, match="below the wave speed"):
-        Task(run_settings({"speed_kmh": fast}))
-    Task(run_settings({"speed_kmh": fast, "line_condition": gained}))
+        Task(run_settings({"speed_kmh": 3.6 * 1.02 * intact}))
+    Task(run_settings({"speed_kmh": 3.6 * 1.02 * intact, "line_condition": gained}))
 
 
 @pytest.mark.parametrize(
@@ -248,9 +235,3 @@ def test_a_window_that_travels_is_refused_where_the_wire_is_not_even():
     with pytest.raises(InputError, match=r"computed as a whole, .* leave out window=8, or set it to 0"):
         simulate(line_condition=WORN, window=8)
     assert simulate(line_condition=WORN, distance=200.0).settings["window"] == 10
-
-
-@pytest.mark.parametrize("condition", [SPOT, WORN, LOST])
-def test_only_a_flexible_catenary_has_them(condition):
-    with pytest.raises(InputError, match="Only a flexible catenary"):
-        Task(run_settings({"catenary": "ohl-three-span", "line_condition": condition}))

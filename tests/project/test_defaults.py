@@ -13,7 +13,7 @@ import pytest
 from panto_env.base.settings import Settings
 from panto_env.control.reward import REWARDS
 from panto_env.envs import IDS
-from panto_env.estimation.settings import ESTIMATORS
+from panto_env.estimation.model import ESTIMATORS
 from panto_env.plant.actuators import ACTUATOR_PRESETS
 from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SENSOR_PRESETS

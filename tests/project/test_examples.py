@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.metrics.spectrum import in_band
+from panto_env.metrics.low_pass import in_band
 
 from ..notebook import LEARNING, UNSEEN_LINE, changes, executed, told
 
@@ -27,6 +27,20 @@ def load(name, monkeypatch):
     return module
 
 
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Runs an example as a command: its module, what it prints, and what it says that it printed."""
+
+    def of(name, *arguments):
+        example = load(name, monkeypatch)
+        monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+        example.main()
+        said = re.sub(r"^ +", "", example.__doc__, flags=re.MULTILINE)  # without indents
+        return example, capsys.readouterr().out, said
+
+    return of
+
+
 def test_a_rig_over_udp_feels_the_line_that_another_process_computes(monkeypatch):
     """Its pantograph and cylinder are written once more there: the force is that under the line itself."""
     example = load("rig_over_udp", monkeypatch)
@@ -39,33 +53,19 @@ def test_a_rig_over_udp_feels_the_line_that_another_process_computes(monkeypatch
     assert abs(ours.std() / true.std() - 1) < 0.05
 
 
-def printed(example, monkeypatch, capsys, *arguments):
-    """What an example prints as a command."""
-    monkeypatch.setattr(sys, "argv", [example.__name__, *map(str, arguments)])
-    example.main()
-    return capsys.readouterr().out
-
-
-def docstring(example):
-    """What it says that it printed, without indents."""
-    return re.sub(r"^ +", "", example.__doc__, flags=re.MULTILINE)
-
-
-def test_first_run_is_the_same_through_gymnasium(monkeypatch, capsys, tmp_path):
-    example = load("first_run", monkeypatch)
-    told = printed(example, monkeypatch, capsys, "--plot", tmp_path / "run.png")
-    assert told in docstring(example)
+def test_first_run_is_the_same_through_gymnasium(run, tmp_path):
+    example, told, said = run("first_run", "--plot", tmp_path / "run.png")
+    assert told in said
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
-    run = example.one_pass()
-    assert run.summary().std == pytest.approx(35.15, abs=0.005)
-    again = example.same_as_environment(run.distance)
-    np.testing.assert_array_equal(again.contact_force, run.contact_force)
+    once = example.one_pass()
+    assert once.summary().std == pytest.approx(35.15, abs=0.005)
+    again = example.same_as_environment(once.distance)
+    np.testing.assert_array_equal(again.contact_force, once.contact_force)
 
 
-def test_own_controller_is_ranked_and_pd_is_not(monkeypatch, capsys):
-    example = load("own_controller", monkeypatch)
-    told = printed(example, monkeypatch, capsys)
-    assert told in docstring(example)
+def test_own_controller_is_ranked_and_pd_is_not(run):
+    example, told, said = run("own_controller")
+    assert told in said
     passive, pd, own = example.judge().cells
     assert (passive.policy, pd.policy) == ("passive", "pd")
     assert own.rank == 1
@@ -73,32 +73,30 @@ def test_own_controller_is_ranked_and_pd_is_not(monkeypatch, capsys):
     assert pd.rank is None
 
 
-def test_line_from_toml_keeps_the_standards(monkeypatch, capsys, tmp_path):
-    example = load("line_from_toml", monkeypatch)
-    told = printed(example, monkeypatch, capsys, "--plot", tmp_path / "line.png")
+def test_line_from_toml_keeps_the_standards(run, tmp_path):
+    example, told, said = run("line_from_toml", "--plot", tmp_path / "line.png")
     verdicts, speeds = told.splitlines()[:9], told.splitlines(keepends=True)[9:]
     assert all(verdict.endswith(", kept") for verdict in verdicts)
-    assert "".join(speeds) in docstring(example)
+    assert "".join(speeds) in said
     sigma = [row["std"] for row in example.over_speed()]
     assert sigma == sorted(sigma)
     assert sigma[0] == pytest.approx(18.9, abs=0.05)
     assert example.one_pass().catenary == "my_line"
 
 
-def test_design_sweep_finds_the_lightest_head_and_the_tightest_wire(monkeypatch, capsys, tmp_path):
-    example = load("design_sweep", monkeypatch)
-    told = printed(example, monkeypatch, capsys, "--plot", tmp_path / "design.png")
+def test_design_sweep_finds_the_lightest_head_and_the_tightest_wire(run, tmp_path):
+    example, told, said = run("design_sweep", "--plot", tmp_path / "design.png")
     assert len(told.splitlines()) == 13
-    assert told.splitlines()[-1] in docstring(example)
+    assert told.splitlines()[-1] in said
     best = min(example.designs(), key=lambda row: row["std"])
     assert (best[example.HEAD], best[example.TENSION]) == (4.0, 24e3)
     assert best["std"] == pytest.approx(23.0, abs=0.05)
     assert best["mean"] == pytest.approx(130.0, abs=0.1)
 
 
-def test_identify_from_csv_finds_the_truth(monkeypatch, capsys, tmp_path):
-    example = load("identify_from_csv", monkeypatch)
-    assert printed(example, monkeypatch, capsys) in docstring(example)
+def test_identify_from_csv_finds_the_truth(run, tmp_path):
+    example, told, said = run("identify_from_csv")
+    assert told in said
     example.write_rig_record(tmp_path / "rig.csv")
     fit = example.identify_file(tmp_path / "rig.csv")
     assert fit.undetermined == ("c2",)

@@ -7,7 +7,7 @@ import pytest
 
 from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.static import hang
 
 from ..documents import ROOT

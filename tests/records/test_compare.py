@@ -8,8 +8,7 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.metrics.low_pass import low_pass
-from panto_env.records.compare import compare
-from panto_env.records.compared import acceptance_table, shift_sentence, spans_table
+from panto_env.records.compare import acceptance_table, compare, shift_sentence, spans_table
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
 
@@ -31,6 +30,9 @@ def test_a_run_against_its_own_noisy_record(run, error):
     found = compare(measured(run, position_error=error), run)
     assert found.shift.value == pytest.approx(-error, abs=0.05)
     assert found.shift.correlation > 0.99
+    if error > 0:  # from the other one, two spans away is more alike
+        assert abs(found.shift.other - found.shift.value) == pytest.approx(60, abs=1)  # the next span
+    assert found.shift.other_correlation < found.shift.correlation
     assert found.accepted is True
     assert found.verdict == "accepted"
     assert [pair.span for pair in found.spans] == list(range(10, 20)) if error > 0 else len(found.spans) > 7
@@ -48,12 +50,6 @@ def test_figures_of_spans_are_those_of_the_run(run):
     one = found.spans[3]
     assert one.std[1] == pytest.approx(run.summary((13, 13)).std)
     assert len(spans_table(found).rows) == 10
-
-
-def test_the_next_best_shift_is_a_span_away(run):
-    shift = compare(measured(run), run).shift
-    assert abs(shift.other) == pytest.approx(60, abs=1)
-    assert shift.other_correlation < shift.correlation
 
 
 def test_a_shift_that_is_given_is_searched_about(run):
@@ -161,25 +157,11 @@ def test_a_speed_that_changes_elsewhere_does_no_harm(run, record):
     assert found.accepted is True
 
 
-def test_spans_that_two_runs_begin_are_not_compared(run, record):
-    (piece,) = record.pieces
-    short = {name: getattr(piece, name)[piece.position < 995] for name in ("position", "force", "height")}
-    parts = [replace(piece, run=name, uplift=None, **short) for name in ("a", "b")]
-    found = compare(Record("a", tuple(parts)), run)
-    assert [pair.span for pair in found.spans] == list(range(10, 17))
-
-
 def test_another_line_is_not_accepted(record, other_run):
     found = compare(record, other_run)
     assert found.accepted is False
     assert found.shift.correlation < 0.3
     assert "another line" in found.notes[-1]
-
-
-def test_forces_that_hardly_resemble_each_other(run, record):
-    noise = 130 + 30 * np.random.default_rng(0).standard_normal(len(record.longest.force))
-    (note,) = compare(changed(record, force=lambda _: noise), run).notes
-    assert note.startswith("Record and run hardly resemble each other (correlation 0.")
 
 
 def test_a_run_that_is_too_short(record, run):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.records.mass_correction import contact_force
 from panto_env.records.measured import measured
-from panto_env.records.record_file import read_record
+from panto_env.records.record_file import contact_force, read_record
 
 
 def test_a_record_has_the_run_s_means(run):

@@ -11,21 +11,20 @@ import numpy as np
 from panto_baselines.benchmark import plot as benchmark_plot
 from panto_baselines.benchmark.statistics import Cell
 from panto_baselines.oracle import report as oracle_report
-from panto_env.analysis import line_check, line_plot
+from panto_env.analysis import line_check
+from panto_env.analysis import plots as line_plot
 from panto_env.analysis.plots import plot_forces, plot_run
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_catenary
-from panto_env.diagnosis.diagnosis import Diagnosis, Finding
-from panto_env.diagnosis.places import Evidence
-from panto_env.diagnosis.plots import plot_diagnosis
-from panto_env.estimation.plots import plot_estimate
-from panto_env.identification.performance import Match
-from panto_env.identification.plots import plot_matches, plot_record
+from panto_env.diagnosis.diagnosis import Diagnosis, Finding, plot_diagnosis
+from panto_env.diagnosis.features import Evidence
+from panto_env.estimation.estimate import plot_estimate
+from panto_env.identification.performance import Match, plot_matches, plot_record
 from panto_env.identification.record import Record
 from panto_env.plant.alignment import Alignment
 from panto_env.report import charts
-from panto_env.rig.comparison import Pair
-from panto_env.rig.plots import plot_pairs
+from panto_env.rig.computer import Pair
+from panto_env.rig.report import plot_pairs
 
 from ..analysis.test_line_check import of_unlike_spans
 from ..metrics.test_summary import RUN as FORCES
@@ -124,11 +123,15 @@ def benchmark():
     settings = SimpleNamespace(
         lines=(line,), drawn_seeds=(3, 4), policies_on=lambda line: ("passive", "p", "q")
     )
-    outcome = SimpleNamespace(settings=settings, spans=((1, 3),), cells=tuple(cells()))
-    with (
-        mock.patch.object(benchmark_plot, "_played", return_value=None),
-        mock.patch.object(benchmark_plot, "drive", side_effect=[(run, None) for run in (RUN, OTHER, QUIET)]),
-    ):
+    rows = [
+        SimpleNamespace(policy=policy, catenary="a", pantograph="b", speed_kmh=300.0, seed=3)
+        for policy in ("passive", "p", "q")
+    ]
+    outcome = SimpleNamespace(
+        settings=settings, spans=((1, 3),), cells=tuple(cells()), rows=rows, played=[None] * 3
+    )
+    runs = [(run, None) for run in (RUN, OTHER, QUIET)]
+    with mock.patch.object(benchmark_plot, "drive", side_effect=runs):
         return benchmark_plot.plot(outcome)
 
 

@@ -9,20 +9,20 @@ import sys
 import termios
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from panto_env import Trajectory, simulate
-from panto_env.control import Task
-from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import low_pass
-from panto_env.render.live import live
+from panto_env.render import strip as live_module
 from panto_env.render.moment import felt
-from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, chart
+from panto_env.render.strip import EMPTY, FORCE_ROWS, Strip, chart, live
 
 from ..cli.test_cli import panto
+from .test_render import driven
 
 STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 HIDE, SHOW = b"\x1b[?25l", b"\x1b[?25h"
@@ -63,14 +63,6 @@ def test_a_level_line_does_not_hide_the_curve():
     assert rows[0].plain.startswith("     20")
 
 
-def driven(steps, **settings):
-    task = Task(run_settings(settings))
-    task.reset(0, np.random.default_rng(0))
-    for _ in range(steps):
-        task.step(np.zeros((1, 1)))
-    return task
-
-
 def test_what_is_shown_is_what_the_run_has():
     task, run = driven(450), simulate()
     contact = felt(task, 0, 3.0)
@@ -103,8 +95,10 @@ def test_no_line_is_wider_than_the_terminal_or_too_wide_to_read(width):
     assert max(map(len, lines)) <= min(width, 120)
 
 
-@pytest.mark.parametrize("policy", [None, "pd"])
-@pytest.mark.parametrize("settings", [{}, STIFFNESS | {"sensors": "realistic", "pantograph_scatter": 0.1}])
+@pytest.mark.parametrize(
+    ("policy", "settings"),
+    [(None, {}), ("pd", STIFFNESS | {"sensors": "realistic", "pantograph_scatter": 0.1})],
+)
 def test_a_run_that_is_watched_is_the_same_bit_for_bit(policy, settings):
     plain = simulate(policy=policy, seed=3, **settings)
     terminal = Console(file=StringIO(), force_terminal=True, width=100)
@@ -116,7 +110,7 @@ def test_a_run_that_is_watched_is_the_same_bit_for_bit(policy, settings):
     assert f"{plain.distance:.0f} m" in terminal.file.getvalue()  # the end is drawn
 
 
-def on_terminal(*arguments, columns=100, interrupt=b""):
+def on_terminal(*arguments, interrupt=b""):
     """Output and exit status of a command on a terminal, interrupted once it has written something."""
     process, terminal = pty.fork()
     if process == 0:
@@ -124,7 +118,7 @@ def on_terminal(*arguments, columns=100, interrupt=b""):
         os.environ.pop("COLUMNS", None)  # the terminal's own width counts
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # tests started in the background ignore it
         os.execv(Path(sys.executable).with_name("panto"), ["panto", *map(str, arguments)])
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 60, columns, 0, 0))
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 100, 0, 0))
     written = b""
     while True:
         try:
@@ -153,14 +147,6 @@ def test_the_command_draws_on_a_terminal_and_tells_the_same_figures(tmp_path):
     np.testing.assert_array_equal(*(run.contact_force for run in runs))
 
 
-def test_a_terminal_too_narrow_for_the_picture_is_said():
-    settings = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 200]
-    written, status = on_terminal("simulate", "--live", *settings, columns=30)
-    assert status == 0
-    assert b"--live needs a terminal of 40 columns" in written
-    assert b"height of the head (mm)" not in written
-
-
 def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
     (tmp_path / "slow.py").write_text(
         "import time\nclass Slow:\n    def reset(self, context): pass\n"
@@ -183,3 +169,30 @@ def test_without_a_terminal_it_says_so_and_goes_on():
     )
     assert "standard deviation" in told.stdout
     assert "height of the head" not in told.stdout
+
+
+def test_the_labels_of_a_chart_stand_at_their_rows():
+    def labels(*given):
+        return [line.plain.partition("│")[0] for line in chart(np.arange(3.0), np.zeros(3), *given)]
+
+    assert labels((10.0, 50.0), 5, 20) == ["     50 ", "        ", "        ", "        ", "     10 "]
+    assert labels((0.0, 100.0), 6, 20, 62.0) == [
+        *(["    100 ", "        ", "     62 "]),
+        *["        "] * 2,
+        "      0 ",
+    ]
+    assert [len(line.plain) for line in chart(np.arange(3.0), np.zeros(3), (0.0, 1.0), 2, 20)] == [29, 29]
+
+
+def test_a_live_picture_is_drawn_ten_times_a_second_and_at_the_end(monkeypatch):
+    clock, drawn = iter([100.0, 100.05, 100.11, 100.2, 100.22]), []
+    monkeypatch.setattr(live_module, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setattr(live_module, "Strip", lambda task, policy: drawn.append((task, policy)) or "it")
+    with live_module.live(Console(file=StringIO(), width=80), "mine") as watch:
+        for task in "abcde":
+            watch(task)
+    assert drawn == [("a", "mine"), ("c", "mine"), ("e", "mine"), ("e", "mine")]
+    drawn.clear()
+    with live_module.live(Console(file=StringIO(), width=80), "mine"):
+        pass
+    assert drawn == []

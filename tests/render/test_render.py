@@ -7,28 +7,24 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
-from panto_env.base.colours import BLUE, ORANGE, VERMILION
-from panto_env.cli import make_app
+from panto_env.base.plotting import ORANGE, VERMILION
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.envs import IDS
+from panto_env.envs import IDS, PantographEnv
 from panto_env.plant.state import Place, Row
 
 pytest.importorskip("cv2", reason="the extra 'render' is not installed")
 
-from panto_env.render.canvas import Canvas, rgb
-from panto_env.render.film import Excerpt, _highest, excerpt, figures_in_words, frames
-from panto_env.render.filmed import check_together, policy_pass
-from panto_env.render.layout import Layout, force_axis
-from panto_env.render.moment import moment_of
-from panto_env.render.palette import QUIET, SUPPORT
+from panto_env.metrics.figures import LABELS
+from panto_env.render.canvas import rgb
+from panto_env.render.moment import Layout, force_axis, moment_of
 from panto_env.render.picture import Picture
-from panto_env.render.video import write_film
+from panto_env.render.viewer import figures_so_far
 
 SIZE = (640, 360)
+STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 ROUND = [1, 2, 5, 10, 15, 20, 30, 50, 100, 200]
 """Exaggerations of heights that are easy to remember."""
 
@@ -42,8 +38,8 @@ def driven(steps=150, action=0.0, **settings):
     return task
 
 
-def moment(task, lane=0):
-    return moment_of(task, lane, "title", {})
+def moment(task):
+    return moment_of(task, 0, "title", {})
 
 
 def calm(task):
@@ -103,14 +99,6 @@ def test_slack_droppers_are_those_without_tension():
     assert seen > 0
 
 
-def test_a_slack_dropper_is_drawn_in_another_colour():
-    task, picture = driven(), Picture(*SIZE)
-    now = calm(task)
-    slack = now.line._replace(slack=np.ones_like(now.line.slack))
-    drawn = [count(picture.draw(replace(now, line=line)), VERMILION) for line in (now.line, slack)]
-    assert drawn[1] > drawn[0] + 100  # the first has the mark of the legend
-
-
 def test_an_arrow_points_as_the_force_does():
     task, picture = driven(), Picture(*SIZE)
     now = moment(task)
@@ -143,16 +131,6 @@ def test_the_force_shown_is_the_one_of_the_run_where_it_was_felt():
     assert filtered.std() < now.force[len(now.force) // 2 :].std()
 
 
-def test_heights_are_exaggerated_by_what_is_said():
-    now = moment(driven())
-    layout = Layout.of(now, *SIZE)
-    places = layout.across(np.array([0.0, 1.0]), 0.0)
-    heights = layout.up(np.array([0.0, 1.0]))
-    assert (heights[0] - heights[1]) / (places[1] - places[0]) == pytest.approx(layout.exaggeration)
-    assert layout.up(now.line.messenger).min() > 0
-    assert layout.forces(np.array([0.0, 350.0]), 350.0)[0] > layout.forces(350.0, 350.0)
-
-
 def test_the_exaggeration_is_the_largest_round_one_at_which_the_line_fits_in():
     """Below the title and above the roof, with the pantograph's share of the height between."""
     now, seen = moment(driven()), set()
@@ -169,17 +147,9 @@ def test_the_exaggeration_is_the_largest_round_one_at_which_the_line_fits_in():
     assert seen == set(ROUND)
 
 
-def test_the_axis_of_a_film_fits_what_the_film_shows():
-    """What a pass had long before and has afterwards does not count."""
-    run = simulate("periodic-stiffness", "three-mass", 180.0, distance=400.0)
-    for peak in (40.0, 60.0, 99.0, 101.0, 149.0, 151.0, 200.0, 399.0):
-        force = np.where(np.abs(run.position - peak) < 0.2, 9000.0, 100.0)
-        what = Excerpt(begin=165.0 / 50, end=150.0 / 50 + 1, every=1, rate=25.0)  # 165 to 200 m, at 50 m/s
-        shown = 165 - 1.3 * 50 <= peak <= 200
-        assert _highest(replace(run, contact_force=force), what) == (9000.0 if shown else 100.0), peak
-
-
-@pytest.mark.parametrize(("name", "mode"), list(itertools.product(IDS, ("rgb_array", "rgb_array_list"))))
+@pytest.mark.parametrize(
+    ("name", "mode"), [*((name, "rgb_array") for name in IDS), ("Pantograph-v0", "rgb_array_list")]
+)
 def test_every_id_draws_itself(name, mode):
     env = gymnasium.make(name, render_mode=mode, render_size=SIZE)
     env.reset(seed=0)
@@ -197,8 +167,8 @@ def test_every_id_draws_itself(name, mode):
     env.close()
 
 
-@pytest.mark.parametrize("name", IDS)
-def test_drawing_changes_no_number(name):
+def test_drawing_changes_no_number():
+    name = "Pantograph-v0"
     plain, drawn = gymnasium.make(name), gymnasium.make(name, render_mode="rgb_array", render_size=SIZE)
     for env in (plain, drawn):
         env.reset(seed=3)
@@ -278,113 +248,14 @@ def read(path):
     return next(reader), sum(1 for _ in reader)
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
-    path = tmp_path / f"film{suffix}"
-    command = ["film", "passive", "pd", "--output", str(path), "--size", "640", "480", "--seconds", "0.3"]
-    result = CliRunner().invoke(make_app(), [*command, "--line-spans", "14", "--slow-motion", "5"])
-    assert result.exit_code == 0, result.output
-    assert "20 frames per second, 5 times slower than real" in result.output
-    if suffix == ".mp4":
-        meta, number = read(path)
-        assert meta["size"] == (640, 480)
-        assert meta["fps"] == 20
-        assert number == pytest.approx(30, abs=1)
-        assert meta["pix_fmt"].startswith("yuv420p")  # what every browser plays
-    else:
-        from PIL import Image
-
-        film = Image.open(path)
-        assert film.size == (640, 480)
-        assert film.n_frames == pytest.approx(30, abs=1)
-
-
-def test_a_film_shows_the_pass_that_simulate_makes():
-    settings = {"speed_kmh": 300.0, "spans": 14}
-    filmed = policy_pass("pd", settings, 2)
-    what = excerpt(filmed, 10, 0.2, 4.0)
-    assert what.begin == pytest.approx(9 * 60 / (300 / 3.6))
-    (first, *_) = frames([filmed], what, SIZE)
-    task = Task(run_settings(settings))
-    assert first.shape == (360, 640, 3)
-    assert task.plant.time_step == filmed.run.time_step
-
-
-def test_a_film_has_every_so_many_control_steps_that_no_frame_comes_too_fast():
-    """25 frames per second at most: every fourth step of 10 ms, each one in a film slowed down by four."""
-    filmed = policy_pass("pd", {"catenary": "periodic-stiffness", "pantograph": "three-mass"}, 0)
-    for slow_motion, every, rate in ((1.0, 4, 25.0), (4.0, 1, 25.0), (10.0, 1, 10.0)):
-        what = excerpt(filmed, 2, 0.2, slow_motion)
-        assert (what.every, what.rate) == (every, pytest.approx(rate))
-
-
-def test_passes_of_other_speeds_or_control_intervals_are_not_filmed_above_each_other():
-    line = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 100.0}
-    first, same, fast, rare = (
-        policy_pass("p", line | more, 0)
-        for more in ({}, {"sensors": "realistic"}, {"speed_kmh": 250.0}, {"control_interval": 0.02})
-    )
-    check_together([first, same])
-    for other, name in ((fast, "speed"), (rare, "control_interval")):
-        with pytest.raises(InputError, match=f"must have the same {name}"):
-            check_together([first, other])
-
-
-def test_a_change_of_spread_is_given_only_between_passes_that_differ_in_their_control():
-    first, same, other = (
-        policy_pass(name, {"distance": 800.0, "pantograph": pantograph}, 0)
-        for name, pantograph in (("passive", "dsa380"), ("pd", "dsa380"), ("pd", "dsa250"))
-    )
-    of_first, of_same, of_other = (figures_in_words(each, first) for each in (first, same, other))
-    assert "σ relative to passive" in of_same
-    assert not any("relative" in text for text in [*of_first, *of_other])
-    early = first._replace(run=replace(first.run, terminated=True))
-    assert not any("relative" in text for text in figures_in_words(same, early))
-
-
-def test_what_cannot_be_filmed_is_refused_in_a_sentence(tmp_path):
-    short = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 200.0}
-    with pytest.raises(InputError, match="before span 10; begin in an earlier one"):
-        excerpt(policy_pass("passive", short, 0), 10, 1.0, 1.0)
-    with pytest.raises(InputError, match=r"must end in one of \.mp4, \.gif"):
-        write_film([], tmp_path / "film.avi", 25, SIZE)
+def test_wrong_arguments_are_refused():
     for arguments, words in (
-        (["passive"] * 5, "up to 4 passes, not 5"),
-        (["passive", "--size", "641", "480"], "even numbers of pixels"),
-        (["passive", "pd", "--size", "640", "362"], "the height for each pass's part"),
-    ):
-        result = CliRunner().invoke(make_app(), ["film", *arguments, "--output", str(tmp_path / "film.mp4")])
-        assert isinstance(result.exception, InputError)
-        assert words in str(result.exception)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_words_at_an_edge_are_cut_and_far_lines_too():
-    canvas = Canvas(64, 64)
-    canvas.words(-20, 2, "cut", (255, 255, 255), 16)
-    canvas.words(60, 63, "cut", (255, 255, 255), 16)
-    canvas.line([(-1e9, 5.0), (1e9, 5.0)], (255, 0, 0))
-    canvas.box(-5, -5, 8, 8, (0, 255, 0))
-    assert canvas.pixels[:3, :3, 1].min() == 255
-    assert canvas.pixels.any(axis=2).sum() > 64
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
         ({"render_mode": "ansi"}, "render_mode must be None, 'human' or 'rgb_array', not 'ansi'"),
         ({"render_size": (1, 1)}, "from 64 to 4,096"),
         ({"slow_motion": 0.0}, "from 0.01 to 1,000"),
-    ],
-)
-def test_wrong_arguments_are_refused(arguments, words):
-    from panto_env.envs import PantographEnv
-
-    with pytest.raises(InputError, match=words):
-        PantographEnv(**arguments)
-
-
-def test_a_lane_that_is_not_there_is_refused():
+    ):
+        with pytest.raises(InputError, match=words):
+            PantographEnv(**arguments)
     with pytest.raises(InputError, match="render_lanes has lane 4, but lanes are 0 to 3"):
         gymnasium.make_vec("Pantograph-v0", num_envs=4, render_lanes=(0, 4))
 
@@ -399,19 +270,6 @@ def test_the_axis_fits_the_force_and_the_limit_is_named_where_it_is_far_above():
         assert force_axis(highest, 54.0, 350.0) >= highest
 
 
-def test_a_light_force_fills_the_chart():
-    """A nominal force of 54 N had used a third of an axis up to the limit of 350 N."""
-    task = driven(catenary="shinkansen-simple", pantograph="identified-2dof")
-    now = calm(task)
-    drawn = Picture(*SIZE).draw(now)
-    layout = Layout.of(now, *SIZE)
-    top, bottom = layout.chart
-    curve = np.abs(drawn.astype(int) - rgb(BLUE)).max(axis=2) < 40
-    rows = np.nonzero(curve[:, int(layout.margin) : int(layout.pantograph) - 8].any(axis=1))[0]
-    rows = rows[rows > top + 2]  # below the legend
-    assert (bottom - rows.min()) / (bottom - top) > 0.45
-
-
 def test_the_axis_never_shrinks_within_an_episode_and_is_one_for_all_passes_of_a_film():
     now, picture = calm(driven()), Picture(*SIZE)
     picture.draw(now)
@@ -424,28 +282,38 @@ def test_the_axis_never_shrinks_within_an_episode_and_is_one_for_all_passes_of_a
     assert picture._highest == pytest.approx(now.force.max())
 
 
-def test_what_names_lines_and_forces_lies_outside_the_chart():
-    """Labels had been drawn over the curves."""
-    now, picture = calm(driven()), Picture(*SIZE)
-    picture.draw(now)
-    layout = Layout.of(now, *SIZE)
-    top, bottom = (round(each) for each in layout.chart)
-    chart = picture._still.pixels[top + 1 : bottom, round(layout.margin) + 1 : round(layout.pantograph) - 1]
-    words = np.abs(chart.astype(int) - QUIET).max(axis=2) < 30
-    assert words.sum(axis=1)[words.any(axis=1)].min() > 50  # only the dashes of the nominal force
-    beside = picture._still.pixels[top:bottom, : round(layout.margin)]
-    assert (np.abs(beside.astype(int) - QUIET).max(axis=2) < 60).sum() > 20
+def test_the_figures_so_far_are_those_of_the_episode(monkeypatch):
+    task = driven(0, **STIFFNESS)
+    assert figures_so_far(task, 0) == {}
+    task = driven(120, **STIFFNESS)
+    values = task.figures(0).as_dict()
+    assert figures_so_far(task, 0) == {
+        "F_m so far": f"{values['mean']:.1f} N",
+        "σ so far": f"{values['std']:.1f} N",
+        f"{LABELS['contact_loss'].short} so far": f"{values['contact_loss']:.1f} %",
+    }
+
+    def diverged(lane):
+        raise InputError("The run has no figures.")
+
+    monkeypatch.setattr(task, "figures", diverged)
+    assert figures_so_far(task, 0) == {}
 
 
-def test_supports_are_dashed_and_lost_contact_is_in_the_legend():
-    now, picture = calm(driven(steps=200)), Picture(*SIZE)
-    drawn = picture.draw(now)
-    layout = Layout.of(now, *SIZE)
-    (number,) = now.alignment.supports_within(now.position - 0.8 * now.alignment.mean_length, now.position)
-    column = round(float(layout.across(np.array(now.alignment.support(number)), now.position)))
-    top, bottom = (round(each) for each in layout.chart)
-    marked = np.abs(drawn[top:bottom, column].astype(int) - SUPPORT).max(axis=1) < 60
-    assert 0.3 < marked.mean() < 0.8
-    assert (np.diff(marked.astype(int)) == 1).sum() > 3  # dashes
-    legend = drawn[top - 14 : top - 1, : round(layout.pantograph)]
-    assert count(legend, VERMILION) >= 4
+def test_what_a_moment_says_of_its_task():
+    task = driven(90, **STIFFNESS)
+    now = moment_of(task, 0, "a title", {"more": "text"})
+    assert (now.title, now.figures, now.time) == ("a title", {"more": "text"}, pytest.approx(0.9))
+    assert now.position == pytest.approx(0.9 * 200 / 3.6)
+    assert now.speed == pytest.approx(200 / 3.6)
+    assert list(now.masses) == list(task.plant.pantograph.masses)
+    assert list(now.heights) == [task.plant.of(0, Row.STATE + k) for k in range(len(now.heights))]
+    assert list(now.actuators.values()) == [0.0] * len(now.actuators)
+    assert np.all(now.places < now.position)
+    assert now.places.min() >= now.position - 1.3 * now.alignment.mean_length
+    gaps = np.diff(now.places)
+    np.testing.assert_allclose(gaps, 200 / 3.6 * task.plant.time_step, rtol=1e-6)
+    assert now.places[-1] == pytest.approx(now.position - gaps[0] / 2)
+    later = moment(driven(300, **STIFFNESS))  # at 167 m, of which the last 65 m are shown
+    assert later.position - 65.0 <= later.places.min() < later.position - 65.0 + gaps[0]
+    assert len(later.places) == len(later.force) == len(later.filtered)

@@ -9,16 +9,14 @@ import gymnasium
 
 import panto_env  # noqa: F401
 from panto_env import InputError, simulate
-from panto_env.analysis.saved_run import check_made_anew, load_with_settings
+from panto_env.analysis.simulation import check_made_anew, load_with_settings
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.plant.state import Row
-from panto_env.render.film import excerpt, figures_in_words, frames
-from panto_env.render.filmed import saved_passes
+from panto_env.render.canvas import FORCE, OTHERS
+from panto_env.render.film import excerpt, figures_in_words, frames, saved_passes
 from panto_env.render.moment import AHEAD, moment_of
-from panto_env.render.overview import SHARE, colour_of
-from panto_env.render.palette import FORCE, OTHERS
-from panto_env.render.picture import Picture
+from panto_env.render.picture import SHARE, Picture, colour_of
 from panto_env.render.strip import Strip
 
 from .test_live import text

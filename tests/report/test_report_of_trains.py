@@ -85,12 +85,8 @@ def test_a_workbook_has_figures_and_droppers_of_each(run, tmp_path):
     covered = run.train[-1].spans()
     for sheet in ("figures", "droppers"):
         heading, *rows = list(book[sheet].iter_rows(values_only=True))
-        assert {
-            (row[heading.index("pantograph_number")], row[heading.index("pantograph")]) for row in rows
-        } == {
-            (1, "en50318-2002"),
-            (2, "dsa250"),
-        }
+        number, name = heading.index("pantograph_number"), heading.index("pantograph")
+        assert {(row[number], row[name]) for row in rows} == {(1, "en50318-2002"), (2, "dsa250")}
     heading, *rows = list(book["figures"].iter_rows(values_only=True))
     of_std = {
         row[heading.index("pantograph_number")]: row[heading.index("value")] for row in rows if "std" in row
@@ -105,11 +101,8 @@ def test_runs_of_one_pantograph_and_trains_share_a_table(run, tmp_path):
     save_figures([alone, run], tmp_path / "f.csv")
     with (tmp_path / "f.csv").open(encoding="utf-8-sig") as file:
         rows = [row for row in csv.DictReader(file) if row["key"] == "mean"]
-    assert [(row["pantograph"], row["pantograph_number"]) for row in rows] == [
-        ("en50318-2002", "1"),
-        ("en50318-2002", "1"),
-        ("dsa250", "2"),
-    ]
+    names = [(row["pantograph"], row["pantograph_number"]) for row in rows]
+    assert names == [("en50318-2002", "1"), ("en50318-2002", "1"), ("dsa250", "2")]
 
 
 def test_a_saved_train_is_whole_when_it_is_read(run, file):

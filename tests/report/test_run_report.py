@@ -6,24 +6,27 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from panto_baselines.report.command import report as report_command
+from panto_baselines.report.page import report as report_command
 from panto_env import InputError, Trajectory, simulate
+from panto_env.base.plotting import series_colour
 from panto_env.catalog import load_catenary
 from panto_env.cli import make_app
 from panto_env.plant.catenary import CATENARIES
-from panto_env.plant.catenary.flexible.dropper_table import droppers_at_rest
-from panto_env.plant.catenary.flexible.elasticity import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
+from panto_env.plant.catenary.flexible.static import droppers_at_rest
 from panto_env.report import charts, save
-from panto_env.report.findings import Findings
-from panto_env.report.page import digits, page
-from panto_env.report.words import LEFT_OUT
+from panto_env.report.findings import Findings, Folded
+from panto_env.report.page import LEFT_OUT, MOST, _title, page
 
 from ..catalog.test_catalog import STEP, wire_stiffness
+from ..metrics.test_summary import RUN
 from ..pages import DOCS
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
@@ -96,23 +99,17 @@ def test_what_is_found_is_what_the_run_says(run, found):
     assert [number for number, _, _ in found.uplifts] == list(range(9, 20))
     lost = sum(loss.duration for loss in found.losses) / (run.inside().sum() * run.time_step)
     assert 100 * lost == pytest.approx(figures.contact_loss)
-    folded = found.folded
-    assert np.all((folded.low <= folded.median) & (folded.median <= folded.high))
+    folded, (first, last) = found.folded, found.covered
+    for share in (0.0, 0.25, 0.75):
+        places = [run.alignment.support(span - 1) + share * 60.0 for span in range(first, last + 1)]
+        force, k = np.interp(places, run.position, found.filtered), np.abs(folded.share - share).argmin()
+        assert folded.share[k] == share
+        assert (folded.low[k], folded.high[k]) == pytest.approx((force.min(), force.max()))
+        assert folded.median[k] == pytest.approx(np.median(force))
     assert folded.median.mean() == pytest.approx(figures.mean, rel=0.01)
     slack = next(each.value for each in run.compliance() if each.key == "slack")
     assert np.mean([dropper.slack for dropper in found.droppers]) == pytest.approx(slack, rel=0.02)
     assert [dropper.position for dropper in found.droppers] == pytest.approx(found.line.droppers.positions)
-
-
-def test_losses_of_contact_are_counted_with_their_length(run, found):
-    force = run.contact_force.copy()
-    begin = int(np.flatnonzero(run.inside())[0]) + 100
-    force[begin : begin + 7] = 0.0
-    force[begin + 50 : begin + 53] = 0.0
-    losses = Findings(replace(run, contact_force=force), "it").losses
-    assert len(losses) == 2 + len(found.losses)
-    assert losses[0].duration == pytest.approx(7 * run.time_step)
-    assert losses[0].position == pytest.approx(run.position[begin])
 
 
 def test_the_page_says_it_and_is_the_same_twice(found):
@@ -123,32 +120,29 @@ def test_the_page_says_it_and_is_the_same_twice(found):
         assert value in words
     for criterion in found.run.compliance():
         assert criterion.name in words
-    assert LEFT_OUT[0] in words
     assert not re.findall(r"(?:src|href)=\"https?:", text)
-
-
-def test_what_is_left_out_is_the_same_list_in_the_documents_and_in_every_report(found):
-    section = (
-        (DOCS / "validation.md").read_text(encoding="utf-8").split("## What the model leaves out\n\n")[1]
-    )
-    told = [" ".join(each.split()) for each in section.split("\n- ")[1:]]
-    assert told == list(LEFT_OUT)
-    shown = re.search(r'<ul id="left-out">(.*?)</ul>', page([found]), re.DOTALL)[1]
-    assert [html.unescape(each) for each in re.findall("<li>(.*?)</li>", shown)] == list(LEFT_OUT)
-
-
-def test_what_is_left_out_is_named_as_long_as_it_is_not_computed():
-    """A line that does one of these has to take it off the list."""
-    words = "; ".join(LEFT_OUT)
-    for each in (
-        "section insulators",
-        "two contact wires",
-        "curves",
-        "wind on stitch wires",
-        "rigid rail",
-    ):
-        assert each in words
+    # What is left out is the same list in the documents and in every report.
+    section = (DOCS / "validation.md").read_text(encoding="utf-8").split("## What the model leaves out\n\n")
+    assert [" ".join(each.split()) for each in section[1].split("\n- ")[1:]] == list(LEFT_OUT)
     assert set(CATENARIES) == {"flexible", "three_span", "periodic_stiffness", "rig"}  # no rigid rail
+    shown = re.search(r'<ul id="left-out">(.*?)</ul>', text, re.DOTALL)[1]
+    assert [html.unescape(each) for each in re.findall("<li>(.*?)</li>", shown)] == list(LEFT_OUT)
+    # Lengths, forces and stretches of the line as designed, for each dropper of a span.
+    table, resting = text[text.index('class="at-rest"') :], droppers_at_rest(found.line)
+    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th>(.*?)</tr>', table[: table.index("</table>")]))
+    for row, values in (
+        ("from the support (m)", [f"{each.position:.3f}" for each in resting]),
+        ("length, unloaded (m)", [f"{each.length:.4f}" for each in resting]),
+        ("static force (N)", [f"{each.static_force:.1f}" for each in resting]),
+        ("stretch at rest (mm)", [f"{1e3 * each.stretch:.2f}" for each in resting]),
+    ):
+        assert re.findall(r"<td>(.*?)</td>", rows[row]) == values
+    # In print headings stay with their tables.
+    rules = text.partition("@media print")[2].partition("</style>")[0]
+    for name in ("h2", "h3", "caption", "figcaption", "thead"):
+        assert re.search(rf"\b{name}\b[^{{}}]*{{ break-after: avoid; }}", rules), name
+    for name in ("#requirements", "#figures", "#losses", ".uplift", ".droppers", ".at-rest"):
+        assert re.search(rf"{name}\b[^{{}}]*{{ break-inside: avoid; }}", rules), name
 
 
 @pytest.mark.skipif(BROWSER is None and "CI" not in os.environ, reason="no browser; CI has one")
@@ -183,22 +177,11 @@ def test_several_runs_stand_side_by_side(run, file, tmp_path):
     assert shown == pytest.approx([slow.summary().mean, run.summary().mean], abs=0.005)
 
 
-def test_a_run_that_ended_early_is_reported_as_such(run):
-    ended = replace(run, terminated=True, ending="The run ended early at 10 m: it was bad.")
-    text = page([Findings(ended, "run.parquet")])
-    assert "The run ended early at 10 m: it was bad. It has no figures." in text
-    assert "None: no run has figures." in text
-
-
-def test_a_line_without_wires_has_a_report_too():
-    run = simulate("periodic-stiffness", "three-mass", 200.0)
-    text = page([Findings(run, "run.parquet")])
-    assert "mean_stiffness" in text
-    assert "Elasticity" not in text
-
-
 def test_the_report_is_of_the_line_that_was_run_whatever_its_file_says_now(tmp_path):
     source = (DOCS.parent / "panto_env/catalog/catenaries/en50318-2002.toml").read_text(encoding="utf-8")
+    without_wires = page([Findings(simulate("periodic-stiffness", "three-mass", 200.0), "run.parquet")])
+    assert "mean_stiffness" in without_wires
+    assert "Elasticity" not in without_wires
     mine = tmp_path / "mine.toml"
     mine.write_text(source, encoding="utf-8")
     simulate(str(mine), speed_kmh=300.0, distance=300.0).save(tmp_path / "run.parquet")
@@ -206,22 +189,23 @@ def test_the_report_is_of_the_line_that_was_run_whatever_its_file_says_now(tmp_p
     found = Findings(Trajectory.load(tmp_path / "run.parquet"), "run.parquet")
     assert found.line.span_length == 60.0
     assert found.line.name == "mine"
-    assert "contact_wire.tension" in page([found])
 
 
 def test_names_and_descriptions_are_escaped(run):
+    """Of a run that ended early, which is reported as such."""
     design = {part: {**values, "description": HOSTILE} for part, values in run.design.items()}
-    text = page([Findings(replace(run, design=design, policy=HOSTILE), HOSTILE)])
+    ended = {"terminated": True, "ending": "The run ended early at 10 m: it was bad."}
+    text = page([Findings(replace(run, design=design, policy=HOSTILE, **ended), HOSTILE)])
     assert HOSTILE not in text
     assert html.escape(HOSTILE) in text
+    assert "The run ended early at 10 m: it was bad. It has no figures." in text
+    assert "None: no run has figures." in text
 
 
 def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
     old = replace(run, design={})
     with pytest.raises(InputError, match="was written by an older version, without its line"):
         page([Findings(old, "old.parquet")])
-    with pytest.raises(InputError, match="1 to 8 runs, not 9"):
-        page([Findings(run, "run.parquet")] * 9)
     odd = tmp_path / "odd.json"
     for files, words in (
         ([file, odd], "either runs (.parquet) or results of the benchmark (.json), not both"),
@@ -246,100 +230,102 @@ def test_runs_that_share_a_name_stay_apart(run):
     assert values == ["60.0", "61.0"]
 
 
-def test_numbers_below_ten_have_three_decimals():
-    assert [digits(value) for value in (9.9996, 10.0, -12.34, 0.05, float("nan"))] == [
-        "10.000",
-        "10.0",
-        "-12.3",
-        "0.050",
-        "–",
+SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
+CHARTS = ("force_along", "force_folded", "spectrum", "uplifts", "stiffness")
+
+
+def alone(**facts):
+    """A run of four spans of 5 m: the whole of it, since its usual spans would begin with the tenth."""
+    return Findings(replace(RUN, **facts), "it.parquet")
+
+
+def test_what_is_found_in_a_run_of_four_spans():
+    """Samples every 0.5 m from 0.25 m on; the supports at 5, 10 and 15 m rise by up to 239, 139 and 39 mm."""
+    one = alone()
+    assert (one.covered, one.figures, one.criteria, one.folded, one.by_span) == (None, None, [], None, [])
+    assert one.inside.all()
+    force = np.full(40, 100.0)
+    force[[3, 4, 5, 39]] = 0.0, -2.0, 0.0, 0.0
+    lost = alone(contact_force=force).losses
+    assert [(loss.position, loss.duration) for loss in lost] == [
+        (pytest.approx(1.75), pytest.approx(0.03)),
+        (pytest.approx(19.75), pytest.approx(0.01)),
     ]
+    assert [(k, place) for k, place, _ in one.uplifts] == [(1, 5.0), (2, 10.0), (3, 15.0)]
+    assert [uplift for *_, uplift in one.uplifts] == pytest.approx([0.239, 0.139, 0.039])
+    assert [k for k, *_ in alone(uplift=RUN.uplift[:, :2]).uplifts] == [1, 2]
 
 
-def test_droppers_at_rest_are_on_the_page(run):
-    """Lengths, forces and stretches of the line as designed, for each dropper of a span."""
-    text = page([Findings(run, "run.parquet")])
-    table = text[text.index('class="at-rest"') :]
-    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th>(.*?)</tr>', table[: table.index("</table>")]))
-    for row, values in (
-        ("from the support (m)", [f"{each.position:.3f}" for each in droppers_at_rest(run_line(run))]),
-        ("length, unloaded (m)", [f"{each.length:.4f}" for each in droppers_at_rest(run_line(run))]),
-        ("static force (N)", [f"{each.static_force:.1f}" for each in droppers_at_rest(run_line(run))]),
-        ("stretch at rest (mm)", [f"{1e3 * each.stretch:.2f}" for each in droppers_at_rest(run_line(run))]),
-    ):
-        assert re.findall(r"<td>(.*?)</td>", rows[row]) == values
+@pytest.fixture(scope="module")
+def whole():
+    return Findings(simulate(**SHORT), "whole.parquet")
 
 
-def run_line(run):
-    return load_catenary(run.catenary)
+@pytest.fixture(scope="module")
+def short():
+    return Findings(simulate(**SHORT, distance=120.0), "short.parquet")
 
 
-PDF_TEXT = shutil.which("pdftotext")
+@pytest.fixture
+def drawn(monkeypatch):
+    """Charts that are only their names, with those of the runs that they were given."""
+    for name in CHARTS:
+
+        def told(given, *_, name=name):
+            files = [one.file for one in given] if isinstance(given, dict) else [given.file]
+            return f"{name}:{','.join(files)};"
+
+        monkeypatch.setattr(charts, name, told)
 
 
-def test_pictures_of_a_report_have_dashed_supports_named_losses_and_labels_off_the_peaks():
-    light = Findings(simulate("shinkansen-simple", "identified-2dof", 320.0), "light.parquet")
-    text = page([light])
-    along = charts.force_along(light, [light])
-    assert along in text
-    for words in ("contact lost", "EN 50367: at most 350 N, above the axis", "(m); dashed lines: supports"):
-        assert f"{words} -->" in along
-    assert along.count("stroke-dasharray: 4.5,3.6") >= 9  # supports
-    # In the legend of the spectrum, and no longer along its peaks.
-    spectrum = charts.spectrum({light: "it"})
-    assert "<!-- per span: 1.78 Hz -->" in spectrum
-    assert "rotate(-90)" not in spectrum.partition("<!-- per span")[2].partition("</g>")[0]
-    pair = (light, Findings(replace(light.run, contact_force=2 * light.run.contact_force), "twice"))
-    ticks = [re.findall(r"<!-- (\d+) -->", charts.force_along(each, pair)) for each in pair]
-    assert ticks[0] == ticks[1]  # one scale for all runs of a page
+def test_charts_stand_on_the_page_of_runs_that_have_them(whole, short, drawn):
+    assert (short.figures, whole.figures is None) == (None, False)
+    np.testing.assert_allclose(whole.folded.share, np.arange(240) / 240)
+    of_short, of_whole = "force_along:short.parquet;", "force_along:whole.parquet;"
+    judged = ["force_folded:whole.parquet;", "spectrum:whole.parquet;"]
+    for runs, shown in (
+        ([whole], [of_whole, *judged]), ([short], [of_short]), ([short, whole], [of_short, of_whole, *judged])
+    ):  # fmt: skip
+        text = page(runs)
+        assert [each for each in shown if each in text] == shown
+        assert sum(text.count(f"{name}:") for name in CHARTS) == len(shown)
 
 
-def test_the_rules_for_print_keep_headings_with_their_tables(found):
-    rules = page([found]).partition("@media print")[2].partition("</style>")[0]
-    for name in ("h2", "h3", "caption", "figcaption", "thead"):
-        assert re.search(rf"\b{name}\b[^{{}}]*{{ break-after: avoid; }}", rules), name
-    for table in ("#requirements", "#figures", "#losses", ".uplift", ".droppers", ".at-rest"):
-        assert re.search(rf"{table}\b[^{{}}]*{{ break-inside: avoid; }}", rules), table
+def test_a_page_holds_one_to_eight_runs(short, drawn):
+    assert MOST == 8
+    names = [f"{k}.parquet" for k in range(9)]
+    runs = [Findings(short.run, name) for name in names]
+    assert all(f"force_along:{name};" in page(runs[:8]) for name in names[:8])
+    for count in (0, 9):
+        with pytest.raises(InputError, match=f"^A report shows 1 to 8 runs, not {count}\\.$"):
+            page(runs[:count])
 
 
-@pytest.mark.skipif(BROWSER is None or PDF_TEXT is None, reason="no browser, or no pdftotext")
-def test_no_table_of_a_printed_report_is_away_from_its_heading(file, tmp_path):
-    source, pdf = tmp_path / "report.html", tmp_path / "report.pdf"
-    save([file], source)
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    command += [
-        "--no-first-run",
-        "--disable-background-networking",
-        f"--user-data-dir={tmp_path / 'profile'}",
-    ]
-    command += ["--no-pdf-header-footer", f"--print-to-pdf={pdf}", f"file://{source}"]
-    subprocess.run(command, capture_output=True, check=True, timeout=120)
-    told = subprocess.run([PDF_TEXT, "-layout", pdf, "-"], capture_output=True, text=True, check=True).stdout
-    pages = told.split("\f")
-    for heading, last in (
-        ("Requirements", "v/c, train over wave"),
-        ("Figures", "span slack"),
-        ("Contact losses in the evaluated spans", "longest (ms)"),
-        ("Droppers", "stretch at rest (mm)"),
-        ("Pantograph", "masses"),
-        ("What was left out", "EN 50318:2018"),
-    ):
-        at = [
-            k for k, each in enumerate(pages) if re.search(rf"^\s*{re.escape(heading)}", each, re.MULTILINE)
-        ]
-        assert at, heading
-        assert any(last in pages[k] for k in at), f"{heading} is on page {at}, its table is not"
+def test_titles_and_names_tell_runs_apart():
+    def of(file, **facts):
+        usual = {"catenary": "a", "pantograph": "b", "speed_kmh": 250.0, "policy": "passive", "seed": 0}
+        known = usual | facts
+        return Findings(SimpleNamespace(**known, pantographs=known["pantograph"]), file)
+
+    runs = [of("1"), of("2", speed_kmh=80.5), of("3", pantograph="c")]
+    assert _title(runs) == "b on a, c on a at 80.5, 250 km/h"
+    assert [*charts.names_of(runs).values()] == ["b, 250 km/h", "b, 80.5 km/h", "c, 250 km/h"]
+    assert [*charts.names_of(runs[:1]).values()] == ["250 km/h"]
+    assert [*charts.names_of([of("1"), of("2")]).values()] == ["250 km/h (1)", "250 km/h (2)"]
+    assert [*charts.names_of([of("1"), of("2", seed=3)]).values()] == ["seed 0", "seed 3"]
+    same = [of("1"), of("2", policy="pd"), of("3", policy="pd")]
+    assert [*charts.names_of(same).values()] == ["passive (1)", "pd (2)", "pd (3)"]
 
 
-def test_a_folded_force_is_that_of_the_same_place_of_every_evaluated_span(found):
-    """Looked up again at one place of each span."""
-    one = found
-    folded, run = one.folded, one.run
-    first, last = one.covered
-    for share in (0.0, 0.25, 0.75):
-        places = [run.alignment.support(span - 1) + share * 60.0 for span in range(first, last + 1)]
-        force = np.interp(places, run.position, one.filtered)
-        k = np.abs(folded.share - share).argmin()
-        assert folded.share[k] == share
-        assert (folded.low[k], folded.high[k]) == pytest.approx((force.min(), force.max()))
-        assert folded.median[k] == pytest.approx(np.median(force))
+def test_a_run_without_whole_spans_hides_no_other(monkeypatch):
+    axes, share = Figure().subplots(), np.linspace(0.0, 1.0, 5)
+    monkeypatch.setattr(charts, "drawn", lambda draw: draw(axes))
+    levels = (None, 100.0, None, 120.0)
+    folded = [level and Folded(share, 0 * share + level, share + 90, share + 130) for level in levels]
+    found = [Findings(RUN, "it") for _ in folded]
+    for one, each in zip(found, folded, strict=True):
+        one.__dict__["folded"] = each
+    charts.force_folded({one: f"run {k}" for k, one in enumerate(found)})
+    assert [line.get_label() for line in axes.lines] == ["run 1: median", "run 3: median"]
+    assert [line.get_color() for line in axes.lines] == [series_colour(1), series_colour(3)]
+    assert [line.get_ydata()[0] for line in axes.lines] == [100.0, 120.0]

@@ -3,28 +3,34 @@
 import numpy as np
 import pytest
 
-from panto_env.diagnosis.cases import SEVERITIES, Track, draw_defect, every_defect
-from panto_env.diagnosis.kinds import BROKEN, TENSION
-from panto_env.diagnosis.training import LINES, PANTOGRAPH, SEEDS, SPEEDS_KMH
+from panto_env.diagnosis.features import BROKEN, TENSION
+from panto_env.diagnosis.training import (
+    LINES,
+    PANTOGRAPH,
+    SEEDS,
+    SEVERITIES,
+    SPEEDS_KMH,
+    Track,
+    draw_defect,
+    every_defect,
+)
 from panto_env.plant.line_condition import LineCondition
 from panto_env.studies.paper2 import diagnosis as study
-from panto_env.studies.paper2 import diagnosis_cases as judged
-from panto_env.studies.paper2.diagnosis_tables import alarms_per_10_km, elsewhere_per_10_km, smallest
 
 TRACK = Track("en50318-2002", "dsa250", 220.0, seed=21)
 
 
 def case(kind="", severity=0.0, detected=False, others=0, passes=1, located=None):
     located = detected if located is None else located
-    return judged.Case(TRACK, kind, severity, passes, 0.1, detected, located, 1.0, kind, others, 2.0)
+    return study.Case(TRACK, kind, severity, passes, 0.1, detected, located, 1.0, kind, others, 2.0)
 
 
 def test_what_is_judged_was_not_trained_on():
-    assert not set(judged.SPEEDS_KMH) & set(SPEEDS_KMH)
+    assert not set(study.SPEEDS_KMH) & set(SPEEDS_KMH)
     tracks = study.tracks()
     assert len({track.seed for track in tracks} - set(SEEDS)) == len(tracks)
-    assert judged.PANTOGRAPH != PANTOGRAPH
-    assert len(set(judged.LINES) - set(LINES)) == 2
+    assert study.PANTOGRAPH != PANTOGRAPH
+    assert len(set(study.LINES) - set(LINES)) == 2
 
 
 def test_shares_have_wilson_s_interval():
@@ -36,16 +42,16 @@ def test_shares_have_wilson_s_interval():
 
 def test_false_alarms_are_those_of_healthy_lines_alone():
     cases = [case(others=1), *[case()] * 9, case(BROKEN, 1.0, True, others=5), case(TENSION, 0.1, others=7)]
-    rate, bound = alarms_per_10_km(cases)
+    rate, bound = study.alarms_per_10_km(cases)
     assert rate == pytest.approx(0.5)  # one in 20 km
     assert bound == pytest.approx(4.744 / 2, rel=1e-3)  # Poisson: one seen, 4.744 at most
-    assert elsewhere_per_10_km(cases) == pytest.approx(25.0)
+    assert study.elsewhere_per_10_km(cases) == pytest.approx(25.0)
 
 
 def test_smallest_severity_needs_all_worse_ones():
     small, middle, large = SEVERITIES["dropper too long"]
     cases = [case("dropper too long", size, size != middle) for size in (small, middle, large)]
-    assert smallest(cases, "dropper too long", 1) == large
+    assert study.smallest(cases, "dropper too long", 1) == large
 
 
 def test_tables_and_curves_hold_every_case():
@@ -53,24 +59,24 @@ def test_tables_and_curves_hold_every_case():
         case(kind, size, True, passes=count)
         for kind, sizes in SEVERITIES.items()
         for size in sizes
-        for count in judged.MEANS
+        for count in study.MEANS
     ]
-    cases += [case(passes=count) for count in judged.MEANS]
+    cases += [case(passes=count) for count in study.MEANS]
     table = study.severity_table(cases)
     assert [row[2] for row in table.rows] == ["100"] * sum(map(len, SEVERITIES.values()))
     confusion = study.confusion_table(cases, 1)
     assert [row[1 + k] for k, row in enumerate(confusion.rows)] == ["100"] * len(SEVERITIES)
     assert study.broken_table(cases).rows[-1][2:6] == ("1", "100.0", "100.0", "21–100")
-    assert len(study.rate_rows(cases)) == len(judged.MEANS) * len(judged.RATES)
+    assert len(study.rate_rows(cases)) == len(study.MEANS) * len(study.RATES)
 
 
 def test_outer_droppers_are_those_next_to_a_support():
-    assert [judged.is_outer(TRACK, 12 * 60 + x) for x in TRACK.data.droppers.positions] == [
+    assert [study.is_outer(TRACK, 12 * 60 + x) for x in TRACK.data.droppers.positions] == [
         True,
         *[False] * 7,
         True,
     ]
-    assert not judged.is_outer(TRACK, 12 * 60)
+    assert not study.is_outer(TRACK, 12 * 60)
 
 
 def test_a_defect_is_drawn_where_it_says_it_is():

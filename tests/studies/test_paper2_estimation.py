@@ -1,6 +1,4 @@
-"""What the paper says of its Figs 11 and 12, and the tables around them, with figures that may not drift."""
-
-import pickle
+"""Ways to estimate the force, noise and parameters; statements and tables are held in ``test_paper2``."""
 
 import numpy as np
 import pytest
@@ -8,51 +6,21 @@ import pytest
 from panto_env.analysis.plots import save
 from panto_env.estimation.motion import measure
 from panto_env.studies.paper2 import estimation
-from panto_env.studies.paper2.estimation import (
-    METHODS,
-    OBSERVATIONS,
-    cases,
-    known_pantograph,
-    over_noise,
-    parameter_information,
-    run,
-)
-from panto_env.studies.paper2.estimation_plots import delay_plot, figure_11_12
-from panto_env.studies.paper2.estimation_tables import (
-    comparisons,
-    noise_table,
-    over_speed_tables,
-    parameters_table,
-    ways_table,
-)
+from panto_env.studies.paper2.estimation import METHODS, OBSERVATIONS
 
 BOTH, ONE = OBSERVATIONS
 
 
 @pytest.fixture(scope="module")
-def at_250():
-    return cases((250.0,))
-
-
-@pytest.fixture(scope="module")
 def trajectory():
-    return run(250.0)
+    return estimation.run(250.0)
 
 
-def test_every_statement_holds(at_250):
-    found = comparisons(at_250)
-    assert {each.quantity: each.ours for each in found} == {
-        "displacements and velocities: correlation": pytest.approx(0.9872, abs=0.002),
-        "displacements: correlation": pytest.approx(0.9571, abs=0.004),
-        "displacements: delay": pytest.approx(5.10, abs=0.2),
-        "displacements: delay over that with velocities": pytest.approx(1.90, abs=0.15),
-        "displacements, smoothed: correlation": pytest.approx(0.9998, abs=2e-4),
-    }
-    assert all(each.agrees for each in found)
-
-
-def test_the_ways_rank_as_told(at_250):
+def test_the_ways_rank_as_told(monkeypatch):
     """Errors at all frequencies, at equal noise: beliefs about the force pay, none at all costs most."""
+    monkeypatch.setattr(estimation, "SEEDS", 1)
+    at_250 = estimation.cases((250.0,))
+    assert all(each.agrees for each in estimation.comparisons(at_250))
     errors = {(case.observation, case.method): case.scores[-1].whole_rms for case in at_250}
     for observation in OBSERVATIONS:
         by_method = {method: errors[observation, method] for method in METHODS}
@@ -64,46 +32,35 @@ def test_the_ways_rank_as_told(at_250):
     assert errors[ONE, "unknown input"] > 2 * errors[ONE, "inertia-corrected"]
 
 
-def test_tables_show_every_way_and_band(at_250):
-    tables = over_speed_tables(at_250)
-    assert [len(table.rows) for table in tables] == [12, 12, 12]
-    assert tables[0].headings == ("observations", "method", "250 km/h")
-    assert float(tables[0].rows[0][2]) == pytest.approx(at_250[0].scores[2].correlation, abs=1e-4)
-    ways = ways_table(at_250)
-    assert len(ways.rows) == 12
-    assert ways.headings[2:5] == ("correlation, 0–2 Hz", "correlation, 0–5 Hz", "correlation, 0–20 Hz")
-    assert float(ways.rows[0][4]) == float(tables[0].rows[0][2])
-    pickle.loads(pickle.dumps(at_250))  # numbers alone, that go to a file
-
-
 def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
     monkeypatch.setattr(estimation, "NOISES", (1e-5, 1e-4))
-    scores = over_noise(trajectory)
+    scores = estimation.over_noise(trajectory)
     for observation in OBSERVATIONS:
         assert scores[observation, 1e-4].delay > 1.8 * scores[observation, 1e-5].delay
-    assert len(noise_table(scores).rows) == 2
 
 
 def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
-    told = parameter_information(trajectory)
+    told = estimation.parameter_information(trajectory)
     true = {"masses.2": 13.0, "stiffnesses.1": 7000.0, "dampings.2": 100.0}
     found = dict(zip(told.found.names, told.found.values, strict=True))
     for name, value in true.items():
         assert found[name] == pytest.approx(value, rel=0.005)
     assert told.bounds["masses.1"] > 5 * told.bounds["masses.2"]
     assert told.scale > 0.5
-    assert len(parameters_table(told).rows) == 8
 
 
 def test_figures_are_drawn(trajectory, tmp_path):
     motion = measure(trajectory, seed=0)
     method = METHODS["filter, random-walk"]
-    forces = {observation: method(motion, known_pantograph(0), observation) for observation in OBSERVATIONS}
+    forces = {
+        observation: method(motion, estimation.known_pantograph(0), observation)
+        for observation in OBSERVATIONS
+    }
     for number, observation in ((11, BOTH), (12, ONE)):
-        figure = figure_11_12(motion, forces[observation], observation)
+        figure = estimation.figure_11_12(motion, forces[observation], observation)
         assert f"as Fig. {number} of paper 2" in figure.get_suptitle()
         save(figure, tmp_path / f"{number}.png")
-    figure = delay_plot(motion, forces)
+    figure = estimation.delay_plot(motion, forces)
     late = {line.get_label(): np.nanmean(line.get_ydata()) for line in figure.axes[0].lines[:2]}
     assert late[ONE] > late[BOTH] > 0
     save(figure, tmp_path / "delay.png")

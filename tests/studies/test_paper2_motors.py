@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from panto_env import InputError
-from panto_env.plant.state import Place
-from panto_env.studies.paper2 import motor_bench, motors
+from panto_env.plant.actuators import actuator_settings
+from panto_env.plant.actuators.motor.schema import motor_power
+from panto_env.studies.paper2 import motors
 
 SPEED = 250.0
 
@@ -20,19 +21,17 @@ def at_15_watts():
     return {place: motors.at_power(SPEED, place, 15.0) for place in motors.PLACES}
 
 
+def recorded_power(one, place):
+    """Current, voltage and watts over a whole pass, from its record; the pantograph has two masses."""
+    record = one.record
+    force, velocity = record.frame_force, record.frame_velocity
+    if place == "head":
+        force, velocity = record.head_force, record.head_velocity - record.frame_velocity
+    return motor_power(actuator_settings(motors.MOTOR), force, velocity, record.time_step)
+
+
 def changes(one, passive):
     return np.array(one.bands) / np.array(passive.bands) - 1
-
-
-def test_bands_hold_all_of_the_force_below_20_hz():
-    time = 1e-3 * np.arange(20000)
-    force = 50 + 3 * np.sin(2 * np.pi * 1.5 * time) + 4 * np.cos(2 * np.pi * 12 * time)
-    np.testing.assert_allclose(
-        motors.rms_by_band(force, 1e-3), np.array([3, 0, 0, 4]) / np.sqrt(2), atol=1e-9
-    )
-    frequency, amplitude = motors.spectrum(force, 1e-3)
-    assert frequency[np.argsort(amplitude)[-2:]] == pytest.approx([1.5, 12.0])
-    assert np.sort(amplitude)[-2:] == pytest.approx([3.0, 4.0])
 
 
 def test_the_frame_is_for_low_frequencies_and_the_head_for_medium_ones(passive, at_15_watts):
@@ -63,11 +62,6 @@ def test_so_they_are_at_an_equal_limit_of_force(passive):
     assert (both < 0.02).all()
 
 
-def test_a_gain_that_moves_the_mean_does_not_count():
-    with pytest.raises(InputError, match=r"move the mean force by more than 1.5 %"):
-        motors.at_force_limit(SPEED, "both", 100.0, (8.0,))
-
-
 def test_motors_that_are_off_hardly_change_the_force(passive):
     """Rotors, half a kilogram, and friction of a newton."""
     off = motors.motor_pass(SPEED, "head", 0.0, passive.figures.mean)
@@ -77,22 +71,15 @@ def test_motors_that_are_off_hardly_change_the_force(passive):
     assert abs(off.power) < 1e-9
 
 
-def test_power_that_a_record_tells_is_what_the_plant_books(at_15_watts):
-    for place, row in (("frame", Place.FRAME), ("head", Place.HEAD)):
+def test_power_is_what_the_record_tells_the_mechanical_a_fraction_of_the_electrical(at_15_watts):
+    for place in ("frame", "head"):
         one = at_15_watts[place]
-        inside = one.record.inside(motors.SPANS)
-        told = motors.recorded_power(one, row)
+        inside, told = one.record.inside(motors.SPANS), recorded_power(one, place)
         assert told.electrical[inside].mean() == pytest.approx(one.power, rel=0.05)
         assert told.copper[inside].mean() == pytest.approx(one.copper, rel=0.05)
-
-
-def test_mechanical_power_is_that_of_the_arms_and_a_fraction_of_the_electrical(at_15_watts):
-    for place, row in (("frame", Place.FRAME), ("head", Place.HEAD)):
-        one = at_15_watts[place]
-        inside = one.record.inside(motors.SPANS)
-        arms = np.abs(motors.recorded_power(one, row).mechanical[inside]).mean()
-        assert one.record.mechanical_power(motors.SPANS) == pytest.approx(arms, rel=0.1)  # but for the rotors
-        assert 0.1 < one.record.mechanical_power(motors.SPANS) / one.power < 0.3
+        mechanical, arms = one.record.mechanical_power(motors.SPANS), np.abs(told.mechanical[inside]).mean()
+        assert mechanical == pytest.approx(arms, rel=0.1)  # but for the rotors
+        assert 0.1 < mechanical / one.power < 0.3
     both = at_15_watts["both"].record
     frame = np.abs(both.frame_force * both.frame_velocity)
     head = np.abs(both.head_force * (both.head_velocity - both.frame_velocity))
@@ -108,35 +95,21 @@ def test_heat_is_that_of_the_current_over_the_nominal_one(at_15_watts):
     assert both.heat < 0.7 * head.heat
 
 
-def test_a_power_that_no_gain_takes_is_refused():
+def test_what_no_gain_reaches_is_refused():
+    with pytest.raises(InputError, match=r"move the mean force by more than 1.5 %"):
+        motors.at_force_limit(SPEED, "both", 100.0, (8.0,))
     with pytest.raises(InputError, match=r"Motors on the head take .* W with gains from .* never 5000 W"):
         motors.at_power(SPEED, "head", 5000.0)
 
 
-def test_tables_name_what_a_pass_took(passive, at_15_watts):
-    table = motors.places_table("at 15 W", passive, list(at_15_watts.values()))
-    assert table.rows[0][0] == "none"
-    assert [row[0] for row in table.rows[1:]] == list(motors.PLACES)
-    assert all(len(row) == len(table.headings) for row in table.rows)
-    frame = at_15_watts["frame"]
-    assert table.headings[2:4] == ("electrical (W)", "mechanical (W)")
-    assert table.rows[1][2] == f"{frame.power:.1f}"
-    assert table.rows[1][3] == f"{frame.record.mechanical_power(motors.SPANS):.1f}"
-    assert table.rows[1][8] == f"{100 * (frame.bands[0] / passive.bands[0] - 1):+.0f}"
-
-
-# --- the bench --------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
-def bench_runs():
-    record = motor_bench.line_pass(SPEED)
-    return {gain: motor_bench.bench_run(record, gain) for gain in (None, 0.0, 1.0, 2.0)}
+def bench_runs(passive):
+    return {gain: motors.bench_run(passive.record, gain) for gain in (None, 0.0, 1.0, 2.0)}
 
 
 def test_the_bench_moves_as_the_line_does(passive, bench_runs):
     """The motion's harmonics carry most of what the contact wire does, and the collector feels them alone."""
-    record, waves = passive.record, motor_bench.motion_of_line(passive.record)
+    record, waves = passive.record, motors.motion_of_line(passive.record)
     height = record.wire[record.inside(motors.SPANS)]
     assert (waves[:, 0] ** 2).sum() / 2 == pytest.approx(height.var(), rel=0.1)
     frequency, amplitude = bench_runs[None].spectrum
@@ -145,21 +118,17 @@ def test_the_bench_moves_as_the_line_does(passive, bench_runs):
     assert (amplitude[near] ** 2).sum() > 0.97 * (amplitude**2).sum()
 
 
-def test_without_control_the_bench_is_linear(bench_runs):
+def test_without_control_the_bench_is_linear(passive, bench_runs):
     """Mass, suspension and pad: each harmonic of the force follows from that of the motion."""
-    run, waves = bench_runs[None], motor_bench.motion_of_line(motor_bench.line_pass(SPEED))
+    run, waves = bench_runs[None], motors.motion_of_line(passive.record)
     mass, spring, damper = 4.25, 3750.0, 10.0
     for amplitude, turns in zip(waves[:, 0], waves[:, 1] * SPEED / 3.6, strict=True):
         s = 2j * np.pi * turns
-        pad, collector = (
-            motor_bench.PAD_STIFFNESS + motor_bench.PAD_DAMPING * s,
-            mass * s * s + damper * s + spring,
-        )
+        pad, collector = motors.PAD_STIFFNESS + motors.PAD_DAMPING * s, mass * s * s + damper * s + spring
         expected = abs(pad * collector / (pad + collector)) * amplitude
         wave = np.exp(-1j * 2 * np.pi * turns * run.time)
-        assert 2 * abs(np.mean((run.force - run.force.mean()) * wave)) == pytest.approx(
-            expected, rel=0.03, abs=0.1
-        )
+        found = 2 * abs(np.mean((run.force - run.force.mean()) * wave))
+        assert found == pytest.approx(expected, rel=0.03, abs=0.1)
 
 
 def test_proportional_control_reduces_the_force_of_the_collector_at_each_frequency(bench_runs):

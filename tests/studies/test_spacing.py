@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
-from panto_env.studies import Outcome, find_study, write
-from panto_env.studies.spacing.passes import CASES, INTERVAL, SPEEDS_KMH, WATCHED, Curve, Wake, curves, wake
-from panto_env.studies.spacing.tables import distances_table, extremes_table, verdict
-from panto_env.studies.spacing.theories import THEORIES, Fit, at_arrival, fit, frequencies, strongest
+from panto_env.studies import Outcome, write
+from panto_env.studies.spacing import passes
+from panto_env.studies.spacing.study import distances_table, extremes_table, verdict
 
 from ..pages import check_page
+from . import made
 
 DISTANCES = np.arange(35.0, 400.0, 2.5)
 SPEED = 250.0
@@ -23,13 +23,13 @@ def made_up(frequency, phase, swing=10.0):
     """σ that goes up and down over the distance."""
     std = 40.0 + swing * np.cos(2 * pi * (frequency * DISTANCES / (SPEED / 3.6) - phase))
     figures = dict.fromkeys(("mean", "std", "max", "min", "contact_loss", "max_uplift"), std)
-    return Curve(CASES[0], SPEED, DISTANCES, figures, figures)
+    return passes.Curve(passes.CASES[0], SPEED, DISTANCES, figures, figures)
 
 
 @pytest.mark.parametrize(("frequency", "phase"), [(0.9, 0.0), (1.3, 0.3), (1.3, 0.9)])
 def test_a_fit_finds_what_a_curve_was_made_of(frequency, phase):
     curve = made_up(frequency, phase)
-    right, wrong = fit(curve, frequency), fit(curve, 0.7 * frequency)
+    right, wrong = passes.fit(curve, frequency), passes.fit(curve, 0.7 * frequency)
     assert right.correlation == pytest.approx(1.0)
     assert (right.phase + 0.5) % 1 == pytest.approx((phase + 0.5) % 1)
     assert right.in_phase == pytest.approx(np.cos(2 * pi * phase), abs=0.1)
@@ -37,18 +37,19 @@ def test_a_fit_finds_what_a_curve_was_made_of(frequency, phase):
 
 
 def test_the_strongest_frequency_of_a_swing_that_dies_out():
-    time = np.arange(0.0, 6.99, INTERVAL)
+    time = np.arange(0.0, 6.99, passes.INTERVAL)
     height = (
         0.05 + 0.02 * np.exp(-time / 4) * np.cos(2 * pi * 1.17 * time) + 0.004 * np.sin(2 * pi * 2.6 * time)
     )
-    assert strongest(Wake(time, height, np.gradient(height, INTERVAL))) == pytest.approx(1.17, abs=0.02)
+    after = passes.Wake(time, height, np.gradient(height, passes.INTERVAL))
+    assert passes.strongest(after) == pytest.approx(1.17, abs=0.02)
 
 
 def test_frequencies_by_hand():
-    time = np.arange(0.0, 6.99, INTERVAL)
-    after = Wake(time, np.cos(2 * pi * time), time)
-    found = frequencies(CASES[0], SPEED, after)
-    assert list(found) == list(THEORIES)
+    time = np.arange(0.0, 6.99, passes.INTERVAL)
+    after = passes.Wake(time, np.cos(2 * pi * time), time)
+    found = passes.frequencies(passes.CASES[0], SPEED, after)
+    assert list(found) == list(passes.THEORIES)
     assert found["span"] == pytest.approx(SPEED / 3.6 / 60)
     assert found["half_span"] == pytest.approx(SPEED / 3.6 / 30)
     assert found["contact_wire"] == pytest.approx((20e3 / 1.35) ** 0.5 / 120)
@@ -57,35 +58,38 @@ def test_frequencies_by_hand():
 
 
 def test_the_wire_is_looked_at_when_the_second_arrives():
-    time = np.arange(0.0, 6.99, INTERVAL)
-    after = Wake(time, np.cos(2 * pi * time), -np.sin(2 * pi * time))
-    found = at_arrival(made_up(1.0, 0.0), after)
+    time = np.arange(0.0, 6.99, passes.INTERVAL)
+    after = passes.Wake(time, np.cos(2 * pi * time), -np.sin(2 * pi * time))
+    found = passes.at_arrival(made_up(1.0, 0.0), after)
     assert found["height"] == pytest.approx(1.0, abs=0.01)
     assert abs(found["velocity"]) < 0.2
 
 
 def test_the_verdict_is_the_theory_that_fits_best():
-    bad, good = Fit(1.0, 0.2, 0.0, 0.0), Fit(1.0, 0.9, 0.25, 0.0)
-    fits = dict.fromkeys([*THEORIES, "best"], bad) | {"half_span": good}
+    bad, good = passes.Fit(1.0, 0.2, 0.0, 0.0), passes.Fit(1.0, 0.9, 0.25, 0.0)
+    fits = dict.fromkeys([*passes.THEORIES, "best"], bad) | {"half_span": good}
     assert "period v / f of: half spans, f = 2 v / l (mean R 0.90" in verdict([(made_up(1, 0), fits)])
 
 
 def test_the_wake_begins_with_the_wire_under_the_pantograph():
-    after = wake(CASES[0], SPEED)
-    run = simulate(CASES[0].line, CASES[0].pantograph, SPEED)
-    middles = [60.0 * (span - 0.5) for span in WATCHED]
+    after = passes.wake(passes.CASES[0], SPEED)
+    run = simulate(passes.CASES[0].line, passes.CASES[0].pantograph, SPEED)
+    middles = [60.0 * (span - 0.5) for span in passes.WATCHED]
     under = np.interp(middles, run.position, run.wire).mean()
     assert after.height[0] == pytest.approx(under, abs=1e-3)
-    assert after.time[-1] > 400 / (SPEEDS_KMH[0] / 3.6) - 0.3
-    np.testing.assert_allclose(np.cumsum(after.velocity)[100:200] * INTERVAL, after.height[100:200]
-                               - after.height[0] + 0.5 * INTERVAL * after.velocity[0], atol=3e-3)  # fmt: skip
+    assert after.time[-1] > 400 / (passes.SPEEDS_KMH[0] / 3.6) - 0.3
+    moved = np.cumsum(after.velocity)[100:200] * passes.INTERVAL
+    begun = after.height[0] - 0.5 * passes.INTERVAL * after.velocity[0]
+    np.testing.assert_allclose(moved, after.height[100:200] - begun, atol=3e-3)
 
 
 def test_curves_are_figures_of_runs():
-    found, rows = curves(CASES[0], (50.0, 120.0))
-    assert [curve.speed_kmh for curve in found] == list(SPEEDS_KMH)
-    assert len(rows) == 2 * 2 * len(SPEEDS_KMH)
-    run = simulate(CASES[0].line, pantographs=[CASES[0].pantograph] * 2, distances=[120.0], speed_kmh=SPEED)
+    found, rows = passes.curves(passes.CASES[0], (50.0, 120.0))
+    assert [curve.speed_kmh for curve in found] == list(passes.SPEEDS_KMH)
+    assert len(rows) == 2 * 2 * len(passes.SPEEDS_KMH)
+    run = simulate(
+        passes.CASES[0].line, pantographs=[passes.CASES[0].pantograph] * 2, distances=[120.0], speed_kmh=SPEED
+    )
     spans = run.train[-1].spans()
     for figures, own in zip((found[1].first, found[1].second), run.train, strict=True):
         assert figures["std"][1] == own.summary(spans).std
@@ -122,7 +126,7 @@ DIFFER = {"correlation of the second's σ with the wire's upward velocity when i
 
 @pytest.mark.study
 def test_the_wire_s_own_swing_says_which_distances_are_bad():
-    outcome = find_study("spacing")(lambda what, share: None)
+    outcome = made("spacing")
     check_page("train-spacing.md", {table.title: table for table in outcome.tables})
     mean = outcome.numbers["mean_correlation"]
     assert mean["measured"] > 0.75

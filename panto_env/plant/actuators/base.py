@@ -9,8 +9,7 @@ from pydantic import Field
 
 from ...backend import operation
 from ...base.arrays import Array
-from ...base.ranges import Between
-from ...base.settings import Settings
+from ...base.settings import Between, Settings
 from ..state import Place
 
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...backend import aligned_zeros, implements, inlined
 from ...base.arrays import Array, Index
-from ...base.ranges import Between
+from ...base.settings import Between
 from ..state import ROW, Place
 from .base import ActuatorSettings, drive
 

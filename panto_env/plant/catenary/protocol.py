@@ -5,9 +5,9 @@ point, ``look_at_contact`` and ``apply_force``; then ``end_step`` once. ``ending
 control step. A class of line constants has its own sources of ``place_contact`` and ``look_at_contact``, and
 of the other operations that it needs; the default of an operation is written here: nothing moves.
 
-A contact point stays at one place during a step: where it is at mid-step. The wire's height at both ends of
-the step is read there with the weights with which the force acts there, so the work of the force on the wire
-is exactly force times change of that height, and no contact is too stiff to be stable.
+A contact point stays where it is at mid-step. The wire's height at both ends of the step is read there with
+the weights with which the force acts there, so the work of the force on the wire is exactly force times
+change of that height, and no contact is too stiff to be stable.
 """
 
 from __future__ import annotations
@@ -16,21 +16,39 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...backend import operation
-from ...base.arrays import Array
-from ...base.errors import InputError
-from ...base.shown import beside
-from ...base.units import from_kmh, to_kmh
+from ...base.arrays import Array, from_kmh, to_kmh
+from ...base.errors import InputError, beside
 from ..line_condition import DrawnLine, LineCondition
 from ..numerics import Numerics, Runs
-from ..valid_range import ENDING
+from ..state import ENDING
 from .schema import CLEAR, CatenaryData
-from .view import LineView
 
-SLOWEST = 1e-9
-"""Minimum speed of a train (m/s); below it the train counts as at rest."""
-FASTEST = from_kmh(1000)
-"""Speed that no train reaches (m/s), for lines on which no wave runs."""
+
+class LineView(NamedTuple):
+    """Part of one lane's line. Arrays are empty for what a line does not have."""
+
+    x: Array  # (n,): positions along the line (m)
+    contact: Array  # (n,): height of the contact wire there (m)
+    messenger: Array  # (n,): height of the messenger wire there (m), or (0,)
+    supports: Array  # (supports,): positions (m)
+    droppers: Array  # (droppers,): positions (m)
+    tops: Array  # (droppers,): height of their upper ends (m)
+    bottoms: Array  # (droppers,): height of their lower ends (m)
+    further: tuple[tuple[Array, Array], ...]  # positions and heights (m) of stitch wires and a second pair
+    slack: NDArray[np.bool_]  # (droppers,): whether each dropper is slack
+
+
+NONE = np.zeros(0)
+NOTHING = LineView(NONE, NONE, NONE, NONE, NONE, NONE, NONE, (), slack=np.zeros(0, dtype=np.bool_))
+"""View of a line that has neither wires nor supports."""
+
+
+SLOWEST = 1e-9  # minimum speed of a train (m/s); below it the train counts as at rest
+FASTEST = from_kmh(1000)  # speed that no train reaches (m/s), for lines on which no wave runs
 
 
 class StartPoint(NamedTuple):
@@ -90,30 +108,19 @@ class CatenaryModel(Protocol):
         """Present shape of one lane's line from begin to end (m), as far as it is computed there."""
 
 
-def accept(data: Any) -> None:
-    """Accept every line that the schema accepts."""
-
-
-def usual_clear_spans(data: Any, numerics: Numerics, runs: Runs, last: int) -> int:
-    """As ``CatenaryKind.clear_spans``, on lines along which no wave comes back from far away."""
-    return CLEAR
-
-
-def say_nothing(data: Any, numerics: Numerics, runs: Runs) -> None:
-    """As ``CatenaryKind.warn_if_short``, of lines without a window."""
-
-
 class CatenaryKind(NamedTuple):
     """A kind of catenary, as the registry lists it."""
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
-    check: Callable[[Any], Any] = accept  # raises InputError where a line with these values cannot exist
+    check: Callable[[Any], Any] = lambda data: (
+        None
+    )  # raises InputError where a line with these values cannot exist
     # Spans of a line beyond the last one of a pass that keep its far end from the train; raises InputError
     # where that takes too many.
-    clear_spans: Callable[[Any, Numerics, Runs, int], int] = usual_clear_spans
+    clear_spans: Callable[[Any, Numerics, Runs, int], int] = lambda data, numerics, runs, last: CLEAR
     # Warns where a given window costs more than 1 % of the figures.
-    warn_if_short: Callable[[Any, Numerics, Runs], None] = say_nothing
+    warn_if_short: Callable[[Any, Numerics, Runs], None] = lambda data, numerics, runs: None
     several_collectors: bool = False  # whether its wire carries waves from one collector to another
 
 

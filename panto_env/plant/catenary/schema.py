@@ -7,12 +7,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
-from ...base.errors import InputError
-from ...base.ranges import Between
-from ...base.settings import Settings
-from ...base.shown import shown
+from ...base.errors import InputError, shown
+from ...base.settings import Between, Settings
 from ..alignment import Alignment
-from ..valid_range import FREE_UPLIFT
+from ..state import FREE_UPLIFT
 
 PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV", "DC 750 V", "DC 600 V"]
 NO_SOURCE, BY_DEFAULT = "no source is named", "default, as none is given"

@@ -10,10 +10,19 @@ from importlib import import_module
 from typing import Any
 
 from ...base.settings import parse_kind
-from .base import READING, Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
+from .base import (
+    READING,
+    Noise,
+    OdometerArrays,
+    Odometers,
+    Reading,
+    SensorArrays,
+    SensorSettings,
+    read_odometer,
+    take_first_readings,
+    take_readings,
+)
 from .delayed import DelayedSensors
-from .noise import Noise
-from .odometer import OdometerArrays, Odometers, read_odometer
 
 __all__ = [
     "KINDS",

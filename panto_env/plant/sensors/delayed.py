@@ -9,11 +9,9 @@ from pydantic import Field
 
 from ...backend import aligned_zeros, implements, inlined
 from ...base.arrays import Array, Index, Lanes
-from ...base.ranges import Between
+from ...base.settings import Between
 from ..state import Row
-from .base import Reading, SensorSettings, take_first_readings, take_readings
-from .noise import AHEAD
-from .odometer import OdometerErrors
+from .base import AHEAD, OdometerErrors, Reading, SensorSettings, take_first_readings, take_readings
 
 SENSED = (Row.HEAD_HEIGHT, Row.FRAME_HEIGHT, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.CONTACT_FORCE)
 """Rows of a sample that are read, in the order of ``Reading``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-from ...base.units import from_kmh
+from ...base.arrays import from_kmh
 from ...catalog import load_catenary
 from ...plant.catenary.flexible.resolution import resolution
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData

@@ -1,14 +1,22 @@
-"""The reference model of EN 50318:2002 and the ranges that the standard accepts."""
+"""The reference model of EN 50318:2002, the ranges that the standard accepts, and other kinds of line.
+
+The standard of 2018 asks for figures of AC simple and AC stitched lines, among others. Its own lines, and any
+DC line with its values, were in no source of ours: these are figures, and no claim.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ...analysis.plots import plot_forces
 from ...analysis.simulation import simulate
-from ...metrics.labels import LABELS
+from ...metrics.figures import LABELS
 from ...metrics.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 REFERENCE_MODEL = "en50318-2002"
 LINE_SPANS = 10
@@ -63,3 +71,41 @@ def check(runs: list[Trajectory]) -> list[Check]:
             label, (low, high) = LABELS[name], ranges[place]
             checks.append(Check(name, label.unit, run.speed_kmh, label.scale * figures[name], low, high))
     return checks
+
+
+def plot_reference(runs: Sequence[Trajectory]) -> Figure:
+    """Contact forces of the reference model at each speed over the standard's spans."""
+    labels = [f"{run.speed_kmh:g} km/h" for run in runs]
+    return plot_forces(runs, labels, SPANS, "Reference model of EN 50318:2002, spans 5 and 6")
+
+
+KINDS = (
+    ("AC simple", "benchmark-2015", "benchmark-2015", (250.0, 300.0)),
+    ("AC simple", "re330", "dsa380", (250.0, 300.0)),
+    ("AC stitched", "re250-stitched", "dsa250", (200.0, 250.0)),
+    ("AC stitched", "re330-stitched", "dsa380", (250.0, 300.0)),
+)
+"""Kind, line, pantograph and speeds (km/h)."""
+
+
+@dataclass(frozen=True)
+class KindCheck:
+    """Figures of one passive run over the default spans; forces low-passed at 20 Hz, but for losses."""
+
+    line_kind: str
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+    mean: float  # N
+    std: float  # N
+    max: float  # N
+    min: float  # N
+    max_uplift: float  # at a support (m)
+    contact_loss: float  # %
+
+
+def check_kind(kind: str, catenary: str, pantograph: str, speed_kmh: float) -> KindCheck:
+    """A passive run on a line of a kind."""
+    found = simulate(catenary, pantograph, speed_kmh, record_droppers=False).summary()
+    figures = (found.mean, found.std, found.max, found.min, found.max_uplift, found.contact_loss)
+    return KindCheck(kind, catenary, pantograph, speed_kmh, *figures)

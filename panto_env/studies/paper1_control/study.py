@@ -1,31 +1,85 @@
-"""Paper 1's active control: its claims tested on a stand-in for its line."""
+"""Paper 1's claims on active control beside ours, with tables and Figs 13 to 18."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
-from ..study import Outcome, Report
-from .cases import SHOWN_SPEEDS, Case, all_cases, control
-from .comparisons import comparisons
-from .passes import Result, passive_at_mean, run_all
-from .plots import all_plots
-from .tables import all_tables
+import numpy as np
+
+from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
+from ...base.plotting import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    POSITION,
+    PURPLE,
+    SKY,
+    VERMILION,
+    legend_above,
+    series_colour,
+)  # fmt: skip
+from ...base.table import Table
+from ...metrics.figures import LABELS
+from ..study import Columns, Comparison, Outcome, Report, panels, row, said, tabled
+from . import passes
+from .passes import (
+    ANGLE_SPEEDS,
+    GAIN,
+    LINE,
+    ON_A_TRAIN,
+    OTHER_LINE,
+    PARTS,
+    SHOWN_SPEEDS,
+    SPAN,
+    SPANS,
+    SPEEDS,
+    THETA,
+    Case,
+    Result,
+    control,
+    cost_over_angle,
+    sampled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CALIBRATED = f"gain {GAIN}: calibrated to this claim, at 300, 350 and 400 km/h"
+UNCALIBRATED = "gain 1: the shipped policy's; the paper prints none"
+STIFF = "force feedback acts as a spring, not a damper: 7 to 15 Hz grows, see the bands"
+SHOWN_SPANS = (10, 11)
+"""Spans of Figs 14 to 16."""
+COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
+WITHOUT, WITH, FORCE = VERMILION, BLUE, GREEN
+"""The paper's colours: without control red, with control blue, control force green."""
+Results = Mapping[Case, Result]
 
 
 def run(report: Report) -> Outcome:
     """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
-    results = run_all(all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total)))
+    results = passes.run_all(
+        passes.all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total))
+    )
     report("passive passes at the same mean force", 0.9)
     at_same_mean = {
-        speed: passive_at_mean(speed, results[Case(speed, control())].figures.mean) for speed in SHOWN_SPEEDS
+        speed: passes.passive_at_mean(speed, results[Case(speed, control())].figures.mean)
+        for speed in SHOWN_SPEEDS
     }
     report("plots", 0.95)
     return Outcome(
         title="Paper 1, active control (section 5, Figs 13 to 18)",
-        comparisons=comparisons(results),
-        tables=all_tables(results, at_same_mean),
-        plots=all_plots(results),
+        comparisons=tuple(_comparisons(results)),
+        tables=tuple(_tables(results, at_same_mean)),
+        plots={
+            "fig13-phase-angle": phase_angle(results),
+            **{f"fig{14 + k}-{speed}kmh": forces_along_line(speed) for k, speed in enumerate(SHOWN_SPEEDS)},
+            "fig17-contact-loss": over_speed(results, 17, "contact_loss", "contact loss ratio"),
+            "fig18-cost-function": over_speed(results, 18, "cost_function", "cost function"),
+        },
         numbers={
             "passes": [_plain(result) for result in results.values()],
             "pressed to the controlled mean": [_plain(result) for result in at_same_mean.values()],
@@ -35,11 +89,319 @@ def run(report: Report) -> Outcome:
 
 def _plain(result: Result) -> dict[str, Any]:
     """One pass for the JSON."""
-    return {
-        **dataclasses.asdict(result.case),
-        **result.figures.as_dict(),
-        "raw_std": result.raw_std,
-        "longest_loss": result.longest_loss,
-        "once_per_span": abs(result.once_per_span),
-        "bands": result.bands,
+    others = {name: getattr(result, name) for name in ("raw_std", "longest_loss", "once_per_span", "bands")}
+    others["once_per_span"] = abs(result.once_per_span)
+    return dataclasses.asdict(result.case) | result.figures.as_dict() | others
+
+
+def _comparisons(results: Results) -> Iterator[Comparison]:
+    def loss(speed: int, policy: str) -> float:
+        return results[Case(speed, policy)].figures.contact_loss
+
+    yield said("control-passive", loss(400, "passive"))
+    for gain, note in ((GAIN, CALIBRATED), (passes.DEFAULT_GAIN, UNCALIBRATED)):
+        for speed in SHOWN_SPEEDS:
+            yield said("control-loss", loss(speed, control(gain)), gain=gain, speed=speed, note=note)
+    most = max(loss(speed, control()) for speed in SPEEDS)
+    yield said("control-most", most, gain=GAIN, note=CALIBRATED)
+    worst = {
+        gain: max(
+            results[sampled(speed, control(gain), "realistic")].figures.contact_loss for speed in SHOWN_SPEEDS
+        )
+        for gain in passes.GAINS
     }
+    best = min(worst, key=worst.__getitem__)
+    for gain, gains in ((GAIN, f"gain {GAIN}"), (best, f"best gain {best:g}")):
+        yield said("control-real", worst[gain], gains=gains)
+    for key, name in (("control-raw", "raw_std"), ("control-cost", "mean_deviation")):
+        both = {speed: (results[Case(speed, control())], results[Case(speed)]) for speed in SPEEDS}
+        ratio = {speed: getattr(on, name) / getattr(off, name) for speed, (on, off) in both.items()}
+        for speed in SHOWN_SPEEDS:
+            yield said(key, ratio[speed], speed=speed, note=STIFF if speed == 300 else "")
+    highest = max(ratio, key=ratio.__getitem__)
+    yield said("control-costs", ratio[highest], speed=highest)
+    paper, low, high = map(math.degrees, (THETA, THETA - passes.THETA_STEP, THETA + passes.THETA_STEP))
+    for speed in ANGLE_SPEEDS:
+        theta = math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best)
+        yield said("control-angle", theta, speed=speed, paper=paper, low=low, high=high)
+
+
+def _figure(name: str, decimals: int) -> tuple[str, Callable[[Result], str]]:
+    """The column of one of ``Figures``."""
+    label = LABELS[name]
+    return label.short_heading, lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
+
+
+COLUMNS: Columns = (
+    ("km/h", "{.case.speed_kmh}"),
+    _figure("mean", 1),
+    _figure("std", 1),
+    ("raw σ (N)", "{.raw_std:.1f}"),
+    _figure("max", 0),
+    _figure("min", 0),
+    _figure("contact_loss", 2),
+    ("longest loss (ms)", lambda result: f"{1e3 * result.longest_loss:.0f}"),
+    _figure("cost_function", 0),
+    ("mean |F − F_N| (N)", "{.mean_deviation:.1f}"),
+    _figure("max_uplift", 0),
+    _figure("effort", 1),
+    _figure("effort_rate", 0),
+)
+GRID_COLUMNS = tuple(
+    _figure(name, decimals)
+    for name, decimals in (("contact_loss", 2), ("mean", 1), ("std", 1), ("cost_function", 0))
+)
+
+
+def _numerics(fine: bool) -> str:
+    grid = passes.FINE if fine else passes.USUAL
+    return f"{1e3 * grid['time_step']:g} ms, {grid['spacing']:g} m"
+
+
+GRIDS = {_numerics(fine): fine for fine in (False, True)}
+"""Whether a pass is on the grid of ``FINE``, by the words of tables."""
+
+
+def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Table]:
+    """All of them. at_same_mean: the passive pantograph at the controlled one's mean force, by speed."""
+
+    def listed(title: str, named: Iterable[tuple[str, Result]], heading: str = "control") -> Table:
+        """Passes, each in a row."""
+        headings = (heading, *(each for each, _ in COLUMNS))
+        return Table(title, headings, [(name, *row(COLUMNS, result)) for name, result in named])
+
+    def losses(
+        title: str,
+        corner: str | tuple[str, ...],
+        rows: Mapping[Any, Any],
+        columns: Mapping[str, Any],
+        cases: Callable[[Any, Any], Iterable[Case]],
+    ) -> Table:
+        """Maximum contact loss of the cases of a row and a column, both by their headings."""
+        cells = [
+            (
+                *heading,
+                *(
+                    f"{max(results[case].figures.contact_loss for case in cases(each, other)):.2f}"
+                    for other in columns.values()
+                ),
+            )
+            for heading, each in rows.items()
+        ]
+        return Table(title, (*corner, *columns), cells)
+
+    def real(speed: int, policy: str, line: str = LINE) -> Result:
+        return results[sampled(speed, policy, "realistic", line=line)]
+
+    named = []
+    for speed in SHOWN_SPEEDS:
+        passive, *others = ((name, results[Case(speed, policy)]) for name, policy in PARTS.items())
+        named += [passive, ("passive, pressed to that mean", at_same_mean[speed]), *others]
+    yield listed(f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}", named)
+    yield losses(
+        "CL (%) of FB+FF over the gain",
+        ("gain (N/N)",),
+        {(f"{gain:g}",): gain for gain in passes.GAINS},
+        {
+            f"{speed} km/h, {actuator}, {1e3 * interval:g} ms": (speed, actuator, interval)
+            for (actuator, interval), speed in product(passes.LOOPS, SHOWN_SPEEDS)
+        },
+        lambda gain, loop: [Case(loop[0], control(gain), actuator=loop[1], control_interval=loop[2])],
+    )
+    yield listed(
+        "Actuators, control every 10 ms",
+        [
+            (f"{actuator}: {name}", results[sampled(speed, policy, actuator)])
+            for actuator, (name, policy), speed in product(passes.ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
+        ],
+        "actuator: control",
+    )
+    yield losses(
+        "Maximum CL (%) of 300, 350 and 400 km/h, control every 10 ms",
+        ("control",),
+        {("passive",): "passive"} | {(name,): policy for name, policy in ON_A_TRAIN.items()},
+        {name: name for name in passes.ACTUATORS},
+        lambda policy, actuator: [
+            Case(speed) if policy == "passive" else sampled(speed, policy, actuator) for speed in SHOWN_SPEEDS
+        ],
+    )
+    yield losses(
+        "Maximum CL (%) of 300, 325, ... 400 km/h: pd over gain and damping, realistic actuator",
+        ("damping (N s/m)", "time step, grid"),
+        {(f"{damping:g}", grid): (damping, GRIDS[grid]) for damping, grid in product(passes.DAMPINGS, GRIDS)},
+        {f"gain {gain:g}": gain for gain in passes.DAMPED_GAINS},
+        lambda each, gain: [
+            sampled(speed, passes.damped(gain, each[0]), "realistic", each[1]) for speed in passes.FAST_SPEEDS
+        ],
+    )
+    rows = []
+    for (gain, reading, fine), speed in product(passes.ANGLE_CONTROLS, ANGLE_SPEEDS):
+        curve = cost_over_angle(results, speed, gain, reading, fine)
+        costs = (min(curve.cost), curve.at_paper, max(curve.cost), curve.without)
+        rows.append(
+            (
+                f"{reading}, gain {gain:g}, {_numerics(fine)}",
+                str(speed),
+                f"{math.degrees(curve.best):.0f}",
+                *(f"{cost:.0f}" for cost in costs),
+                f"{math.degrees(curve.cancelling):.0f}" if reading == SPAN else "–",
+            )
+        )
+    first = ("reading", "km/h", "best θ (°)", "minimum CF (N m)", "CF at π/6", "maximum CF")
+    headings = (*first, "CF of FB alone", "θ that cancels once per span (°)")
+    yield Table("Phase angle of the feed-forward (Fig. 13)", headings, rows)
+    shown = ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")
+    yield tabled(
+        "What the contact force is made of: rms (N)",
+        [
+            ("control", "{[0]}"),
+            ("km/h", "{[1].case.speed_kmh}"),
+            ("once per span", lambda each: f"{abs(each[1].once_per_span) / math.sqrt(2):.1f}"),
+            *(
+                (f"{low:g}-{high:g} Hz", f"{{[1].bands[{k}]:.1f}}")
+                for k, (low, high) in enumerate(passes.BANDS)
+            ),
+            ("all", "{[1].raw_std:.1f}"),
+        ],
+        [(name, results[Case(speed, PARTS[name])]) for speed, name in product(ANGLE_SPEEDS, shown)],
+    )
+    laws = {"FB, gain 1": (1.0, 0.0), f"FB, gain {GAIN}": (GAIN, 0.0), "damping 150 N s/m": (0.0, 150.0)}
+    laws["both: gain 1, 150 N s/m"] = (1.0, 150.0)
+    yield Table(
+        "Linear model: contact force over the passive one's",
+        ("frequency (Hz)", *laws),
+        [
+            (f"{frequency}", *(f"{passes.amplification(frequency, *law):.2f}" for law in laws.values()))
+            for frequency in (1, 2, 3, 5, 7, 9, 11, 13, 15, 17, 20, 25)
+        ],
+    )
+    named = []
+    for speed in SPEEDS:
+        named += [(name, results[Case(speed, policy)]) for name, policy in passes.OVER_SPEED.items()]
+        named += [
+            (f"{name}, realistic actuator", real(speed, policy))
+            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
+        ]
+    yield listed("Over speed (Figs 17 and 18)", named)
+    named = [
+        (name, results[Case(speed, policy, OTHER_LINE)])
+        for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
+    ]
+    named += [
+        (f"{name}, realistic actuator", real(speed, policy, OTHER_LINE))
+        for speed, (name, policy) in product(SHOWN_SPEEDS, ON_A_TRAIN.items())
+    ]
+    yield listed(f"The same on the line {OTHER_LINE}", named)
+    on_lines = [
+        (f"{line}, ideal: {name}", Case(speed, policy, line))
+        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, PARTS.items())
+    ]
+    on_lines += [
+        (f"{line}, realistic: {name}", sampled(speed, policy, "realistic", line=line))
+        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, ON_A_TRAIN.items())
+    ]
+    both = [(*each, results[each[1]], results[dataclasses.replace(each[1], fine=True)]) for each in on_lines]
+    yield Table(
+        "Time step and grid",
+        (
+            *("line, actuator: control", "km/h"),
+            *(f"{heading}, {grid}" for heading, _ in GRID_COLUMNS for grid in GRIDS),
+        ),
+        [
+            (name, str(case.speed_kmh), *(cell(each) for _, cell in GRID_COLUMNS for each in on_both))
+            for name, case, *on_both in both
+        ],
+    )
+    yield losses(
+        "CL (%) over speed on both grids",
+        ("km/h", "time step, grid"),
+        {(str(speed), grid): (speed, GRIDS[grid]) for speed, grid in product(SPEEDS, GRIDS)},
+        {name: (policy, False) for name, policy in passes.OVER_SPEED.items()}
+        | {
+            f"{name}, realistic actuator": (policy, True)
+            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
+        },
+        lambda each, column: [
+            sampled(each[0], column[0], "realistic", each[1])
+            if column[1]
+            else Case(each[0], column[0], fine=each[1])
+        ],
+    )
+
+
+def phase_angle(results: Results) -> Figure:
+    """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
+    figure, axes = panels((10, 5.2), 1, 2, sharey=True)
+    for axis, reading in zip(axes, (SPAN, passes.KMH), strict=True):
+        for k, speed in enumerate(ANGLE_SPEEDS):
+            curve = cost_over_angle(results, speed, GAIN, reading)
+            colour = series_colour(k)
+            axis.plot(np.degrees(passes.THETAS), curve.cost, color=colour, label=f"{speed} km/h")
+            axis.plot(math.degrees(curve.best), min(curve.cost), "o", color=colour)
+        axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
+        axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
+    figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=8, fontsize="small")
+    figure.suptitle(f"Fig. 13: cost function for phase angle (dots: minimum), gain {GAIN}")
+    return figure
+
+
+def forces_along_line(speed: int) -> Figure:
+    """Figs 14 to 16: unfiltered contact force without and with control, and the control force."""
+    passive, active = passes.records([Case(speed), Case(speed, control())])
+    figure, (upper, lower) = panels((7.5, 4.7), 2, sharex=True, height_ratios=(3, 2))
+    upper.plot(passive.position, passive.contact_force, color=WITHOUT, label=r"$f_{1O}$, without control")
+    upper.plot(active.position, active.contact_force, color=WITH, label=r"$f_{1FBFF}$, with control")
+    upper.axhline(active.nominal_force, color="0.4", linestyle=":", label="nominal force, 54 N")
+    upper.set(ylabel="contact force, unfiltered (N)", ylim=(0, 120))
+    lower.plot(active.position, active.frame_force, color=FORCE, label=r"$f_{cFBFF}$, control force")
+    lower.set(ylabel="control force (N)", xlabel=POSITION, ylim=(-110, 110))
+    for axis in (upper, lower):
+        mark_supports_of_run(axis, active)
+        legend_above(axis, 3)
+    lower.set_xlim(active.alignment.limits(SHOWN_SPANS))
+    for axis in (upper, lower):
+        say_what_is_hidden(axis)
+    shown = f"spans {SHOWN_SPANS[0]} to {SHOWN_SPANS[1]}"
+    figure.suptitle(f"Fig. {14 + SHOWN_SPEEDS.index(speed)}: {speed} km/h, gain {GAIN}, {shown}")
+    return figure
+
+
+def over_speed(results: Results, number: int, name: str, caption: str) -> Figure:
+    """Figs 17 and 18: a figure of merit over speed, by the name that the paper gives it.
+
+    On the left what the paper claims, with an ideal actuator; on the right what a realistic one makes of it.
+    """
+    passive = [Case(v) for v in SPEEDS]
+
+    def real(policy: str) -> list[Case]:
+        return [sampled(v, policy, "realistic") for v in SPEEDS]
+
+    panel = {
+        "ideal actuator": {
+            "without control": (passive, WITHOUT, "o-"),
+            "with control, gain 1": ([Case(v, control(passes.DEFAULT_GAIN)) for v in SPEEDS], ORANGE, "^--"),
+            f"with control, gain {GAIN}": ([Case(v, control()) for v in SPEEDS], WITH, "s-"),
+        },
+        "realistic actuator": {
+            "without control": (passive, WITHOUT, "o-"),
+            f"with control, gain {passes.REAL_GAIN}": (real(control(passes.REAL_GAIN)), "0.5", "x--"),
+            "feedback and frame damping (pd)": (real(passes.DAMPING[passes.SHIPPED]), PURPLE, "d--"),
+            passes.STRONG: (real(passes.DAMPING[passes.STRONG]), SKY, "v-"),
+        },
+    }
+    figure, axes = panels((10.5, 5), 1, 2, sharey=True)
+    for axis, (actuator, curves) in zip(axes, panel.items(), strict=True):
+        for label, (cases, colour, style) in curves.items():
+            values = [getattr(results[case].figures, name) for case in cases]
+            none = " (0 at every speed)" if not any(values) else ""
+            axis.plot(SPEEDS, values, style, color=colour, label=f"{label}{none}", markersize=5)
+        axis.set(xlabel="speed (km/h)", title=actuator)
+        axis.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False)
+        axis.grid(color="0.9")
+    figure.axes[0].set(ylabel=f"{caption} {LABELS[name].short_heading}")
+    if name == "cost_function":
+        figure.axes[0].set_ylim(bottom=0)
+    figure.suptitle(f"Fig. {number}: {caption}, {COVERED}")
+    return figure

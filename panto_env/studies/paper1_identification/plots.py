@@ -1,4 +1,4 @@
-"""Figures of paper 1's identification. Matplotlib is imported late: it is slow to import."""
+"""Figures of paper 1's identification."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.colours import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
+from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
-from ...identification.equation_error import equations
-from ...identification.plots import plot_matches, plot_record
+from ...identification.methods import equations
+from ...identification.performance import plot_matches, plot_record
+from ..study import panels
 from .published import PUBLISHED
 
 if TYPE_CHECKING:
@@ -37,10 +38,7 @@ def match(shown: Record, matches: Sequence[Match], name: str) -> Figure:
 
 def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[float]]) -> Figure:
     """Condition number and RSD of the three experiments, ours and the paper's."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1, 2))
+    figure, (left, right) = panels((11, 4.2), 1, 2, width_ratios=(1, 2))
     place = np.arange(3)
     left.bar(place - 0.2, [p.condition for p in PUBLISHED], 0.4, color="0.7", label="paper")
     ours = [kept[p.name].fits[FILTERED].condition for p in PUBLISHED]
@@ -70,10 +68,7 @@ def stiffness(
 
     last: last frequencies of sweeps (Hz); sweeps: RSD of k3 (%) at these, by whether the offset is free.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = panels((11, 4.2), 1, 2)
     known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
     m3, k3 = IDENTIFIED.index("m3"), IDENTIFIED.index("k3")
     for (name, shown), colour, width in zip(
@@ -112,10 +107,7 @@ def convergence(
     noise: Mapping[str, Mapping[str, Sequence[float]]],
 ) -> Figure:
     """Errors of the equations as printed over the sampling step, and of all methods over the noise."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.6, 4.9), layout="constrained")
-    axes = figure.subplots(1, 3)
+    figure, axes = panels((11.6, 4.9), 1, 3)
     steps = 1e3 / np.array(rates)
     for k, (name, errors) in enumerate(sampling.items()):
         style: dict[str, Any] = {"color": series_colour(k), "marker": "osd^"[k]}
@@ -140,10 +132,7 @@ def convergence(
 
 def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
     """Shares (%) of records whose 95 % intervals hold the truth, by record and method."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(13, 3.8), layout="constrained")
-    axes = figure.subplots(1, len(shares), sharey=True)
+    figure, axes = panels((13, 3.8), 1, len(shares), sharey=True)
     place = np.arange(5)
     for axis, (record_name, by_method) in zip(axes, shares.items(), strict=True):
         for k, (method, colour) in enumerate(zip(METHODS, COLOURS, strict=True)):
@@ -164,8 +153,9 @@ def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
 
 def _legend_below(axis: Axes, columns: int) -> None:
     """A legend that covers no data."""
-    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
-    axis.legend(fontsize="small", ncols=columns, frameon=False, **place)
+    axis.legend(
+        fontsize="small", ncols=columns, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14)
+    )
 
 
 def _symbol(name: str) -> str:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ...identification.model import Parameters, matrices
+from ...catalog import load_pantograph
+from ...identification import parameters_of
+from ...identification.model import matrices
+
+TRUTH = parameters_of(load_pantograph("identified-2dof"))
+"""Table 2's parameters."""
 
 
 @dataclass(frozen=True)
@@ -44,65 +50,59 @@ PUBLISHED = (
 )  # fmt: skip
 
 
-def per_plate(parameters: Parameters, frequency: float) -> tuple[complex, complex, complex]:
+def per_plate(frequency: float) -> tuple[complex, complex, complex]:
     """Force (N/m), y_p2 and y_p3 per metre of plate motion at a frequency (Hz), complex: Eqs 1 and 2."""
-    a, b = matrices(parameters)
+    a, b = matrices(TRUTH)
     s = 2j * np.pi * frequency
     head, support, *_ = np.linalg.solve(s * np.eye(4) - a, b[:, 0] + s * b[:, 1])
-    return complex((parameters["k1T"] + s * parameters["c1T"]) * (1 - head)), complex(head), complex(support)
+    return complex((TRUTH["k1T"] + s * TRUTH["c1T"]) * (1 - head)), complex(head), complex(support)
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """Of one series under the printed motion of the plate: the model's, then the printed one (N or mm)."""
 
-    name: str  # "f_1", "y_p2" or "y_p3"
+    name: str
+    unit: str
     amplitude: float
-    offset: float
     printed_amplitude: float
+    offset: float
     printed_offset: float
 
-    @property
-    def unit(self) -> str:
-        """Of all four."""
-        return "N" if self.name == "f_1" else "mm"
 
-
-def expected(parameters: Parameters, printed: Published) -> tuple[Motion, Motion, Motion]:
+def expected(printed: Published) -> list[Motion]:
     """The contact force f_1, then y_p2 and y_p3."""
-    moving, still = per_plate(parameters, printed.frequency), per_plate(parameters, 0.0)
-
-    def motion(name: str, series: int, scale: float, amplitude: float, offset: float) -> Motion:
-        return Motion(
+    moving, still = per_plate(printed.frequency), per_plate(0.0)
+    series = ("f_1", "N", 1e-3), ("y_p2", "mm", 1.0), ("y_p3", "mm", 1.0)
+    amplitudes = printed.force[0], *printed.amplitudes[1:]
+    offsets = printed.force[1], *printed.offsets[1:]
+    return [
+        Motion(
             name,
-            scale * abs(moving[series]) * printed.amplitudes[0],
-            scale * still[series].real * printed.offsets[0],
-            amplitude,
-            offset,
+            unit,
+            scale * abs(moving[k]) * printed.amplitudes[0],
+            amplitudes[k],
+            scale * still[k].real * printed.offsets[0],
+            offsets[k],
         )
-
-    return (
-        motion("f_1", 0, 1e-3, *printed.force),
-        motion("y_p2", 1, 1.0, printed.amplitudes[1], printed.offsets[1]),
-        motion("y_p3", 2, 1.0, printed.amplitudes[2], printed.offsets[2]),
-    )
+        for k, (name, unit, scale) in enumerate(series)
+    ]
 
 
-def best_performance(parameters: Parameters, printed: Published) -> float:
+def best_performance(printed: Published) -> float:
     """Largest P_f (%) of y_p1 that a model can reach if driven by Table 1's force, whatever its phase.
 
     Offset left out. With one phase free, two sinusoids differ at least by the difference of their amplitudes.
     """
-    modelled = 1e3 * printed.force[0] / abs(per_plate(parameters, printed.frequency)[0])  # mm
+    modelled = 1e3 * printed.force[0] / abs(per_plate(printed.frequency)[0])  # mm
     return float(100 * (1 - abs(modelled - printed.amplitudes[0]) / printed.amplitudes[0]))
 
 
-def dry_friction(parameters: Parameters, printed: Published) -> float:
+def dry_friction(printed: Published) -> float:
     """Dry friction (N) that would raise the model's force to Table 1's amplitude, by harmonic balance.
 
     A friction F_c against the velocity adds 4 F_c / pi to the part of the force in phase with it.
     """
-    force = 1e-3 * printed.amplitudes[0] * per_plate(parameters, printed.frequency)[0]
+    force = 1e-3 * printed.amplitudes[0] * per_plate(printed.frequency)[0]
     missing = np.sqrt(printed.force[0] ** 2 - force.real**2) - force.imag
     return float(np.pi / 4 * missing)
 

@@ -1,55 +1,307 @@
 """Paper 2, section 4.2: what is found out about an overhead line from the estimated contact force.
 
-The force is the estimator's, which knows the pantograph as designed. The classifier has seen other speeds,
-another pantograph and other lines; see ``diagnosis_cases``.
+The force is the estimator's, which knows the pantograph as designed. Simulated defects are judged; the
+classifier has seen other speeds, another pantograph and other lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
-from ...base.colours import LIMIT, series_colour
-from ...base.legend import legend_above
+from ...base.plotting import LIMIT, legend_above, series_colour
 from ...base.table import Table
 from ...diagnosis import diagnose
-from ...diagnosis.cases import Track, draw_defect, drive
-from ...diagnosis.kinds import BROKEN, RAISED, SPOT
-from ...diagnosis.plots import plot_diagnosis
-from ...diagnosis.threshold import FALSE_ALARMS
-from ..study import Comparison, Outcome, Report
-from .diagnosis_cases import (
-    HEALTHY,
-    LINES,
-    MEANS,
-    PANTOGRAPH,
-    RATES,
-    SEEDS,
-    SPEEDS_KMH,
-    Case,
-    broken_only,
-    judge_track,
-)
-from .diagnosis_tables import (
-    BROKEN_HEADINGS,
-    alarms_per_10_km,
-    broken_row,
-    broken_table,
-    confusion_table,
-    elsewhere_per_10_km,
-    severity_table,
-    share,
-    smallest_table,
-    usual,
-)
+from ...diagnosis.diagnosis import judge, plot_diagnosis
+from ...diagnosis.features import BROKEN, ECHOES, FALSE_ALARMS, KINDS, RAISED, SPOT, TENSION
+from ...diagnosis.healthy import Healthy
+from ...diagnosis.passes import Passes, side_by_side
+from ...diagnosis.training import SEVERITIES, Defect, Track, draw_defect, drive, every_defect
+from ...metrics.trajectory import Trajectory
+from ..study import Comparison, Outcome, Report, panels, said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+LINES = ("en50318-2002", "benchmark-2015", "ln2")
+"""The first was trained on, at other speeds; the others were not."""
+PANTOGRAPH = "dsa250"
+"""Training has ``dsa380``."""
+SPEEDS_KMH = (220.0, 260.0)
+"""Training has 160, 200, 240 and 280 km/h."""
+SEEDS = (21, 22, 23)
+"""Of tracks of one line and speed."""
+HEALTHY, CONTROLS, BROKEN_EACH = 12, 4, 8
+"""Of each track: healthy passes to compare with, healthy passes to be judged, broken droppers."""
+MEANS = (1, 3)
+"""Passes over a defect of which the mean is judged."""
+RATES = (0.01, 0.03, 0.1, 0.3, 1.0)
+"""False alarms per km for which thresholds are set, to draw what each costs."""
+NEAR = ECHOES[0][0]
+"""Way (spans) from a defect within which a finding is of it: a sunk support is felt at its neighbours too."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One defect, or none, as it was judged."""
+
+    track: Track
+    kind: str  # "" for a healthy line
+    severity: float
+    passes: int  # of which the mean was judged
+    false_alarms: float  # per km, by which the threshold was set
+    detected: bool  # a finding is near; of lost tension: the whole line counts as changed
+    located: bool  # and its place is within a dropper interval
+    error: float  # between the finding's place and the defect (m); nan where there is none
+    named: str  # kind of the finding; "" where there is none
+    others: int  # findings that are not of the defect
+    distance: float  # judged (km)
+    outer: bool = False  # whether it is at the first or the last dropper of a span
+
+
+def judge_track(track: Track, means: Sequence[int], rates: Sequence[float]) -> list[Case]:
+    """Every kind and severity on one track, and healthy controls."""
+    random = np.random.default_rng([track.seed, round(track.speed_kmh)])
+    defects: list[Defect | None] = [*every_defect(track, random, BROKEN_EACH), *[None] * CONTROLS]
+    return judge_defects(track, defects, means, rates, [drive(track, k) for k in range(HEALTHY)])
+
+
+def judge_defects(
+    track: Track,
+    defects: Sequence[Defect | None],
+    means: Sequence[int],
+    rates: Sequence[float],
+    healthy: Sequence[Trajectory],
+) -> list[Case]:
+    """Defects on one track, each judged by means of passes and for rates; a None is a healthy line.
+
+    Passes that leave the plant's valid range are none, and a defect under which one does is left out.
+    """
+    most, first = max(means), 100  # numbers of passes that no healthy one has
+    runs = [
+        [drive(track, first + most * n + k, () if each is None else (each,)) for k in range(most)]
+        for n, each in enumerate(defects)
+    ]
+    whole = [n for n, own in enumerate(runs) if not any(run.terminated for run in own)]
+    passes, reference = side_by_side([run for n in whole for run in runs[n]], healthy, track.seed)
+    model = Healthy.of(reference)
+    cases = []
+    for k, n in enumerate(whole):
+        for count in means:
+            own = passes.only(*range(k * most, k * most + count))
+            cases += [_case(track, defects[n], own, model, rate) for rate in rates]
+    return cases
+
+
+def _case(track: Track, defect: Defect | None, own: Passes, healthy: Healthy, rate: float) -> Case:
+    found = judge(own, healthy, rate)
+    case = Case(
+        track=track,
+        kind="" if defect is None else defect.kind,
+        severity=0.0 if defect is None else defect.severity,
+        passes=len(own.force),
+        false_alarms=rate,
+        detected=False,
+        located=False,
+        error=float("nan"),
+        named="",
+        others=len(found.findings) + found.changed,
+        distance=(found.end - found.begin) / 1e3,
+        outer=defect is not None and is_outer(track, defect.position),
+    )
+    if defect is None:
+        return case
+    if defect.kind == TENSION:
+        named = TENSION if found.changed else ""
+        return replace(case, detected=found.changed, located=found.changed, named=named, others=0)
+    span = found.evidence.alignment.mean_length
+    near = [each for each in found.findings if abs(each.position - defect.position) < NEAR * span]
+    if not near:
+        return case
+    best = min(near, key=lambda each: abs(each.position - defect.position))
+    return replace(
+        case,
+        detected=True,
+        located=within_interval(best.position, defect.position, found.evidence.droppers),
+        error=best.position - defect.position,
+        named=best.kind,
+        others=case.others - len(near),
+    )
+
+
+def is_outer(track: Track, position: float) -> bool:
+    """Whether the first or the last dropper of a span is at a position (m)."""
+    data = track.data
+    offset = float(data.alignment().place(position))
+    return min(abs(offset - data.droppers.positions[k]) for k in (0, -1)) < 1e-6
+
+
+def within_interval(place: float, defect: float, droppers: Sequence[float] | np.ndarray) -> bool:
+    """Whether a place lies no further from a defect than the next dropper on that side (m)."""
+    at = np.asarray(droppers)
+    before, after = at[at < defect - 1e-6], at[at > defect + 1e-6]
+    low = before[-1] if len(before) else -np.inf
+    high = after[0] if len(after) else np.inf
+    return bool(low - 1e-6 <= place <= high + 1e-6)
+
+
+def broken_only(count: int, scatter: float | None, track: Track) -> list[Case]:
+    """Broken droppers and controls on one track, held against so many healthy passes over the same line.
+
+    scatter: of droppers (m), where they are over other lines alike instead.
+    """
+    if scatter is None:
+        healthy = [drive(track, k) for k in range(count)]
+    else:
+        track = replace(track, scatter=scatter)
+        healthy = [drive(replace(track, seed=track.seed + 1000 * (k + 1)), 0) for k in range(count)]
+    random = np.random.default_rng([track.seed, 1])
+    broken = [each for each in every_defect(track, random, BROKEN_EACH) if each.kind == BROKEN]
+    return judge_defects(track, [*broken, *[None] * CONTROLS], (1,), (FALSE_ALARMS,), healthy)
+
+
+SURE = 0.9
+"""Share of defects of a severity from which on it counts as found."""
+
+
+def chosen(cases: Sequence[Case], **wanted: Any) -> list[Case]:
+    """Cases judged with the usual threshold that have these values, of a case or of its track."""
+    usual = wanted | {"false_alarms": FALSE_ALARMS}
+    return [case for case in cases if usual.items() <= (vars(case.track) | vars(case)).items()]
+
+
+def share(cases: Sequence[Case], of: Callable[[Case], bool]) -> tuple[float, float, float]:
+    """Share of cases, with its 95 % interval after Wilson; nan where there are no cases."""
+    from scipy.stats import binomtest  # slow to import
+
+    if not cases:
+        return float("nan"), float("nan"), float("nan")
+    hits = sum(map(of, cases))
+    interval = binomtest(hits, len(cases)).proportion_ci(method="wilson")
+    return hits / len(cases), float(interval.low), float(interval.high)
+
+
+def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
+    """False alarms on healthy lines per 10 km, and their upper 95 % bound after Poisson; nan without any."""
+    from scipy.stats import chi2  # slow to import
+
+    healthy = [case for case in cases if not case.kind]
+    if not healthy:
+        return float("nan"), float("nan")
+    alarms, way = sum(case.others for case in healthy), sum(case.distance for case in healthy)
+    return 10 * alarms / way, float(10 * chi2.ppf(0.95, 2 * alarms + 2) / 2 / way)
+
+
+def elsewhere_per_10_km(cases: Sequence[Case]) -> float:
+    """Findings in 10 km far from the only defect of a line; lost tension is left out."""
+    local = [case for case in cases if case.kind not in ("", TENSION)]
+    return 10 * sum(case.others for case in local) / sum(case.distance for case in local)
+
+
+BROKEN_HEADINGS = (
+    *("broken droppers", "noticed (%)", "within an interval (%)", "95 %", "named so (%)", "healthy km"),
+    *("false alarms in 10 km", "at most (95 %)"),
+)
+
+
+def broken_row(cases: Sequence[Case]) -> tuple[str, ...]:
+    """Cells under ``BROKEN_HEADINGS``."""
+    broken = [case for case in cases if case.kind == BROKEN]
+    located, low, high = share(broken, lambda case: case.located)
+    noticed, _, _ = share(broken, lambda case: case.detected)
+    named, _, _ = share([case for case in broken if case.detected], lambda case: case.named == BROKEN)
+    alarms, bound = alarms_per_10_km(cases)
+    way = sum(case.distance for case in cases if not case.kind)
+    found = f"{100 * noticed:.1f}", f"{100 * located:.1f}", f"{100 * low:.0f}–{100 * high:.0f}"
+    return f"{len(broken)}", *found, f"{100 * named:.0f}", f"{way:.0f}", f"{alarms:.2f}", f"{bound:.2f}"
+
+
+def broken_table(cases: Sequence[Case]) -> Table:
+    """Broken droppers by line, speed and passes, and false alarms on healthy lines."""
+    rows, ends = [], []
+    for count in MEANS:
+        words, own = _passes(count), chosen(cases, passes=count)
+        for line, speed in product(LINES, SPEEDS_KMH):
+            here = chosen(own, catenary=line, speed_kmh=speed)
+            rows.append((f"{words}, {line}", f"{speed:g}", *broken_row(here)))
+        for where, some in (
+            ("next to a support", [case for case in own if case.outer or not case.kind]),
+            ("other droppers", [case for case in own if not case.outer]),
+            ("all", own),
+        ):
+            rows.append((f"{words}, {where}", "", *broken_row(some)))
+        ends.append(len(rows) - 1)
+    headings = ("mean of", "km/h", *BROKEN_HEADINGS)
+    return Table("Broken droppers on lines not trained on", headings, rows, section_ends=tuple(ends))
+
+
+def _passes(count: int) -> str:
+    return f"{count} pass{'es' if count > 1 else ''}"
+
+
+def severity_table(cases: Sequence[Case]) -> Table:
+    """What of each kind and severity is noticed, and how far off its place is."""
+    rows = []
+    for kind, severities in SEVERITIES.items():
+        for severity in severities:
+            cells = []
+            for count in MEANS:
+                own = chosen(cases, kind=kind, severity=severity, passes=count)
+                found = [abs(case.error) for case in own if case.detected]
+                noticed, _, _ = share(own, lambda case: case.detected)
+                located, _, _ = share(own, lambda case: case.located)
+                median = f"{np.median(found):.1f}" if found and kind != TENSION else "–"
+                cells += [f"{100 * noticed:.0f}", f"{100 * located:.0f}", median]
+            rows.append((kind, _size(kind, severity), *cells))
+    each = product(map(_passes, MEANS), ("noticed (%)", "located (%)", "off (m)"))
+    headings = ("kind", "severity", *(f"{what}, {passes}" for passes, what in each))
+    return Table("Noticed, and within a dropper interval, by severity", headings, rows)
+
+
+def _size(kind: str, severity: float) -> str:
+    unit = {"broken dropper": "", "hard spot": f"{severity:g} kg"}
+    if kind in unit:
+        return unit[kind]
+    return f"{100 * severity:g} %" if kind in ("worn wire", TENSION) else f"{1e3 * severity:g} mm"
+
+
+def smallest(cases: Sequence[Case], kind: str, passes: int) -> float:
+    """Smallest severity of which, and of all worse ones, ``SURE`` are noticed; nan where there is none."""
+    found = float("nan")
+    for severity in sorted(SEVERITIES[kind], reverse=True):
+        own = chosen(cases, kind=kind, severity=severity, passes=passes)
+        if share(own, lambda case: case.detected)[0] < SURE:
+            break
+        found = severity
+    return found
+
+
+def smallest_table(cases: Sequence[Case]) -> Table:
+    """Smallest severity that is noticed."""
+    rows = []
+    for kind in SEVERITIES:
+        sizes = [smallest(cases, kind, count) for count in MEANS]
+        rows.append((kind, *("none" if np.isnan(size) else _size(kind, size) or "yes" for size in sizes)))
+    headings = ("kind", *(f"mean of {count}" for count in MEANS))
+    return Table(f"Smallest severity of which {100 * SURE:.0f} % are noticed", headings, rows)
+
+
+def confusion_table(cases: Sequence[Case], passes: int) -> Table:
+    """Kinds that were, in rows, and what they were taken for (%); of those noticed."""
+    named = (*KINDS, TENSION)
+    rows = []
+    for kind in SEVERITIES:
+        own = chosen(cases, kind=kind, passes=passes, detected=True)
+        shares = (share(own, lambda case, name=name: case.named == name)[0] for name in named)  # type: ignore[misc]
+        rows.append((f"{kind} ({len(own)})", *(f"{100 * each:.0f}" for each in shares)))
+    return Table(f"Taken for (%), mean of {passes}", ("kind (noticed)", *named), rows)
+
 
 WANTED = 0.95
 """Share of broken droppers to be found within a dropper interval, at one false alarm per 10 km or fewer."""
@@ -75,68 +327,44 @@ def tracks(seeds: Sequence[int] = SEEDS, lines: Sequence[str] = LINES) -> list[T
     ]
 
 
-def all_cases(progress: Progress | None = None) -> list[Case]:
-    """Every kind of defect on every track, at all thresholds."""
-    jobs = [partial(judge_track, track, MEANS, RATES) for track in tracks()]
-    return [case for cases in in_processes(jobs, progress=progress) for case in cases]
-
-
-def with_fewer_healthy(count: int, track: Track) -> list[Case]:
-    """Broken droppers held against so many healthy passes over the same line."""
-    return broken_only(track, [drive(track, k) for k in range(count)])
-
-
-def against_other_lines(scatter: float, track: Track) -> list[Case]:
-    """Broken droppers held against healthy passes over other lines alike, whose droppers scatter (m)."""
-    own = replace(track, scatter=scatter)
-    return broken_only(own, [drive(replace(own, seed=own.seed + 1000 * (k + 1)), 0) for k in range(HEALTHY)])
-
-
 def rate_rows(cases: Sequence[Case]) -> list[dict[str, float]]:
     """Share of broken droppers located, and false alarms measured, for each threshold."""
     rows = []
-    for count in MEANS:
-        for rate in RATES:
-            own = [c for c in cases if c.passes == count and c.false_alarms == rate]
-            located, low, high = share([c for c in own if c.kind == BROKEN], lambda case: case.located)
-            measured, _ = alarms_per_10_km(own)
-            rows.append({"passes": count, "rate": rate, "located": located, "low": low, "high": high,
-                         "measured": measured / 10})  # fmt: skip
+    for count, rate in product(MEANS, RATES):
+        own = [c for c in cases if c.passes == count and c.false_alarms == rate]
+        located, low, high = share([c for c in own if c.kind == BROKEN], lambda case: case.located)
+        measured, _ = alarms_per_10_km(own)
+        found = {"located": located, "low": low, "high": high, "measured": measured / 10}
+        rows.append({"passes": count, "rate": rate} | found)
     return rows
 
 
 def reference_table(progress: Progress | None = None) -> Table:
     """Broken droppers by number of healthy passes over the same line, or over other lines instead."""
     here = tracks(REFERENCE_SEEDS, LINES[:1])
-    references = [(f"{count} over the same line", partial(with_fewer_healthy, count)) for count in COUNTS]
-    references += [
-        (
-            f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms",
-            partial(against_other_lines, scatter),
-        )
-        for scatter in SCATTERS
-    ]
-    jobs = [partial(job, track) for _, job in references for track in here]
+    references: dict[str, tuple[int, float | None]] = {
+        f"{count} over the same line": (count, None) for count in COUNTS
+    }
+    for scatter in SCATTERS:
+        words = f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms"
+        references[words] = HEALTHY, scatter
+    jobs = [partial(broken_only, *how, track) for how in references.values() for track in here]
     found = in_processes(jobs, progress=progress)
     rows = []
-    for k, (name, _) in enumerate(references):
+    for k, name in enumerate(references):
         own = [case for cases in found[k * len(here) : (k + 1) * len(here)] for case in cases]
         rows.append((name, *broken_row(own)))
-    headings = ("healthy passes", *BROKEN_HEADINGS)
-    return Table(f"What healthy passes are worth, {LINES[0]}", headings, tuple(rows))
+    return Table(f"What healthy passes are worth, {LINES[0]}", ("healthy passes", *BROKEN_HEADINGS), rows)
 
 
 def plot_rates(rows: Sequence[dict[str, float]]) -> Figure:
     """Share of broken droppers located over the false alarms allowed."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.5, 4.5), layout="constrained")
-    axis = figure.subplots()
+    figure, axis = panels((6.5, 4.5))
     for k, count in enumerate(MEANS):
         own, colour = [row for row in rows if row["passes"] == count], series_colour(k)
-        rate, located = [row["rate"] for row in own], [100 * row["located"] for row in own]
+        rate = [row["rate"] for row in own]
+        located, low, high = ([100 * row[name] for row in own] for name in ("located", "low", "high"))
         axis.semilogx(rate, located, "o-", color=colour, label=f"mean of {count}")
-        low, high = ([100 * row[end] for row in own] for end in ("low", "high"))
         axis.fill_between(rate, low, high, color=colour, alpha=0.15, linewidth=0)
     axis.axhline(100 * WANTED, color=LIMIT, linestyle="--", linewidth=0.9, label=f"bar of {WANTED:.0%}")
     axis.axvline(FALSE_ALARMS, color=LIMIT, linestyle=":", label=f"default of {FALSE_ALARMS:g} per km")
@@ -149,25 +377,23 @@ def plot_rates(rows: Sequence[dict[str, float]]) -> Figure:
 
 def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
     """The paper's claim and our bars."""
-    claim = "failure presence and typology can be identified"
     found = []
     for count in MEANS:
         for speed in SPEEDS_KMH:
-            own = [c for c in cases if usual(c) and c.passes == count and c.track.speed_kmh == speed]
-            located, _, _ = share([c for c in own if c.kind == BROKEN], lambda case: case.located)
-            what = f"broken droppers within an interval, {speed:g} km/h, mean of {count}"
-            found.append(Comparison(what, "%", 100 * located, claim, 100 * WANTED, 100.0))
-        own = [c for c in cases if usual(c) and c.passes == count]
-        what = f"false alarms in 10 km, mean of {count}"
-        found.append(Comparison(what, "", alarms_per_10_km(own)[0], claim, 0.0, 1.0))
+            own = chosen(cases, passes=count, speed_kmh=speed, kind=BROKEN)
+            located, _, _ = share(own, lambda case: case.located)
+            names = {"speed": speed, "count": count, "wanted": 100 * WANTED}
+            found.append(said("diagnosis-broken", 100 * located, **names))
+        alarms, _ = alarms_per_10_km(chosen(cases, passes=count))
+        found.append(said("diagnosis-alarms", alarms, count=count))
     return tuple(found)
 
 
 def example() -> Figure:
     """Picture of a line with a broken dropper, a hard spot and a raised support, each some spans apart."""
     random = np.random.default_rng(EXAMPLE.seed)
-    chosen = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
-    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in chosen)
+    three = ((BROKEN, 1.0, 12), (SPOT, 5.0, 17), (RAISED, 0.05, 22))
+    defects = tuple(draw_defect(EXAMPLE, *each, random) for each in three)
     healthy = [drive(EXAMPLE, k) for k in range(HEALTHY)]
     found = diagnose([drive(EXAMPLE, HEALTHY, defects)], healthy)
     figure = plot_diagnosis(
@@ -180,35 +406,27 @@ def example() -> Figure:
 
 
 def outcome(report: Report) -> Outcome:
-    """Tables, curves and comparisons of the diagnosis."""
+    """Tables, curves and comparisons of the diagnosis: every kind of defect on every track."""
     report("diagnosis", 0.0)
-    cases = all_cases(progress=lambda done, every: report("diagnosis", SHARE * done / every))
+    jobs = [partial(judge_track, track, MEANS, RATES) for track in tracks()]
+    found = in_processes(jobs, progress=lambda done, every: report("diagnosis", SHARE * done / every))
+    cases = [case for own in found for case in own]
     worth = reference_table(
         progress=lambda done, every: report("healthy passes", SHARE + (1 - SHARE) * done / every)
     )
     rates = rate_rows(cases)
-    far = {n: elsewhere_per_10_km([c for c in cases if usual(c) and c.passes == n]) for n in MEANS}
+    plain = [vars(case.track) | dict([*vars(case).items()][1:]) for case in chosen(cases)]  # less the track
+    far = {count: elsewhere_per_10_km(chosen(cases, passes=count)) for count in MEANS}
     return Outcome(
-        title="Paper 2, section 4.2: diagnosis of the overhead line",
-        comparisons=comparisons(cases),
-        tables=(
+        "Paper 2, section 4.2: diagnosis of the overhead line",
+        comparisons(cases),
+        (
             broken_table(cases),
             severity_table(cases),
             smallest_table(cases),
             *(confusion_table(cases, count) for count in MEANS),
             worth,
         ),
-        plots={"diagnosis": example(), "diagnosis-false-alarms": plot_rates(rates)},
-        numbers={
-            "diagnosis": {
-                "cases": [_plain(case) for case in cases if usual(case)],
-                "rates": rates,
-                "findings_far_from_the_defect_in_10_km": far,
-            }
-        },
+        {"diagnosis": example(), "diagnosis-false-alarms": plot_rates(rates)},
+        {"diagnosis": {"cases": plain, "rates": rates, "findings_far_from_the_defect_in_10_km": far}},
     )
-
-
-def _plain(case: Case) -> dict[str, Any]:
-    track = vars(case.track)
-    return track | {name: value for name, value in vars(case).items() if name != "track"}

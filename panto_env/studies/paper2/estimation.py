@@ -8,18 +8,22 @@ noise.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
+from ...base.plotting import ORANGE, legend_above, series_colour
+from ...base.table import Table
 from ...catalog import load_pantograph
-from ...estimation.estimate import estimate
+from ...estimation.estimate import BANDS, COHERENT, Score, estimate, phases, score
 from ...estimation.force import FORCE_MODELS, RandomWalk, as_force_model
-from ...estimation.inertia import inertia_corrected
+from ...estimation.model import PAPER2, EstimatorSettings
 from ...estimation.motion import DISPLACEMENT_NOISE, VELOCITY_NOISE, Motion, measure
 from ...estimation.parameters import (
     LIFT,
@@ -29,12 +33,14 @@ from ...estimation.parameters import (
     information,
     parameter_names,
 )
-from ...estimation.score import BANDS, Score, score
-from ...estimation.settings import PAPER2, EstimatorSettings
-from ...estimation.unknown_input import unknown_input
+from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
-from ...plant.pantograph.build import with_scatter
-from ...plant.pantograph.schema import PantographData
+from ...plant.pantograph.schema import PantographData, with_scatter
+from ...terminal import number
+from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CATENARY, PANTOGRAPH = "en50318-2002", "own-two-mass"
 """The paper's line with both wires and droppers, and its rig's pantograph, static load 120 N."""
@@ -56,6 +62,10 @@ FREE = 1e5
 """Intensity of a random walk (N/s^0.5) of which next to nothing is believed."""
 NOISES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
 """Of displacements, rms (m)."""
+SHOWN = 4.0
+"""Seconds drawn: about five spans at 250 km/h. Own choice."""
+HIGHEST = 20.0
+"""Of the frequencies shown (Hz)."""
 
 
 @dataclass(frozen=True)
@@ -84,32 +94,21 @@ def known_pantograph(seed: int) -> PantographData:
 
 def filtered(force_model: str, lag: float, motion: Motion, known: PantographData, observation: str) -> Array:
     """Contact force (N), (n,), by a Kalman filter with this belief, or a smoother."""
-    settings = EstimatorSettings(
-        observation=observation,
-        force_model=as_force_model(force_model),
-        lag=lag,
-    )
+    settings = EstimatorSettings(observation=observation, force_model=as_force_model(force_model), lag=lag)
     return estimate(motion, known, settings).force
-
-
-def by_unknown_input(motion: Motion, known: PantographData, observation: str) -> Array:
-    """Contact force (N), (n,), of which nothing is believed, low-passed."""
-    settings = EstimatorSettings(observation=observation)
-    return unknown_input(motion, known, settings, cutoff=CUTOFFS[observation])
-
-
-def by_inertia(motion: Motion, known: PantographData, observation: str) -> Array:
-    """Contact force (N), (n,), from the suspension less the head's inertia, low-passed."""
-    velocities = observation == OBSERVATIONS[0]
-    return inertia_corrected(motion, known, velocities=velocities, cutoff=CUTOFFS[observation])
 
 
 METHODS: dict[str, Callable[[Motion, PantographData, str], Array]] = {
     **{f"filter, {name}": partial(filtered, name, 0.0) for name in FORCE_MODELS},
     f"smoother, {1e3 * LAG:g} ms": partial(filtered, "random-walk", LAG),
-    "unknown input": by_unknown_input,
-    "inertia-corrected": by_inertia,
+    "unknown input": lambda motion, known, observation: unknown_input(
+        motion, known, EstimatorSettings(observation=observation), cutoff=CUTOFFS[observation]
+    ),
+    "inertia-corrected": lambda motion, known, observation: inertia_corrected(
+        motion, known, velocities=observation == OBSERVATIONS[0], cutoff=CUTOFFS[observation]
+    ),
 }
+"""Contact force (N), (n,), with these observations: by belief, then by none, which needs a low-pass."""
 
 
 def settled_scores(motion: Motion, force: Array) -> tuple[Score, ...]:
@@ -128,13 +127,8 @@ def cases(
     jobs = [partial(_assess, measure(runs[speed], seed=seed), seed) for speed, seed in keys]
     found = dict(zip(keys, in_processes(jobs, progress=progress), strict=True))
     return [
-        _median(
-            (speed, condition, observation, method),
-            [found[speed, seed][observation, method] for seed in range(SEEDS)],
-        )
-        for speed in speeds_kmh
-        for observation in OBSERVATIONS
-        for method in METHODS
+        _median((speed, condition, *way), [found[speed, seed][way] for seed in range(SEEDS)])
+        for speed, way in product(speeds_kmh, product(OBSERVATIONS, METHODS))
     ]
 
 
@@ -164,9 +158,7 @@ def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
         motion = measure(trajectory, displacement_noise=noise, velocity_noise=velocity)
         for observation in OBSERVATIONS:
             settings = EstimatorSettings(
-                observation=observation,
-                displacement_noise=noise,
-                velocity_noise=velocity,
+                observation=observation, displacement_noise=noise, velocity_noise=velocity
             )
             force = estimate(motion, known_pantograph(0), settings).force
             found[observation, noise] = settled_scores(motion, force)[-1]
@@ -197,4 +189,160 @@ def parameter_information(trajectory: Trajectory) -> ParameterInformation:
         found=found,
         bounds=dict(zip(names, single.tolist(), strict=True)),
         scale=float(np.linalg.eigvalsh(together)[0] ** -0.5),
+    )
+
+
+def ways_table(cases: Sequence[Case]) -> Table:
+    """Every way at the paper's speed, by band."""
+
+    def by_band(what: str, cell: Callable[[Score], str]) -> list[tuple[str, Cell]]:
+        def at(k: int) -> Cell:
+            return lambda case: cell(case.scores[k])
+
+        return [(f"{what}, 0–{band:g} Hz", at(k)) for k, band in enumerate(BANDS)]
+
+    return tabled(
+        f"The estimated force at {SPEED_KMH:g} km/h, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds",
+        [
+            ("observations", "{.observation}"),
+            ("method", "{.method}"),
+            *by_band("correlation", lambda score: number(score.correlation, 4)),
+            *by_band("rms error (N)", lambda score: number(score.rms, 2)),
+            ("all", lambda case: number(case.scores[-1].whole_rms, 2)),
+            ("mean error (N)", lambda case: number(case.scores[-1].bias, 2)),
+            *by_band("late by (ms)", lambda score: number(1e3 * score.delay, 2)),
+            *by_band("by phase (ms)", lambda score: number(1e3 * score.phase_delay, 2))[-1:],
+        ],
+        [case for case in cases if case.speed_kmh == SPEED_KMH],
+        text_columns=2,
+    )
+
+
+def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
+    """One table a quantity, in 0 to 20 Hz: methods and observations down, speeds across."""
+    found = {(case.observation, case.method, case.speed_kmh): case.scores[-1] for case in cases}
+    speeds = sorted({speed for *_, speed in found})
+    ways = list(dict.fromkeys((observation, method) for observation, method, _ in found))
+    quantities: dict[str, Callable[[Score], str]] = {
+        "correlation with the true force": lambda score: number(score.correlation, 4),
+        "rms error without its mean (N)": lambda score: number(score.rms, 2),
+        "delay by cross-correlation (ms)": lambda score: number(1e3 * score.delay, 2),
+    }
+    return tuple(
+        Table(
+            f"Estimated force, {title}, 0 to {BANDS[-1]:g} Hz",
+            ("observations", "method", *(f"{speed:g} km/h" for speed in speeds)),
+            [(*way, *(cell(found[*way, speed]) for speed in speeds)) for way in ways],
+            text_columns=2,
+        )
+        for title, cell in quantities.items()
+    )
+
+
+def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
+    """What noise does to delay and correlation in 0 to 20 Hz."""
+    rows = []
+    for noise in dict.fromkeys(noise for _, noise in scores):
+        both = [scores[observation, noise] for observation in OBSERVATIONS]
+        late = (number(1e3 * each.delay, 2) for each in both)
+        rows.append((f"{1e3 * noise:g}", *late, *(number(each.correlation, 4) for each in both)))
+    title = f"Noise, velocities' in proportion; {SPEED_KMH:g} km/h, 0 to 20 Hz"
+    delays = ("noise of displacements (mm)", "delay, both (ms)", "delay, displacements (ms)")
+    return Table(title, (*delays, "correlation, both", "correlation, displacements"), rows)
+
+
+def parameters_table(estimated: ParameterInformation) -> Table:
+    """True, known and found values, and the minimum uncertainty of each."""
+    true, parameters = load_pantograph(PANTOGRAPH), estimated.found
+    pairs = zip(parameters.values.tolist(), parameters.deviation.tolist(), strict=True)
+    found = dict(zip(parameters.names, pairs, strict=True))
+    rows = []
+    for name, bound in estimated.bounds.items():
+        key, _, place = name.partition(".")
+        cells = ["–"] * 4
+        if place:
+            right, known = (float(getattr(each, key)[int(place) - 1]) for each in (true, estimated.known))
+            cells = [f"{right:g}", f"{100 * (known / right - 1):+.2f}", "not determined", "–"]
+            if name in found:
+                value, deviation = found[name]
+                cells[2:] = f"{100 * (value / right - 1):+.2f}", f"{100 * deviation:.2f}"
+        rows.append((name, *cells, f"{100 * bound:.3g}"))
+    rows.append(("frame and lift by one factor", "–", "–", "–", "–", f"{100 * estimated.scale:.3g}"))
+    headings = ("parameter", "true", "known, error (%)", "found, error (%)", "± (%)", "alone, minimum ± (%)")
+    return Table(
+        "Parameters from one pass by the extended filter; ± is one standard deviation", headings, rows
+    )
+
+
+def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
+    """What the paper says of Figs 11 and 12, at 250 km/h and 120 N, in 0 to 20 Hz."""
+    found = {(case.observation, case.method): case for case in cases if case.speed_kmh == SPEED_KMH}
+    both, one = (found[observation, "filter, random-walk"] for observation in OBSERVATIONS)
+    smoothed = found[OBSERVATIONS[1], "smoother, 100 ms"]
+    note = f"mismatch {100 * MISMATCH:g} %, minimum of {SEEDS} seeds"
+    return (
+        said("estimator-both", both.least_correlation[-1], note=note),
+        said("estimator-one", one.least_correlation[-1], note=note),
+        said("estimator-delay", 1e3 * one.scores[-1].delay),
+        said("estimator-delays", one.scores[-1].delay / both.scores[-1].delay),
+        said("estimator-smoothed", smoothed.least_correlation[-1]),
+    )
+
+
+def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
+    """True and estimated contact force (N), (n,): Fig. 11 with velocities, Fig. 12 without."""
+    assert motion.contact_force is not None
+    shown = (motion.time >= START) & (motion.time <= START + SHOWN)
+    figure, axis = panels((9, 4))
+    axis.plot(motion.time[shown], motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
+    axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
+    axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
+    words = f"as Fig. {11 + OBSERVATIONS.index(observation)} of paper 2, from {observation}"
+    figure.suptitle(f"{words}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %", fontsize="medium")
+    legend_above(axis)
+    axis.grid(color="0.9")
+    return figure
+
+
+def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
+    """Delay by phase over frequency of estimates (N), (n,), by name; only where they are coherent."""
+    assert motion.contact_force is not None
+    kept = slice(round(START / motion.time_step), None)
+    figure, axis = panels((8, 4.2))
+    for k, (name, force) in enumerate(forces.items()):
+        found = phases(motion.contact_force[kept], force[kept], motion.time_step)
+        late = np.where(found.coherence >= COHERENT, 1e3 * found.delay, np.nan)
+        axis.plot(found.frequency, late, "o-", markersize=3, color=series_colour(k), label=name)
+    axis.axhline(0, color="0.4", linewidth=0.8)
+    axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
+    words = f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent"
+    figure.suptitle(words, fontsize="medium")
+    legend_above(axis, 3)
+    axis.grid(color="0.9")
+    return figure
+
+
+def outcome(report: Report) -> Outcome:
+    """Every way at every speed, over noise, which parameters a pass determines, and the figures."""
+    report("estimator: a pass over the line", 0.0)
+    trajectory = run(SPEED_KMH)
+    every = cases(progress=lambda done, all_: report("estimator: every way", 0.05 + 0.75 * done / all_))
+    report("estimator: noise", 0.8)
+    scores = over_noise(trajectory)
+    report("estimator: parameters", 0.9)
+    parameters = parameter_information(trajectory)
+    motion, known = measure(trajectory), known_pantograph(0)
+    by_filter = {kind: filtered("random-walk", 0.0, motion, known, kind) for kind in OBSERVATIONS}
+    late = {f"filter, {kind}": force for kind, force in by_filter.items()}
+    late[f"smoother of {1e3 * LAG:g} ms, {OBSERVATIONS[1]}"] = filtered(
+        "random-walk", LAG, motion, known, OBSERVATIONS[1]
+    )
+    names = ("fig11-displacements-and-velocities", "fig12-displacements")
+    drawn = [figure_11_12(motion, force, kind) for kind, force in by_filter.items()]
+    return Outcome(
+        "Paper 2, section 4.1: the contact force from the pantograph's motion",
+        comparisons(every),
+        (ways_table(every), *over_speed_tables(every), noise_table(scores), parameters_table(parameters)),
+        dict(zip(names, drawn, strict=True)) | {"estimator-delay": delay_plot(motion, late)},
+        {"estimator": [asdict(case) for case in every]},
     )

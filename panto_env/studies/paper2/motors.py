@@ -2,8 +2,13 @@
 
 The pantograph is ``own-motor-head``, the line ``en50318-2002``, the motors ``head-motor``. The paper says
 that actuators on the articulated frame reach low frequencies only and those in the head suspension medium
-ones;
-``at_power`` and ``at_force_limit`` compare frame, head and both under equal terms.
+ones; ``at_power`` and ``at_force_limit`` compare frame, head and both under equal terms.
+
+Then one collector on a bench, controlled by a DC motor (Figs 14 and 15). The collector is half of the head,
+on half of its suspension, whose foot stands still; one of the two motors acts on it. It runs under a contact
+point that moves as that of the line: the strongest harmonics of the span in the height of the contact wire
+over the pantograph, found by a pass along the line without motors. Paper 2 says neither how the collector was
+excited nor what it touched.
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +24,27 @@ from numpy.typing import NDArray
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...base.errors import InputError
+from ...base.plotting import legend_above, series_colour
 from ...base.table import Table
+from ...catalog import load_catenary, load_pantograph
 from ...control import Task
-from ...control.context import Context
+from ...control.observation import Context
 from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
-from ...metrics.spectrum import band_rms
+from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.actuators import actuator_settings
 from ...plant.actuators.motor import MotorActuator
-from ...plant.actuators.motor.arrays import MotorArrays
-from ...plant.actuators.motor.power import MotorPower, motor_power
+from ...plant.actuators.motor.step import MotorArrays
+from ...plant.line_condition import DrawnLine, LineCondition
+from ...plant.numerics import Numerics, Runs
+from ...plant.plant import Plant
 from ...plant.state import Place, Row
+from ...plant.train import Train
+from ..study import Comparison, Outcome, Report, panels, said
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PANTOGRAPH, CATENARY, MOTOR = "own-motor-head", "en50318-2002", "head-motor"
 PLACES = ("frame", "head", "both")
@@ -93,13 +107,6 @@ def rms_by_band(force: Array, time_step: float) -> tuple[float, ...]:
     return tuple(band_rms(force, time_step, *band) for band in BANDS)
 
 
-def spectrum(force: Array, time_step: float) -> tuple[Array, Array]:
-    """Frequencies (Hz) and amplitudes (N) of a force about its mean, sampled every ``time_step`` (s)."""
-    parts = np.fft.rfft(force - force.mean()) / len(force)
-    amplitude = 2 * np.abs(parts)
-    return np.fft.rfftfreq(len(force), time_step), amplitude
-
-
 def without_motors(speed_kmh: float) -> MotorPass:
     """The pantograph as it is, with no motors on it."""
     return _kept(simulate(CATENARY, PANTOGRAPH, speed_kmh, record_droppers=False), "", 0.0, 0.0, 0.0, 0.0)
@@ -113,19 +120,8 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
     Raises InputError where the pass leaves the plant's valid range.
     """
     actuator = cast(MotorActuator, actuator_settings(motor)).model_copy(update={"place": place})
-    task = Task(
-        far_enough(
-            run_settings(
-                {
-                    "catenary": CATENARY,
-                    "pantograph": PANTOGRAPH,
-                    "speed_kmh": speed_kmh,
-                    "actuator": actuator,
-                    "control_interval": CONTROL_INTERVAL,
-                }
-            )
-        )
-    )
+    settings = {"catenary": CATENARY, "pantograph": PANTOGRAPH, "speed_kmh": speed_kmh, "actuator": actuator}
+    task = Task(far_enough(run_settings(settings | {"control_interval": CONTROL_INTERVAL})))
     task.reset(0, np.random.default_rng(0))
     policy, results, plant = ForceFeedback(gain, mean), task.results, task.plant
     policy.reset(task.context(0))
@@ -146,13 +142,10 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
     return _kept(record, place, gain, supplied.sum(), copper.sum(), copper.max() / borne)
 
 
-def _kept(record: Trajectory, place: str, gain: float, power: float, copper: float, heat: float) -> MotorPass:
-    bands, figures = (
-        rms_by_band(record.contact_force[record.inside(SPANS)], record.time_step),
-        record.summary(SPANS),
-    )
-    watts = float(power), float(copper)
-    return MotorPass(record.speed_kmh, place, gain, record, figures, bands, *watts, float(heat))
+def _kept(record: Trajectory, place: str, gain: float, *watts_and_heat: float) -> MotorPass:
+    bands = rms_by_band(record.contact_force[record.inside(SPANS)], record.time_step)
+    kept = map(float, watts_and_heat)
+    return MotorPass(record.speed_kmh, place, gain, record, record.summary(SPANS), bands, *kept)
 
 
 def at_power(speed_kmh: float, place: str, watts: float) -> MotorPass:
@@ -200,48 +193,229 @@ def at_force_limit(speed_kmh: float, place: str, newtons: float, gains: Sequence
     return min(kept, key=lambda one: one.figures.std)
 
 
-def recorded_power(one: MotorPass, place: Place) -> MotorPower:
-    """Current, voltage and watts over a whole pass, from its record; the pantograph has two masses."""
-    motor, record = cast(MotorActuator, actuator_settings(MOTOR)), one.record
-    if place == Place.FRAME:
-        return motor_power(motor, record.frame_force, record.frame_velocity, record.time_step)
-    apart = record.head_velocity - record.frame_velocity
-    return motor_power(motor, record.head_force, apart, record.time_step)
-
-
 def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) -> Table:
     """Change of the contact force's rms by band, sigma, and what it took; the first row has no motors.
 
     Electrical: what the supply gives, net. Mechanical: magnitude of force times speed, as in the benchmark.
     Heat: of the hottest place's armatures, over what they bear; beyond 100 % no train could go on so.
     """
-    headings = [
-        "motors on",
-        "gain",
-        "electrical (W)",
-        "mechanical (W)",
-        "heat (%)",
-        "rms (N)",
-        "F_m (N)",
-        "σ (N)",
-    ]
-    headings += [f"{low:g}–{high:g} Hz (%)" for low, high in BANDS]
+    taken = ("motors on", "gain", "electrical (W)", "mechanical (W)", "heat (%)", "rms (N)")
+    headings = (*taken, "F_m (N)", "σ (N)", *(f"{low:g}–{high:g} Hz (%)" for low, high in BANDS))
     first: list[Any] = ["none", *"–––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
     rows = [(*first, *(f"{rms:.2f} N" for rms in passive.bands))]
     for one in passes:
-        figures, pairs = one.figures, zip(one.bands, passive.bands, strict=True)
-        changes = (f"{100 * (rms / before - 1):+.0f}" for rms, before in pairs)
-        rows.append(
-            (
-                one.place,
-                f"{one.gain:.2f}",
-                f"{one.power:.1f}",
-                f"{one.record.mechanical_power(SPANS):.1f}",
-                f"{100 * one.heat:.0f}",
-                f"{figures.effort:.1f}",
-                f"{figures.mean:.1f}",
-                f"{figures.std:.2f}",
-                *changes,
-            )
-        )
-    return Table(title, tuple(headings), tuple(rows))
+        figures = one.figures
+        watts = f"{one.power:.1f}", f"{one.record.mechanical_power(SPANS):.1f}", f"{100 * one.heat:.0f}"
+        forces = f"{figures.effort:.1f}", f"{figures.mean:.1f}", f"{figures.std:.2f}"
+        changes = (f"{change:+.0f}" for change in _changes(passive, one))
+        rows.append((one.place, f"{one.gain:.2f}", *watts, *forces, *changes))
+    return Table(title, headings, rows)
+
+
+def _changes(passive: MotorPass, one: MotorPass) -> list[float]:
+    """Change of the force's rms in each band (%)."""
+    return [100 * (after / before - 1) for after, before in zip(one.bands, passive.bands, strict=True)]
+
+
+HARMONICS = 4
+"""Of the span, in the motion: as many cosines as a line can have."""
+HIGHEST = 17
+"""Harmonic up to which they are looked for: 20 Hz at 250 km/h."""
+PAD_STIFFNESS, PAD_DAMPING = 25e3, 165.0
+"""Own choice, of a pad between collector and contact point (N/m, N s/m): half of a strip's spring, and half
+of the damper 2 sqrt(T m) that the contact wire is to fast motion, since half of a head is tested."""
+TIME_STEP = 1.25e-3
+RUN_SPANS, SHOWN_SPANS = 24, 16
+"""The bench runs for the time of so many spans, of which the last ones are shown."""
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """The contact force of the collector under one gain."""
+
+    gain: float  # N/N; nan without a motor
+    time: Array  # (n,): s
+    motion: Array  # (n,): of the contact point (m)
+    force: Array  # (n,): N
+    motor_force: Array  # (n,): N
+    bands: tuple[float, ...]  # rms of the contact force in BANDS (N)
+    power: float  # of the motor from the supply, over the whole run (W)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the contact force (N)."""
+        return float(self.force.std())
+
+    @property
+    def spectrum(self) -> tuple[Array, Array]:
+        """Frequencies (Hz) and amplitudes (N) of the contact force about its mean (Fig. 15)."""
+        parts = np.fft.rfft(self.force - self.force.mean()) / len(self.force)
+        return np.fft.rfftfreq(len(self.force), TIME_STEP), 2 * np.abs(parts)
+
+
+def motion_of_line(record: Trajectory) -> Array:
+    """The harmonics of greatest velocity: amplitude (m), turns per metre, phase (turns), (HARMONICS, 3)."""
+    inside = record.inside(SPANS)
+    spans, height = record.alignment.in_spans(record.position[inside]), record.wire[inside]
+    orders = np.arange(1, HIGHEST + 1)
+    parts = 2 * np.mean((height - height.mean()) * np.exp(-2j * np.pi * np.outer(orders, spans)), axis=1)
+    chosen = np.sort(np.argsort(-orders * np.abs(parts))[:HARMONICS])
+    turns = orders[chosen] / record.alignment.mean_length
+    return np.column_stack([np.abs(parts[chosen]), turns, np.angle(parts[chosen]) / (2 * np.pi)])
+
+
+def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
+    """The collector under the contact point of a pass, and proportional control of this gain (N/N).
+
+    None: without a motor. The target force is half of the mean of the pass.
+    """
+    target = 0.5 * float(record.contact_force[record.inside(SPANS)].mean())
+    plant, waves = _bench(record, target, gain is not None)
+    span_time, steps = record.alignment.mean_length / record.speed, round(CONTROL_INTERVAL / TIME_STEP)
+    controls, command = round(RUN_SPANS * span_time / CONTROL_INTERVAL), np.zeros((1, 1, 2))
+    samples = plant.samples(steps * controls + 1)
+    for _ in range(controls):
+        command[0, 0, 1] = (gain or 0.0) * (target - plant.of(0, Row.CONTACT_FORCE))
+        plant.advance(command, steps, samples)
+    time = TIME_STEP * (np.arange(steps * controls) + 0.5)
+    shown = time > time[-1] - SHOWN_SPANS * span_time
+    rows = samples.rows[0, 1:, 0][shown]
+    turns = np.outer(time[shown] * record.speed, waves[:, 1]) + waves[:, 2]
+    motors = plant.actuators
+    supplied = motors.energy(0)[Place.HEAD, 0] if isinstance(motors, MotorArrays) else 0.0
+    return BenchRun(
+        gain=float("nan") if gain is None else gain,
+        time=time[shown],
+        motion=np.cos(2 * np.pi * turns) @ waves[:, 0],
+        force=rows[:, Row.CONTACT_FORCE],
+        motor_force=rows[:, Row.HEAD_FORCE],
+        bands=rms_by_band(rows[:, Row.CONTACT_FORCE], TIME_STEP),
+        power=float(supplied) / (TIME_STEP * steps * controls),
+    )
+
+
+def _bench(record: Trajectory, target: float, driven: bool) -> tuple[Plant, Array]:
+    """The bench at rest under a mean force (N), and the waves that the contact point goes through."""
+    whole = load_pantograph(PANTOGRAPH)
+    suspension = 0.5 * whole.stiffnesses[0]
+    collector = whole.model_copy(
+        update={
+            "masses": (0.5 * whole.masses[0],),
+            "stiffnesses": (suspension,),
+            "dampings": (0.5 * whole.dampings[0],),
+            # The suspension pulls back by what the pad gives way.
+            "static_force": target * (PAD_STIFFNESS + suspension) / PAD_STIFFNESS,
+            "aerodynamic_coefficient": 0.0,
+            "contact_stiffness": PAD_STIFFNESS,
+            "contact_damping": PAD_DAMPING,
+        }
+    )
+    point = load_catenary("periodic-stiffness").model_copy(
+        update={"mean_stiffness": 1e8, "stiffness_variation": 0.0}
+    )
+    # A condition with room for as many waves; theirs are replaced by those of the motion.
+    room = LineCondition(irregularity=1.0, wear_depth=1e-3, wear_wavelength=100.0)
+    motor = actuator_settings(f"{MOTOR}:motors=1,force_limit=50" if driven else "ideal:place=head")
+    plant = Plant(
+        point,
+        Train.of(collector, actuator=motor),
+        numerics=Numerics(time_step=TIME_STEP),
+        runs=Runs(conditions=(room,)),
+    )
+    waves = motion_of_line(record)
+    plant.start(0, record.speed, [DrawnLine(room, waves)])
+    return plant, waves
+
+
+SPEEDS_KMH = (250.0, 300.0)
+WATTS, NEWTONS = 15.0, 50.0
+"""Electrical power of all motors, and maximum force at each place, at which places are compared."""
+BENCH_KMH, BENCH_GAINS = 250.0, (1.0, 2.0, 4.0)
+HEAD_GAIN = 2.0
+"""Of the proportional control on the whole pantograph, beside that of the bench (N/N)."""
+LOW, MEDIUM = 0, (2, 3)
+"""Bands, by their places in BANDS: what "low" and "medium" frequencies are taken to be."""
+LARGE = 0.1
+"""Share of the maximum harmonic from which on a harmonic counts as large."""
+SHOWN = 3.0
+"""Seconds of Fig. 14."""
+
+
+def outcome(report: Report) -> Outcome:
+    """Tables and statements on motors in the head and on the frame, and the bench's figures."""
+    report("one collector on a bench", 0.0)
+    record = without_motors(BENCH_KMH).record
+    bench = [bench_run(record, gain) for gain in (None, *BENCH_GAINS)]
+    tables, numbers = [], {}
+    for k, speed_kmh in enumerate(SPEEDS_KMH):
+        report(f"motors at {speed_kmh:g} km/h", 0.1 + 0.45 * k)
+        passive, at = without_motors(speed_kmh), f"{speed_kmh:g} km/h"
+        at_watts = [at_power(speed_kmh, place, WATTS) for place in PLACES]
+        at_newtons = [at_force_limit(speed_kmh, place, NEWTONS) for place in PLACES]
+        gained = [motor_pass(speed_kmh, "head", HEAD_GAIN, passive.figures.mean)]
+        if k == 0:
+            comparisons = _statements(passive, at_watts[0], at_watts[1], bench[0], bench[2])
+        numbers[at] = {"none": _plain(passive)}
+        for title, words, passes in (
+            (f"Motors at {at} that take {WATTS:g} W", f"{WATTS:g} W", at_watts),
+            (f"Motors of at most {NEWTONS:g} N at {at}", f"{NEWTONS:g} N", at_newtons),
+            (f"Proportional control at {at} by the head's motors", f"gain {HEAD_GAIN:g}", gained),
+        ):
+            tables.append(places_table(title, passive, passes))
+            numbers[at][words] = {one.place: _plain(one) for one in passes}
+    of_bench = [{name: getattr(one, name) for name in ("gain", "std", "bands", "power")} for one in bench]
+    return Outcome(
+        "Paper 2, section 4.3: motors in the head",
+        comparisons,
+        tuple(tables),
+        {"fig14-15-bench": _plot(bench)},
+        {"motors": numbers, "bench": of_bench},
+    )
+
+
+def _statements(
+    passive: MotorPass, frame: MotorPass, head: MotorPass, free: BenchRun, controlled: BenchRun
+) -> tuple[Comparison, ...]:
+    """The paper's words on where actuators work, at equal power, and on the bench."""
+    on_frame, on_head = _changes(passive, frame), _changes(passive, head)
+    names = {
+        "at": f"at {passive.speed_kmh:g} km/h and {WATTS:g} W",
+        "low": f"{BANDS[LOW][0]:g}-{BANDS[LOW][1]:g} Hz",
+        "medium": f"{BANDS[MEDIUM[0]][0]:g}-{BANDS[MEDIUM[-1]][1]:g} Hz",
+    }
+    before, after = free.spectrum[1], controlled.spectrum[1]
+    worst = float((after / np.maximum(before, 1e-9))[before > LARGE * before[1:].max()].max())
+    return (
+        said("motors-frame-low", on_frame[LOW], **names),
+        said("motors-frame-medium", max(on_frame[k] for k in MEDIUM), **names),
+        said("motors-head-medium", max(on_head[k] for k in MEDIUM), **names),
+        said("bench-std", controlled.std / free.std, gain=controlled.gain),
+        said("bench-harmonic", worst, gain=controlled.gain),
+    )
+
+
+def _plain(one: MotorPass) -> dict[str, object]:
+    kept = {"gain": one.gain, "watts": one.power, "heat": one.heat, "bands": one.bands}
+    return kept | {"largest_force": one.largest_force, "figures": one.figures.as_dict()}
+
+
+def _plot(bench: Sequence[BenchRun]) -> Figure:
+    """Fig. 14 and Fig. 15: contact force of the collector on the bench over time, and its spectrum."""
+    figure, (over_time, over_frequency) = panels((10, 7), 2)
+    for k, one in enumerate(bench):
+        label = "without motor" if k == 0 else f"gain {one.gain:g}"
+        style = {"color": "black" if k == 0 else series_colour(k), "linewidth": 1.2}
+        shown = one.time < one.time[0] + SHOWN
+        over_time.plot(one.time[shown] - one.time[0], one.force[shown], label=label, **style)
+        frequency, amplitude = one.spectrum
+        inside = (frequency > 0.2) & (frequency < BANDS[-1][1])
+        over_frequency.plot(frequency[inside], amplitude[inside], **style)
+    over_time.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(0, SHOWN))
+    over_frequency.set(xlabel="frequency (Hz)", ylabel="amplitude (N)", xlim=(0, BANDS[-1][1]))
+    legend_above(over_time, 4)
+    for axis in (over_time, over_frequency):
+        axis.grid(color="0.92")
+    figure.suptitle(
+        f"One collector on a bench, line's motion at {BENCH_KMH:g} km/h, as Figs 14 and 15 of paper 2"
+    )
+    return figure

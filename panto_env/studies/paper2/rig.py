@@ -1,28 +1,21 @@
-"""The rig of section 2 beside the line itself: Figs 5 to 8, and what the paper says of them.
-
-The paper prints no figure of them, so each statement is given a range that its words allow, written down
-before ours was computed.
-"""
+"""The rig of section 2 beside the line itself: Figs 5 to 8, and what the paper says of them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf
 from typing import Any
 
 import numpy as np
 
+from ...base.arrays import from_kmh
 from ...base.errors import InputError
 from ...base.table import Table
-from ...base.units import from_kmh
 from ...catalog import load_pantograph
-from ...metrics.spectrum import amplitudes
-from ...rig.comparison import Pair, compare, rms
-from ...rig.computer import load_rig
-from ...rig.growth import with_values
-from ...rig.plots import plot_pairs
-from ...rig.report import Stability, pair_facts, stability, stability_facts, stability_table
-from ..study import Comparison, Outcome, Report
+from ...metrics.low_pass import amplitudes
+from ...rig.computer import Pair, compare, load_rig, rms
+from ...rig.margins import with_values
+from ...rig.report import pair_facts, plot_pairs, stability, stability_facts, stability_table
+from ..study import Comparison, Outcome, Report, said
 
 PANTOGRAPH, LINE, SPEED_KMH = "own-two-mass", "en50318-2002", 250.0
 RIGS = ("rig", "rig-flexible")
@@ -67,97 +60,43 @@ def statements(pairs: Mapping[str, Pair]) -> tuple[Comparison, ...]:
     """The paper's words on Figs 5 to 8, of its own rig; then what its last sentence expects of droppers."""
     own, flexible = pairs["rig"], pairs["rig-flexible"]
     below, above = own.bands(edges=(BELOW, ABOVE))
-    differ = {name: _difference(own, name) for name in ("head", "contact_force")}
-    passing = _peak(own, *ABOVE)
-    to_20_hz = flexible.bands(edges=[(0.0, 20.0)])[0].error
+    force, _ = own.signals("contact_force")
+    frequency, amplitude = amplitudes(force, own.reference.time_step)
+    inside = (frequency >= ABOVE[0]) & (frequency < ABOVE[1])
     return (
-        Comparison(
-            "collectors' displacement, rig with reference: correlation",
-            "",
-            _correlation(own, "head"),
-            "a satisfactory agreement between the trends (Fig. 5)",
-            0.9,
-            1.0,
-        ),
-        Comparison(
-            "frame's displacement, rig with reference: correlation",
-            "",
-            _correlation(own, "frame"),
-            "the same (Fig. 6)",
-            0.9,
-            1.0,
-        ),
-        Comparison(
-            "relative difference of force over that of collectors",
-            "",
-            differ["contact_force"] / differ["head"],
-            "greater differences arise, of droppers' contribution (Fig. 7)",
-            1.0,
-            inf,
-        ),
-        Comparison(
-            "force up to 5 Hz, rms on the rig over the reference's",
-            "",
-            below.rig / below.reference,
-            "good agreement in amplitude up to 5 Hz (Fig. 8)",
-            0.8,
-            1.25,
-            "K_S, damping, span and the pantograph are not printed; no K_S and damping that we tried gives "
-            "all four harmonics within a fifth",
-        ),
-        Comparison(
-            "force from 10 to 20 Hz, difference over the reference's rms",
-            "",
-            above.error,
-            "substantial differences above 10 Hz (Fig. 8)",
-            0.5,
-            inf,
-        ),
-        Comparison(
-            "strongest harmonic of the reference above 10 Hz",
-            "Hz",
-            passing,
-            "the frequency of droppers passing is above 10 Hz",
-            10.0,
-            12.0,
-        ),
-        Comparison(
-            "the flexible line in the rig: force to 20 Hz, difference over rms",
-            "",
-            to_20_hz,
-            "droppers will extend the range of reproducible frequency (its last sentence)",
-            0.0,
-            0.10,
-        ),
+        said("rig-head", _correlation(own, "head")),
+        said("rig-frame", _correlation(own, "frame")),
+        said("rig-force", _difference(own, "contact_force") / _difference(own, "head")),
+        said("rig-below", below.rig / below.reference),
+        said("rig-above", above.error),
+        said("rig-passing", float(frequency[inside][np.argmax(amplitude[inside])])),
+        said("rig-flexible", flexible.bands(edges=[(0.0, 20.0)])[0].error),
     )
 
 
 def speeds_table(by_speed: Mapping[float, Mapping[str, Pair]]) -> Table:
     """What each rig follows over speed."""
-    rows: list[tuple[str | float, ...]] = []
-    for speed_kmh, pairs in by_speed.items():
-        for name, pair in pairs.items():
-            bands = pair.bands()
-            errors = (f"{100 * band.error:.1f}" for band in bands)
-            rows.append((f"{speed_kmh:g}", name, *errors, f"{pair.followed():g}"))
-    bands = next(iter(next(iter(by_speed.values())).values())).bands()
-    named = (f"{band.low:g}-{band.high:g} Hz" for band in bands)
+    named = [(f"{speed:g}", name, pair) for speed, pairs in by_speed.items() for name, pair in pairs.items()]
+    rows = [
+        (speed, name, *(f"{100 * band.error:.1f}" for band in pair.bands()), f"{pair.followed():g}")
+        for speed, name, pair in named
+    ]
+    bands = (f"{band.low:g}-{band.high:g} Hz" for band in named[0][-1].bands())
     title = "Contact force on the rig: difference from the line itself, % of its rms by band"
-    return Table(title, ("km/h", "rig", *named, "followed to (Hz)"), rows, 2)
+    return Table(title, ("km/h", "rig", *bands, "followed to (Hz)"), rows, 2)
 
 
 def variants_table() -> Table:
     """What limits the rig with the flexible line: one part of it changed at a time."""
-    rows: list[tuple[str | float, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for words, tables in VARIANTS.items():
         try:
             pair = compare(with_values(load_rig("rig-flexible"), tables), LINE, PANTOGRAPH, SPEED_KMH)
         except InputError:
             rows.append((words, "–", "–", "–", "the rig stops"))
             continue
-        to_10, to_20, to_40 = pair.bands(edges=((0.0, 10.0), (10.0, 20.0), (20.0, 40.0)))
-        errors = (f"{100 * band.error:.1f}" for band in (to_10, to_20, to_40))
-        rows.append((words, *errors, f"{pair.followed():g}"))
+        bands = pair.bands(edges=((0.0, 10.0), (10.0, 20.0), (20.0, 40.0)))
+        rows.append((words, *(f"{100 * band.error:.1f}" for band in bands), f"{pair.followed():g}"))
     title = f"rig-flexible, one part changed, {SPEED_KMH:g} km/h: difference of the force, % of its rms"
     return Table(title, ("", "0-10 Hz", "10-20 Hz", "20-40 Hz", "followed to (Hz)"), rows)
 
@@ -184,13 +123,6 @@ def _harmonics(run: Any, once: float) -> Any:
     return 2 / whole * np.abs(turns @ force[:whole])
 
 
-def _peak(pair: Pair, low: float, high: float) -> float:
-    force, _ = pair.signals("contact_force")
-    frequency, amplitude = amplitudes(force, pair.reference.time_step)
-    inside = (frequency >= low) & (frequency < high)
-    return float(frequency[inside][np.argmax(amplitude[inside])])
-
-
 def _correlation(pair: Pair, name: str) -> float:
     return float(np.corrcoef(*pair.signals(name))[0, 1])
 
@@ -213,7 +145,13 @@ def outcome(report: Report) -> Outcome:
     found = {name: stability(load_rig(name), pantograph, SPEED_KMH) for name in RIGS}
     return Outcome(
         title="Paper 2, section 3: the rig beside the line itself",
-        comparisons=(*statements(pairs), *margin_statements(found)),
+        comparisons=(
+            *statements(pairs),
+            *(  # the delay that the loop bears by its frequency response over that which the simulation bears
+                said("rig-margin", each.linear.delay / each.delay, name=name, delay=1e3 * each.delay)
+                for name, each in found.items()
+            ),
+        ),
         tables=(
             harmonics_table(pairs),
             speeds_table(by_speed),
@@ -228,20 +166,4 @@ def outcome(report: Report) -> Outcome:
             },
             "stability": {name: stability_facts(each) for name, each in found.items()},
         },
-    )
-
-
-def margin_statements(found: Mapping[str, Stability]) -> tuple[Comparison, ...]:
-    """The delay that the loop bears by its frequency response over that which the simulation bears."""
-    return tuple(
-        Comparison(
-            f"delay that {name} bears, linear loop over simulation",
-            "",
-            each.linear.delay / each.delay,
-            "no statement: the two must agree",
-            0.9,
-            1.1,
-            f"{1e3 * each.delay:.2f} ms on top of its own, in the simulation",
-        )
-        for name, each in found.items()
     )

@@ -5,9 +5,16 @@ from __future__ import annotations
 from functools import partial
 
 from ..study import Outcome, Report
-from . import closed_loop, diagnosis, estimated_force, estimator, head_motors, rig
+from . import control, diagnosis, estimation, motors, rig
 
-PARTS = (rig, estimator, estimated_force, diagnosis, head_motors, closed_loop)
+PARTS = (
+    rig.outcome,
+    estimation.outcome,
+    control.on_estimated_force,
+    diagnosis.outcome,
+    motors.outcome,
+    control.closed_loop,
+)
 
 
 def run(report: Report) -> Outcome:
@@ -16,7 +23,7 @@ def run(report: Report) -> Outcome:
     def within(part: int, what: str, share: float) -> None:
         report(what, (part + share) / len(PARTS))
 
-    outcomes = [part.outcome(partial(within, k)) for k, part in enumerate(PARTS)]
+    outcomes = [part(partial(within, k)) for k, part in enumerate(PARTS)]
     return Outcome(
         title="Paper 2: rig, estimator, diagnosis and motors in the head",
         comparisons=tuple(comparison for each in outcomes for comparison in each.comparisons),

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ...analysis.parameters import change
 from ...analysis.simulation import simulate
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary, load_pantograph
-from ...metrics import en50367
-from ...metrics.criterion import Criterion
+from ...metrics import compliance as en50367
 from ...metrics.figures import Figures, arcing, contact_loss
 from ...plant.catenary.schema import PowerSystem
 
@@ -64,7 +62,7 @@ class Pass:
     displacement: Array  # (n,): of the head, z_1 (m)
     nominal_force: float  # F(v), Eq. 6 (N)
     figures: Figures  # as EN 50317 sees the same way: force low-passed at 20 Hz
-    compliance: tuple[Criterion, ...]  # with EN 50367
+    within_en50367: dict[str, bool]  # whether each limit of EN 50367 is kept, by its key
 
     @property
     def swing(self) -> float:
@@ -76,16 +74,11 @@ class Pass:
         """Maximum less minimum of the head's displacement (m)."""
         return float(np.ptp(self.displacement))
 
-    @property
-    def within_en50367(self) -> dict[str, bool]:
-        """Whether each limit of EN 50367 is kept, by its key."""
-        return {criterion.key: bool(criterion.kept) for criterion in self.compliance}
-
     def numbers(self) -> dict[str, Any]:
         """Maximum, minimum, mean, σ of force (N) and displacement (mm), and EN 50367's limits."""
         return {
-            "contact_force_n": _statistics(self.force),
-            "displacement_mm": _statistics(1e3 * self.displacement),
+            "contact_force_n": statistics(self.force),
+            "displacement_mm": statistics(1e3 * self.displacement),
             "nominal_force_n": self.nominal_force,
             "contact_lost_percent": contact_loss(self.force),
             "low_passed": self.figures.as_dict(),
@@ -138,7 +131,10 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
         displacement=run.head[shown],
         nominal_force=run.nominal_force,
         figures=figures,
-        compliance=tuple(en50367.criteria(figures, nq, from_kmh(speed_kmh), SYSTEM, "own choice")),
+        within_en50367={
+            each.key: bool(each.kept)
+            for each in en50367.criteria(figures, nq, from_kmh(speed_kmh), SYSTEM, "own choice")
+        },
     )
 
 
@@ -152,10 +148,125 @@ def largest_static_force(one_pass: Pass) -> float:
     return limit / float(one_pass.force.max() / one_pass.nominal_force) - aerodynamic
 
 
-def _statistics(values: Array) -> dict[str, float]:
-    return {
-        "max": float(values.max()),
-        "min": float(values.min()),
-        "mean": float(values.mean()),
-        "sigma": float(values.std()),
-    }
+def statistics(values: Array) -> dict[str, float]:
+    """Extremes, mean and standard deviation."""
+    found = {"max": values.max(), "min": values.min(), "mean": values.mean(), "sigma": values.std()}
+    return {name: float(value) for name, value in found.items()}
+
+
+RUN_TIME = 12.0
+"""How long the paper's simulation runs (s), section 3."""
+POINTS = 601
+
+
+class Equations:
+    """Paper 3's plant at one speed: y' = A(t) y + b, y = (z_1, z_2, z_3, their velocities)."""
+
+    def __init__(self, speed_kmh: float) -> None:
+        """Take the catalogue's parameters."""
+        line, data = load_catenary(CATENARY), load_pantograph(PANTOGRAPH)
+        self._mean: float = line.mean_stiffness  # type: ignore[attr-defined]
+        self._variation: float = line.stiffness_variation  # type: ignore[attr-defined]
+        speed = from_kmh(speed_kmh)
+        self.span = line.alignment().mean_length
+        self.span_time = self.span / speed
+        self.shown = np.linspace(SPANS[0] - 1, SPANS[1], POINTS) * self.span_time
+        self._inertia = np.array(data.masses)[:, None]
+        springs, dampers = _chain(data.stiffnesses), _chain(data.dampings)
+        self._matrix = np.block(
+            [[np.zeros((3, 3)), np.eye(3)], [-springs / self._inertia, -dampers / self._inertia]]
+        )
+        self._push = np.zeros(6)
+        self._push[5] = data.nominal_force(speed) / data.masses[-1]
+
+    def stiffness(self, time: Array | float) -> Array:
+        """Eq. 5 (N/m)."""
+        turns = 2 * np.pi * np.asarray(time) / self.span_time
+        return np.asarray(self._mean * (1 + self._variation * np.cos(turns)))
+
+    def matrix(self, time: float) -> Array:
+        """A at a time (s), (6, 6)."""
+        matrix = self._matrix.copy()
+        matrix[3, 0] -= self.stiffness(time) / self._inertia[0, 0]
+        return matrix
+
+    def natural_frequency(self) -> float:
+        """Lowest natural frequency (Hz) of the pantograph on the mean stiffness."""
+        matrix = self._matrix.copy()
+        matrix[3, 0] -= self._mean / self._inertia[0, 0]
+        swings = np.linalg.eigvals(matrix)
+        return float(np.abs(swings[swings.imag > 0]).min() / (2 * np.pi))
+
+    def contact_force(self, start: Literal["rest", "flat"]) -> Array:
+        """Contact force over the 11th and 12th span (N), (POINTS,), Eq. 8: the contact may pull.
+
+        start: "rest" under F(v) on the spring at the mast, or "flat", all displacements and velocities 0.
+        """
+        from scipy.integrate import solve_ivp  # slow to import
+
+        begin = np.zeros(6) if start == "flat" else np.linalg.solve(self.matrix(0.0), -self._push)
+        solution = solve_ivp(
+            lambda t, y: self.matrix(t) @ y + self._push,
+            (0.0, self.shown[-1]),
+            begin,
+            t_eval=self.shown,
+            rtol=1e-8,
+            atol=1e-11,
+        )
+        return np.asarray(self.stiffness(solution.t) * solution.y[0])
+
+    def growth(self) -> float:
+        """What is left of a disturbance after one span, at most (-): the largest Floquet multiplier.
+
+        Below 1 the motion forgets how it began.
+        """
+        from scipy.integrate import solve_ivp
+
+        solution = solve_ivp(
+            lambda t, y: (self.matrix(t) @ y.reshape(6, 6)).ravel(),
+            (0.0, self.span_time),
+            np.eye(6).ravel(),
+            rtol=1e-8,
+            atol=1e-11,
+        )
+        return float(np.abs(np.linalg.eigvals(solution.y[:, -1].reshape(6, 6))).max())
+
+
+def _chain(values: tuple[float, ...]) -> Array:
+    """Matrix of springs or dampers between three masses, the last to the ground."""
+    first, second, third = values
+    return np.array([[first, -first, 0], [-first, first + second, -second], [0, -second, second + third]])
+
+
+SHARES = (0.10, 0.25, 0.50)
+"""Each parameter is varied by plus and minus so much of its basic value."""
+SHARE = 0.25
+"""The share that the ranking is made with."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Change from (1 - share) to (1 + share) times the basic value, over the basic figure (-)."""
+
+    influence: str  # its key
+    symbol: str
+    share: float
+    std: float  # of the contact force's σ
+    swing: float  # of the contact force's maximum less minimum
+    travel: float  # of the head displacement's maximum less minimum
+
+
+def measure(influence: Influence, share: float, *, bilateral: bool) -> Sensitivity:
+    """Central difference of one parameter's effect at 300 km/h."""
+    low, base, high = (
+        run_pass(influence.parameter, factor * influence.base, bilateral=bilateral)
+        for factor in (1 - share, 1.0, 1 + share)
+    )
+    return Sensitivity(
+        influence=influence.key,
+        symbol=influence.symbol,
+        share=share,
+        std=float((np.std(high.force) - np.std(low.force)) / np.std(base.force)),
+        swing=(high.swing - low.swing) / base.swing,
+        travel=(high.travel - low.travel) / base.travel,
+    )

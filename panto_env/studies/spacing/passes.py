@@ -1,7 +1,14 @@
-"""Passes of two pantographs over their distance, and what the wire does after one alone has passed."""
+"""Passes of two pantographs over their distance, and what the wire does after one alone has passed.
+
+Frequencies at which theories expect the second pantograph to be good and bad by turns, and how they fit.
+
+All say that σ goes up and down with the distance L as cos(2π f L / v − φ), with the frequency at which the
+train passes spans, v / l, or with that of a span's own swing.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,11 +17,10 @@ import numpy as np
 
 from ...analysis.simulation import simulate
 from ...analysis.sweep import Row, sweep
-from ...base.arrays import Array
-from ...base.units import from_kmh
+from ...base.arrays import Array, from_kmh
 from ...catalog import load_catenary
 from ...control import Task
-from ...metrics.labels import NUMBER
+from ...metrics.figures import NUMBER
 from ...plant.state import Row as StateRow
 
 
@@ -116,3 +122,89 @@ def wake(case: Case, speed_kmh: float) -> Wake:
     ]
     height = np.mean(each, axis=0)
     return Wake(time, height, np.gradient(height, INTERVAL))
+
+
+THEORIES = {
+    "span": "whole spans, f = v / l",
+    "half_span": "half spans, f = 2 v / l",
+    "contact_wire": "contact wire as a string, f = c / (2 l)",
+    "both_wires": "both wires as one string, f = c / (2 l)",
+    "measured": "wire after one pantograph, its strongest frequency",
+}
+"""Where a frequency is from, by key."""
+BEST = "best"
+"""Key of the frequency that fits a curve best."""
+SCANNED = np.linspace(0.4, 3.0, 1301)
+"""Frequencies (Hz) among which the best one is looked for."""
+BEGIN = 0.3
+"""Time (s) after a pantograph from which the wire swings freely."""
+PADDED = 16
+"""Factor by which a motion is padded with zeros, to find its strongest frequency between two of its own."""
+
+
+class Fit(NamedTuple):
+    """How a frequency fits a curve of σ over the distance."""
+
+    frequency: float  # Hz
+    correlation: float  # of σ with the cosine in its best phase, 0..1
+    phase: float  # of that: worst distances are (n + phase) v / f, 0..1
+    in_phase: float  # correlation of σ with the cosine in phase, phase 0: whole multiples are worst
+
+
+def frequencies(case: Case, speed_kmh: float, after: Wake) -> dict[str, float]:
+    """Frequencies of ``THEORIES`` (Hz)."""
+    line = load_catenary(case.line)
+    length, per_span = line.alignment().mean_length, from_kmh(speed_kmh) / line.alignment().mean_length
+    wires = [getattr(line, name) for name in ("contact_wire", "messenger_wire")]
+    tensions, masses = [wire.tension for wire in wires], [wire.mass for wire in wires]
+    return {
+        "span": per_span,
+        "half_span": 2 * per_span,
+        "contact_wire": wires[0].wave_speed / (2 * length),
+        "both_wires": math.sqrt(sum(tensions) / sum(masses)) / (2 * length),
+        "measured": strongest(after),
+    }
+
+
+def strongest(after: Wake) -> float:
+    """Strongest frequency (Hz) of the free motion behind a pantograph."""
+    free = after.height[after.time >= BEGIN]
+    count = PADDED * len(free)
+    amplitude = np.abs(np.fft.rfft((free - free.mean()) * np.hanning(len(free)), count))
+    known = np.fft.rfftfreq(count, INTERVAL)
+    possible = (known >= SCANNED[0]) & (known <= SCANNED[-1])
+    return float(known[possible][amplitude[possible].argmax()])
+
+
+def fit(curve: Curve, frequency: float) -> Fit:
+    """Fit of a frequency (Hz) to the second pantograph's σ, by least squares."""
+    angle = 2 * np.pi * frequency * curve.distances / from_kmh(curve.speed_kmh)
+    std = curve.second["std"]
+    terms = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+    found = np.linalg.lstsq(terms, std)[0]
+    _, cosine, sine = found
+    left = std - terms @ found
+    share = max(0.0, 1.0 - float(left.var() / std.var()))
+    phase = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
+    return Fit(frequency, math.sqrt(share), phase, correlation(std, np.cos(angle)))
+
+
+def fits(curve: Curve, after: Wake) -> dict[str, Fit]:
+    """Fits of all theories to a curve, and of the frequency that fits it best."""
+    found = {key: fit(curve, each) for key, each in frequencies(curve.case, curve.speed_kmh, after).items()}
+    best = max((fit(curve, float(each)) for each in SCANNED), key=lambda each: each.correlation)
+    return found | {BEST: best}
+
+
+def at_arrival(curve: Curve, after: Wake) -> dict[str, float]:
+    """Correlations of the second's σ with the wire's height and velocity when it arrives."""
+    arrival = curve.distances / from_kmh(curve.speed_kmh)
+    return {
+        name: correlation(curve.second["std"], np.interp(arrival, after.time, getattr(after, name)))
+        for name in ("height", "velocity")
+    }
+
+
+def correlation(one: Array, other: Array) -> float:
+    """Pearson's coefficient of two series."""
+    return float(np.corrcoef(one, other)[0, 1])

@@ -1,68 +1,267 @@
-"""σ, losses of contact and uplift of two pantographs over their distance, beside theories and others."""
+"""The study's tables, plots, comparisons with others, and verdict."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from ..study import Outcome, Report
-from .passes import CASES, DISTANCES, SPEEDS_KMH, curves, wake
-from .plots import plot_std, plot_uplift
-from .tables import (
-    arrival_comparison,
-    comparisons,
-    distances_table,
-    extremes_table,
-    means,
-    theories_table,
-    verdict,
-)
-from .theories import at_arrival, fits
+import numpy as np
 
+from ...base.arrays import from_kmh
+from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, series_colour
+from ...base.table import Table
+from ...catalog import load_catenary
+from ...metrics.compliance import STD_OF_MEAN
+from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
+from . import passes
+from .passes import BEST, THEORIES, Case, Curve, at_arrival, curves, fits
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EVERY = 10.0
+"""Distance (m) between two rows that are printed; the CSV has all."""
+FAR = 100.0
+"""Distance (m) from which the second is said to hardly touch the first."""
+CLOSE = 0.05
+"""Relative difference within which a finite-element model's σ over spans 4 to 11 should lie."""
 KEPT = ("distances", "speed_kmh", "catenary", "pantograph_number", "pantograph", "spans", "mean", "std",
         "max", "min", "contact_loss", "max_uplift")  # fmt: skip
 """Columns of the CSV."""
+Found = Mapping[str, passes.Fit]
 
 
 def run(report: Report) -> Outcome:
     """Curves of two lines at three speeds, fits of theories, and what others found."""
     by_case, rows = {}, []
-    for k, case in enumerate(CASES):
+    for k, case in enumerate(passes.CASES):
         report(case.line, 0.4 * k)
         by_case[case], own = curves(case)
         rows += [{key: row[key] for key in KEPT} for row in own]
     found, arrivals = [], []
     for k, curve in enumerate(curve for each in by_case.values() for curve in each):
         report("the wire behind one pantograph", 0.8 + 0.03 * k)
-        after = wake(curve.case, curve.speed_kmh)
+        after = passes.wake(curve.case, curve.speed_kmh)
         found.append((curve, fits(curve, after)))
-        arrivals.append(at_arrival(curve, after))
-    by_place = {(curve.case, curve.speed_kmh): curve for curve, _ in found}
+        arrivals.append((curve, at_arrival(curve, after)))
     measured = {(curve.case, curve.speed_kmh): each["measured"] for curve, each in found}
     report("plots", 0.98)
-    said = verdict(found)
-    numbers: dict[str, Any] = {
-        "distances_m": list(DISTANCES),
-        "speeds_kmh": list(SPEEDS_KMH),
-        "mean_correlation": means(found),
-        "fits": [
-            {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
-            | {key: each._asdict() for key, each in own.items()}
-            for (curve, own), arrival in zip(found, arrivals, strict=True)
-        ],
-    }
     return Outcome(
         title="Two pantographs: ours beside others",
-        comparisons=(
-            *comparisons(by_place, CASES[0]),
-            arrival_comparison([each["velocity"] for each in arrivals]),
-        ),
+        comparisons=tuple(_comparisons(by_case, arrivals)),
         tables=(
             *(distances_table(each) for each in by_case.values()),
-            extremes_table([(curve, arrival) for (curve, _), arrival in zip(found, arrivals, strict=True)]),
+            extremes_table(arrivals),
             theories_table(found),
         ),
         plots={"spacing-sigma": plot_std(by_case, measured), "spacing-uplift": plot_uplift(by_case)},
-        numbers=numbers,
+        numbers={
+            "distances_m": list(passes.DISTANCES),
+            "speeds_kmh": list(passes.SPEEDS_KMH),
+            "mean_correlation": means(found),
+            "fits": [
+                {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
+                | {key: each._asdict() for key, each in own.items()}
+                for (curve, own), (_, arrival) in zip(found, arrivals, strict=True)
+            ],
+        },
         rows={"spacing": rows},
-        verdict=said,
+        verdict=verdict(found),
     )
+
+
+def distances_table(curves: Sequence[Curve]) -> Table:
+    """σ, loss of contact and uplift of the second, and σ of the first, of one line at all speeds."""
+    first = curves[0]
+
+    def cell(curve: Curve, whose: str, key: str, digits: int, scale: float) -> Cell:
+        return lambda k: f"{scale * getattr(curve, whose)[key][k]:.{digits}f}"
+
+    return tabled(
+        f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)",
+        (
+            ("distance (m)", lambda k: f"{first.distances[k]:g}"),
+            *(
+                (f"{name}, {curve.speed_kmh:g}", cell(curve, whose, key, digits, scale))
+                for name, whose, key, digits, scale in (
+                    ("σ (N)", "second", "std", 1, 1.0),
+                    ("σ of the first (N)", "first", "std", 1, 1.0),
+                    ("CL (%)", "second", "contact_loss", 2, 1.0),
+                    ("uplift (mm)", "second", "max_uplift", 1, 1e3),
+                )
+                for curve in curves
+            ),
+        ),
+        np.flatnonzero((first.distances - first.distances[0]) % EVERY < 1e-9).tolist(),
+        text_columns=0,
+    )
+
+
+def extremes_table(found: Sequence[tuple[Curve, Mapping[str, float]]]) -> Table:
+    """Best and worst distances by line and speed, and how σ goes with the wire when the second arrives.
+
+    found: curves, and correlations of ``at_arrival``.
+    """
+    rows = []
+    for curve, arrival in found:
+        std, first, speed = curve.second["std"], curve.first["std"], f"{curve.speed_kmh:g}"
+        uplift, over = 1e3 * curve.second["max_uplift"], std > STD_OF_MEAN * curve.second["mean"]
+        extremes = (f"{std[k]:.1f} at {curve.distances[k]:g}" for k in (std.argmin(), std.argmax()))
+        shares = (f"{100 * np.mean(share):.0f}" for share in (std < first, over))
+        loss = f"{curve.second['contact_loss'].max():.1f}", f"{uplift.min():.0f} to {uplift.max():.0f}"
+        correlations = (f"{arrival[name]:+.2f}" for name in ("height", "velocity"))
+        case = curve.case.line, speed, f"{np.median(first):.1f}"
+        rows.append((*case, *extremes, *shares, *loss, *correlations))
+    sigma = ("line", "km/h", "σ of the first (N)", "second, lowest σ (N) at (m)", "highest σ (N) at (m)")
+    others = ("below the first (%)", "over 0.3 F_m (%)", "highest CL (%)", "uplift (mm)")
+    title = "Distances of 35 to 400 m; r: σ with the wire's height and velocity when the second arrives"
+    return Table(title, (*sigma, *others, "r with height", "r with velocity"), rows, text_columns=2)
+
+
+def theories_table(found: Sequence[tuple[Curve, Found]]) -> Table:
+    """Frequency, period of the distance, correlation and phase of every theory, curve by curve."""
+    names = THEORIES | {BEST: "frequency that fits best"}
+    return tabled(
+        "Second pantograph's σ over the distance L: correlation with cos 2π(f L / v − phase)",
+        (
+            ("line", "{0[0].case.line}"),
+            ("km/h", "{0[0].speed_kmh:g}"),
+            ("theory", lambda each: names[each[1]]),
+            ("f (Hz)", "{0[2].frequency:.2f}"),
+            ("v / f (m)", lambda each: f"{from_kmh(each[0].speed_kmh) / each[2].frequency:.1f}"),
+            ("R", "{0[2].correlation:.2f}"),
+            ("r in phase", "{0[2].in_phase:+.2f}"),
+            ("phase", "{0[2].phase:.2f}"),
+        ),
+        [(curve, key, each) for curve, fitted in found for key, each in fitted.items()],
+        text_columns=3,
+        section=lambda each: (each[0].case, each[0].speed_kmh),
+    )
+
+
+def means(found: Sequence[tuple[Curve, Found]]) -> dict[str, float]:
+    """Mean correlation of each theory over all curves."""
+    return {key: float(np.mean([fits[key].correlation for _, fits in found])) for key in (*THEORIES, BEST)}
+
+
+def verdict(found: Sequence[tuple[Curve, Found]]) -> str:
+    """Which theory fits, as a sentence."""
+    mean = means(found)
+    first, *others = sorted(THEORIES, key=lambda key: -mean[key])
+    ranking = ", ".join(f"{THEORIES[key]}: {mean[key]:.2f}" for key in others)
+    lowest = min(fits[first].correlation for _, fits in found)
+    phases = [fits[first].phase for _, fits in found]
+    return (
+        f"The second pantograph's σ follows the distance with the period v / f of: {THEORIES[first]} (mean R "
+        f"{mean[first]:.2f}, lowest {lowest:.2f}; the best possible frequency reaches {mean[BEST]:.2f}); the "
+        f"others do not ({ranking}). Worst are the distances (n + phase) v / f with a phase of "
+        f"{min(phases):.2f} to {max(phases):.2f} by line and speed, so a distance is good or bad for one "
+        "speed only."
+    )
+
+
+def _comparisons(
+    by_case: Mapping[Case, Sequence[Curve]], arrivals: Sequence[tuple[Curve, Mapping[str, float]]]
+) -> Iterator[Comparison]:
+    """Ours beside others, those of the reference line; arrivals: correlations of ``at_arrival``."""
+    at = {curve.speed_kmh: curve for curve in by_case[passes.CASES[0]]}
+
+    def std(speed: float, *distances: float, whose: str = "second") -> float:
+        curve = at[speed]
+        places = [int(np.abs(curve.distances - distance).argmin()) for distance in distances]
+        return float(np.mean(getattr(curve, whose)["std"][places]))
+
+    for whose, speed, distance, judged in (
+        ("second", 250.0, 100.0, 51.4),
+        ("second", 250.0, 200.0, 22.0),
+        ("first", 250.0, 200.0, 26.9),
+        ("second", 300.0, 200.0, 51.6),
+    ):
+        names: dict[str, Any] = {
+            "whose": f"{whose}'s",
+            "distance": distance,
+            "speed": speed,
+            "judged": judged,
+        }
+        names |= {"low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
+        yield said("spacing-std", std(speed, distance, whose=whose), **names)
+    ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in passes.SPEEDS_KMH}
+    other = ", ".join(f"{ratios[speed]:.2f} at {speed:g}" for speed in (200.0, 300.0))
+    yield said("spacing-ratio", ratios[250.0], other=other)
+    firsts = [curve.first["std"][curve.distances >= FAR] for curve, _ in arrivals]
+    changes = [100 * (first / np.median(first) - 1) for first in firsts]
+    largest = max(float(np.abs(each).max()) for each in changes)
+    change = max(float(np.sqrt(np.mean(each**2))) for each in changes)
+    yield said("spacing-first", change, far=FAR, largest=largest)
+    velocities = [arrival["velocity"] for _, arrival in arrivals]
+    low, high = min(velocities), max(velocities)
+    yield said("spacing-arrival", float(np.mean(velocities)), low=low, high=high)
+
+
+def plot_std(curves: Mapping[Case, Sequence[Curve]], fits: Mapping[tuple[Case, float], passes.Fit]) -> Figure:
+    """σ over the distance, a column for each line and a row for each speed.
+
+    fits: of the frequency measured behind one pantograph, by line and speed.
+    """
+    count = len(next(iter(curves.values())))  # of speeds
+    figure, axes = panels(
+        (14, 2.9 * count + 0.8), count, len(curves), sharex=True, sharey="col", squeeze=False
+    )
+    for column, (case, of_line) in zip(axes.T, curves.items(), strict=True):
+        length = load_catenary(case.line).alignment().mean_length
+        for axis, curve in zip(column, of_line, strict=True):
+            best, distances = fits[case, curve.speed_kmh], curve.distances
+            axis.plot(distances, curve.second["std"], color=VERMILION, label="second pantograph")
+            axis.plot(distances, curve.first["std"], color=BLUE, label="first pantograph")
+            period = from_kmh(curve.speed_kmh) / best.frequency
+            swing = _wave(curve, best)
+            axis.plot(
+                distances, swing, "--", color=GREEN, linewidth=1.6,
+                label="period v / f of the wire's own swing behind one pantograph, fitted height and phase",
+            )  # fmt: skip
+            limit = STD_OF_MEAN * float(np.median(curve.second["mean"]))
+            axis.axhline(limit, color=LIMIT, linestyle=":", linewidth=1.0, label="EN 50367: 0.3 of the mean")
+            for k in range(1, int(distances[-1] / length) + 1):
+                label = "whole spans" if k == 1 else None
+                axis.axvline(k * length, color="0.82", linewidth=0.9, zorder=0, label=label)
+            words = f"{curve.speed_kmh:g} km/h: f = {best.frequency:.2f} Hz, v / f = {period:.0f} m"
+            axis.set_title(f"{words}, R = {best.correlation:.2f}", fontsize="medium", loc="left")
+            axis.set(ylabel="σ (N)", xlim=(distances[0], distances[-1]))
+        column[0].set_ylim(0, 1.05 * max(float(curve.second["std"].max()) for curve in of_line))
+        column[0].set_title(
+            f"{case.pantograph} twice on {case.line}\n{column[0].get_title(loc='left')}", loc="left",
+            fontsize="medium",
+        )  # fmt: skip
+        column[-1].set(xlabel="distance between the pantographs (m)")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="medium")
+    return figure
+
+
+def plot_uplift(curves: Mapping[Case, Sequence[Curve]]) -> Figure:
+    """Uplift at the supports, and the second one's losses of contact, a column for each line."""
+    figure, axes = panels((14, 6), 2, len(curves), sharex=True, sharey="row", squeeze=False)
+    for (uplift, loss), (case, of_line) in zip(axes.T, curves.items(), strict=True):
+        for k, curve in enumerate(of_line):
+            colour, label = series_colour(k), f"{curve.speed_kmh:g} km/h"
+            uplift.plot(curve.distances, 1e3 * curve.second["max_uplift"], color=colour, label=label)
+            loss.plot(curve.distances, curve.second["contact_loss"], color=colour, label=label)
+        uplift.set_title(f"{case.pantograph} twice on {case.line}", fontsize="medium", loc="left")
+        uplift.set(ylabel="maximum uplift at the supports (mm)")
+        loss.set(ylabel="contact loss of the second (%)", xlabel="distance between the pantographs (m)")
+        loss.set_xlim(of_line[0].distances[0], of_line[0].distances[-1])
+        for axis in (uplift, loss):
+            axis.grid(color="0.9")
+    for row in axes:  # now: all of a row have one scale
+        row[0].set_ylim(bottom=0)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="medium"
+    )
+    return figure
+
+
+def _wave(curve: Curve, best: passes.Fit) -> np.ndarray:
+    """The cosine of a fit, with the height and the mean that fit σ, (n,)."""
+    angle = 2 * np.pi * (best.frequency * curve.distances / from_kmh(curve.speed_kmh) - best.phase)
+    slope, mean = np.polyfit(np.cos(angle), curve.second["std"], 1)
+    return np.asarray(mean + slope * np.cos(angle))

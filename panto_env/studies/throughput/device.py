@@ -18,7 +18,7 @@ from ...control.state import TaskRow
 from ...envs import IDS
 from ...envs.tensors import PantographTensorEnv, usable_device
 from ...plant.state import Row
-from .plants import Report
+from .study import Report
 
 LANES = (1, 32, 1024, 8192, 65_536, 262_144, 1_048_576)
 CASES: dict[str, tuple[str, dict[str, Any]]] = {

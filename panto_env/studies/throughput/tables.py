@@ -1,12 +1,18 @@
-"""What ``panto speed`` says of its measurements: tables and sentences, for the terminal and as Markdown."""
+"""What ``panto speed`` says of its measurements: tables and sentences, as Markdown too, and plots."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ...base.plotting import legend_above, series_colour
 from ...base.table import Table
-from .plants import COUNTED, LINE_SPANS, SPEED_KMH
+from ..study import panels, tabled
+from .study import COUNTED, LINE_SPANS, SPEED_KMH
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BEGIN, END = "<!-- panto speed --markdown -->", "<!-- end -->"
 """Between these a document holds what the command printed."""
@@ -125,21 +131,33 @@ def _limits(roofline: Row) -> str:
 
 
 def _plants(title: str, key: str, rows: Sequence[tuple[str, Row]]) -> Table:
-    headings = (key, "× real time", "slowest", "fastest", "first call (s)")
-    cells = []
-    for label, row in rows:
-        factors = (f"{row[name]:,.0f}" for name in ("times_real_time", "slowest", "fastest"))
-        cells.append((label, *factors, f"{row['first_call']:.2f}"))
-    return Table(title, headings, cells)
+    return tabled(
+        title,
+        (
+            (key, "{[0]}"),
+            ("× real time", "{[1][times_real_time]:,.0f}"),
+            ("slowest", "{[1][slowest]:,.0f}"),
+            ("fastest", "{[1][fastest]:,.0f}"),
+            ("first call (s)", "{[1][first_call]:.2f}"),
+        ),
+        rows,
+    )
 
 
 def _environments(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
-    cells = []
-    for label, row in rows:
-        rates = (f"{row[name]:,.0f}" for name in ("steps_per_second", "slowest", "fastest"))
-        reference = f"{row['yardstick_steps_per_second']:,.0f}"
-        cells.append((label, *rates, row["yardstick"], reference, f"{row['ratio']:.2g}"))
-    return Table(title, ("environment", "steps/s", "slowest", "fastest", "yardstick", "its", "ratio"), cells)
+    return tabled(
+        title,
+        (
+            ("environment", "{[0]}"),
+            ("steps/s", "{[1][steps_per_second]:,.0f}"),
+            ("slowest", "{[1][slowest]:,.0f}"),
+            ("fastest", "{[1][fastest]:,.0f}"),
+            ("yardstick", "{[1][yardstick]}"),
+            ("its", "{[1][yardstick_steps_per_second]:,.0f}"),
+            ("ratio", "{[1][ratio]:.2g}"),
+        ),
+        rows,
+    )
 
 
 def _environment(row: Row) -> str:
@@ -149,3 +167,59 @@ def _environment(row: Row) -> str:
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def plot_speed(result: Row) -> Figure:
+    """How cost grows on a machine: plants over spans and modes, vector environments over lanes, cores."""
+    figure, ((by_spans, by_modes), (by_lanes, by_cores)) = panels((10, 8), 2, 2)
+    scaling = result["scaling"]
+    _draw_plants(by_spans, scaling["spans"], "spans", "spans computed, flexible catenary")
+    _draw_plants(by_modes, scaling["modes"], "modes", "modes, three-span catenary")
+    _draw_lanes(by_lanes, [row for row in result["environments"] if row["lanes"] is not None])
+    _draw_cores(by_cores, scaling["cores"])
+    for axis in figure.axes:
+        axis.grid(color="0.9")
+    figure.suptitle(f"{result['machine']['processor']}, medians of {result['repeats']}")
+    return figure
+
+
+def _draw_plants(axis: Axes, rows: Sequence[Row], key: str, label: str) -> None:
+    values = [row[key] for row in rows]
+    axis.plot(values, [1e3 / row["times_real_time"] for row in rows], "o-", color=series_colour(0))
+    axis.set(xlabel=label, ylabel="one core, ms per simulated second", xticks=values)
+    axis.set(xlim=(0, None), ylim=(0, None))
+
+
+def _draw_lanes(axis: Axes, rows: Sequence[Row]) -> None:
+    for k, (name, of_environment) in enumerate(_by_environment(rows).items()):
+        rates = [row["steps_per_second"] for row in of_environment]
+        lanes = [row["lanes"] for row in of_environment]
+        axis.loglog(lanes, rates, "o-", color=series_colour(k), label=name)
+    widest = max(_by_environment(rows).values(), key=lambda its: its[-1]["lanes"])
+    rates = [row["yardstick_steps_per_second"] for row in widest]
+    axis.loglog([row["lanes"] for row in widest], rates, "s:", color="0.5", label=widest[0]["yardstick"])
+    axis.set(xlabel="lanes, on all cores", ylabel="environment steps per second")
+    legend_above(axis, 2)
+
+
+def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
+    """Steps per second over those on one core, the first row of each environment."""
+    if not rows:
+        axis.set_axis_off()
+        axis.text(0.5, 0.5, "cores can't be chosen on this platform", ha="center")
+        return
+    counts = sorted({row["cores"] for row in rows})
+    for k, (name, lanes) in enumerate(dict.fromkeys((row["id"], row["lanes"]) for row in rows)):
+        own = [row for row in rows if (row["id"], row["lanes"]) == (name, lanes)]
+        gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
+        axis.plot(
+            [row["cores"] for row in own], gain, "o-", color=series_colour(k), label=f"{name}, {lanes} lanes"
+        )
+    axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
+    axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
+    legend_above(axis, 2)
+
+
+def _by_environment(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    names = dict.fromkeys(row["id"] for row in rows)
+    return {name: [row for row in rows if row["id"] == name] for name in names}

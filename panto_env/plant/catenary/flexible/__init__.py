@@ -14,8 +14,8 @@ are anchors where the line ends and absorb waves elsewhere. A window of all span
 
 from ..protocol import CatenaryKind
 from . import step as step
-from .clear import clear_spans, warn_if_short
 from .model import FlexibleCatenary
+from .resolution import clear_spans, warn_if_short
 from .schema import FlexibleCatenaryData
 from .static import hang
 

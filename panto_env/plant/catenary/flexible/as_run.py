@@ -1,28 +1,94 @@
-"""A line at rest as it is run: with the tensions that its condition leaves, beside the line as designed.
+"""A line at rest as it is run, beside the line as designed, and its elasticity (EN 50119): uplift per newton.
 
-What lies along the whole line counts: lost tension, temperature and ice. Errors that are drawn, those of
-single droppers and supports, and wear are left out.
+What lies along the whole line counts: lost tension, temperature and ice; errors that are drawn, those of
+single droppers and supports, and wear are left out. For the elasticity a line of a few spans is solved at
+rest for a force at many places of its middle span, and a line whose spans differ as a whole, for each of
+them. Droppers that the force would compress go slack.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
-from ....base.arrays import Array
+import numpy as np
+
+from ....base.arrays import Array, to_kmh
 from ....base.table import Table
-from ....base.units import to_kmh
 from ...line_condition import NEW, LineCondition
-from .attached import dropper_positions
-from .defects import DefectiveLine
-from .dropper_table import RestingDropper, dropper_table, droppers_at_rest
-from .elasticity import elasticity, non_uniformity
+from .defects import DefectiveLine, shape_left, with_tension_left
 from .fixed_wires import SPANS, tensions_of_fixed
+from .on_grid import dropper_positions
 from .overlaps import tension_lengths
-from .parts import Conductor
+from .parts import Conductor, Span, places_of
 from .schema import FlexibleCatenaryData
-from .static import solve
-from .tension import shape_left, with_tension_left
+from .spans import spans_of
+from .static import RestingDropper, dropper_table, droppers_at_rest, solve
+
+SPANS_OF_ELASTICITY = 5
+"""Number of spans in the computation: the neighbours of the middle one count, further ones hardly do."""
+PLACES = 48
+"""Number of equal intervals between the places of the force in a span; droppers, where the wire is stiffest,
+are places too."""
+
+
+def elasticity(
+    line: FlexibleCatenaryData,
+    force: float,
+    condition: LineCondition = NEW,
+    tensions: tuple[float, float] = (1.0, 1.0),
+) -> tuple[Array, Array]:
+    """Places in a span (m) and the uplift of the contact wire there per newton (m/N), (places,) each.
+
+    The places are equally far apart, with those of the droppers in between.
+
+    force: at the place (N). The larger it is, the more droppers go slack. Where spans differ, places are
+    along the line, in all spans but the first and the last, at whose ends anchors hold the wires; in an
+    overlap the uplift is that of the wire in use alone. condition, tensions: as ``DefectiveLine`` takes them.
+    """
+    if not line.sequence:
+        places = _places(spans_of(line).each[0], 0.0, line.span_length)
+        whole = DefectiveLine(line, SPANS_OF_ELASTICITY, condition, tensions, places.tolist())
+        return places, _lifts(whole, places + SPANS_OF_ELASTICITY // 2 * line.span_length, force)
+    found: list[tuple[Array, Array]] = []
+    for span, (begin, end) in zip(
+        spans_of(line).each[1:-1], pairwise(line.alignment().supports[1:-1]), strict=True
+    ):
+        places = _places(span, begin, end)
+        lifts = np.zeros(len(places))
+        for part in tension_lengths(line):
+            used = (places >= part.in_use[0]) & (places <= part.in_use[1])
+            if used.any():
+                own = places[used] - part.begin
+                whole = DefectiveLine(part.line, part.spans, condition, tensions, own.tolist())
+                lifts[used] = _lifts(whole, own, force)
+        found.append((places, lifts))
+    return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
+
+
+def per_span(places: Array, lifts: Array) -> list[Array]:
+    """What ``elasticity`` found, span by span."""
+    return np.split(lifts, np.flatnonzero(np.diff(places) <= 0) + 1)
+
+
+def _places(span: Span, begin: float, end: float) -> Array:
+    """Places of the force (m), those of droppers among them, in a span from begin to end."""
+    droppers = begin + np.array(span.droppers.positions)
+    return places_of([begin, *droppers, end], np.linspace(begin, end, PLACES + 1))
+
+
+def _lifts(whole: DefectiveLine, places: Array, force: float) -> Array:
+    """Uplift per newton (m/N) at nodes of a line under a force there (N)."""
+    rest = whole.rise(whole.solve()).height(places)  # 0 as designed
+    lifted = [whole.rise(whole.solve(pushed=(float(x), force))).height(np.array([x]))[0] for x in places]
+    return np.asarray((np.array(lifted) - rest) / force)
+
+
+def non_uniformity(elasticities: Array) -> float:
+    """EN 50119's degree of non-uniformity (%): (maximum - minimum) / (maximum + minimum)."""
+    maximum, minimum = float(elasticities.max()), float(elasticities.min())
+    return 100 * (maximum - minimum) / (maximum + minimum)
 
 
 class AsRun(NamedTuple):

@@ -14,27 +14,19 @@ from numpy.typing import DTypeLike
 
 from ....backend import WIDTH, bind, called, kernel, load_row, open_packed, pack, store_row
 from ....base.arrays import Array
-from ...side_wind import SHORTEST_WAVE, SIDE_ROWS
-from ...trigonometry import cosine_of_turns, sine_of_turns
+from ...functions import cosine_of_turns, sine_of_turns
+from ...wind import SHORTEST_WAVE, SIDE_ROWS
 from ..protocol import advance_wire, end_step
 from ..schema import Wire
-from .arrays import PAD, STENCIL, FlexibleLine, FlexibleWire
-from .blown_arrays import Air, Gusts
+from .arrays import PAD, STENCIL, Air, FlexibleLine, FlexibleWire, Gusts
 
-AIR_DENSITY = 1.225
-"""kg/m^3, at 15 degrees and sea level."""
-DRAG = 1.2
-"""C_D of a wire: that of a smooth cylinder at Reynolds numbers from 1e3 to 1e5."""
-COPPER, ICE = 8900.0, 900.0
-"""kg/m^3."""
-STRAND = 0.76
-"""Share of a strand's circle that is metal, for a messenger (nineteen wires)."""
-HEAVIEST = 1.6
-"""Metal of one wire (kg/m); a heavier one stands for two side by side, each in the wind."""
-POINTS_PER_WAVE = 6
-"""Of the shortest gusts along the track."""
-INTERVAL = 0.01
-"""Time between two computations of the gusts (s): ten in the quickest one at 30 m/s."""
+AIR_DENSITY = 1.225  # kg/m^3, at 15 degrees and sea level
+DRAG = 1.2  # C_D of a wire: that of a smooth cylinder at Reynolds numbers from 1e3 to 1e5
+COPPER, ICE = 8900.0, 900.0  # kg/m^3
+STRAND = 0.76  # share of a strand's circle that is metal, for a messenger (nineteen wires)
+HEAVIEST = 1.6  # metal of one wire (kg/m); a heavier one stands for two side by side, each in the wind
+POINTS_PER_WAVE = 6  # of the shortest gusts along the track
+INTERVAL = 0.01  # time between two computations of the gusts (s): ten in the quickest one at 30 m/s
 SETTLED = 2.0
 """Time for which wires are blown upon before a run, in time constants of the damping by wind and wire: their
 variance is within 2 % of its steady value. A time constant is 1 / (alpha / 2 + drag / 2)."""

@@ -8,25 +8,23 @@ import numpy as np
 
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
 from ....base.arrays import Array
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
 from ...numerics import Numerics
-from ...valid_range import LARGEST_SPEED
+from ...state import LARGEST_SPEED
 from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
-from .attached import joined_springs, links_of, springs_of
-from .beams import Located, Profile, located
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
-from .near_build import near_droppers
-from .on_grid import in_equal_rows, on_grid
-from .overlaps import heights_of_pair, pairs_of, tension_lengths
+from .near import near_droppers
+from .on_grid import in_equal_rows, joined_springs, links_of, on_grid, springs_of
+from .overlaps import heights_of_pair, moving_stitches, pairs_of, tension_lengths
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
-from .segments import lay_out, places
+from .shape import Located, Profile, located
 from .static import StaticShape
-from .stitches import moving_stitches
 from .wire_defects import NO_DEFECTS, WireDefects
+from .wires import lay_out, places
 
 SHAPE_SPACING = 0.05  # m, of the table of the static height; EI rounds kinks over about 0.1 m
 MOST_NODES = 1_000_000
@@ -76,7 +74,7 @@ def constants(
         springs = springs_of(part, masts, resolution.time_step, wrong.springs_of_nodes(x, dx))
         begin, end = part.in_use
         used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
-        held.append((part, springs._replace(number=np.where(used, springs.number, -1))))
+        held.append(springs._replace(number=np.where(used, springs.number, -1)))
     ropes = moving_stitches(data, covered)
     links = links_of(data, covered, shape, ropes)
     grid = on_grid(data, shape, joined_springs(held), links, ropes, covered, x, resolution.time_step, defects)
@@ -166,7 +164,6 @@ def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Arr
 
 @remembered
 def _table(period: float, breaks: tuple[float, ...], repeats: bool) -> Located:
-    """Places of the table of the static height: the same for all tensions."""
     return located(np.array(breaks), _table_places(period), repeats)
 
 

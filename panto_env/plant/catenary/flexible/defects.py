@@ -1,33 +1,113 @@
 """Static state of a whole line at rest, with defects of its droppers, supports and wires.
 
+Its droppers and steady arms were cut and set for the design's wires. A line designed for the tension that is
+left, and for wires with ice, would have other droppers: the real ones are too long or too short by the
+difference.
+
 Droppers apart, the wires are linear, so only the change about the static shape as designed is solved for:
 two tensioned beams along the whole line, hinged at its anchors, on the springs of supports, steady arms
-and taut droppers. Nodes of their exact elements (``beams``) stand at supports, droppers and defects of the
-contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
+and taut droppers. Nodes of their exact elements (``shape.Beams``) stand at supports, droppers and defects of
+the contact wire itself. The matrix is banded, and a line of any length costs a few times its nodes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
-from .arrays import CONTACT, MESSENGER, FlexibleLine
-from .beams import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
+from .arrays import CONTACT, MESSENGER
+from .overlaps import as_wire, joined, moving, stitches_of, tension_lengths
 from .parts import index_at
 from .schema import FlexibleCatenaryData, Span
+from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
 from .spans import spans_of
-from .static import solve
-from .stitches import as_wire, moving, stitches_of
-from .tension import misfit, shape_left, with_tension_left
+from .static import StaticShape, solve
 from .wire_defects import WireDefects, locate
+
+
+class _Arms(NamedTuple):
+    """Steady arms of a line as it was designed: at its supports, or one for all."""
+
+    places: Array  # (arms,): m
+    stiffness: Array  # (arms,): N/m
+    heights: Array  # (arms,): of the contact wire there (m)
+    holding: Any  # (arms,): whether each holds the wire
+
+
+class Misfit(NamedTuple):
+    """Differences of a line that has lost tension, or bears ice, from one that was designed for that."""
+
+    too_long: Array  # (droppers of the spans that repeat,): excess length of the droppers (m)
+    lighter: Array  # (droppers,): missing weight of each half of a dropper (N)
+    lift: Array  # (supports between two spans, or one for all,): additional upward force of steady arms (N)
+
+
+def with_tension_left(
+    data: FlexibleCatenaryData, condition: LineCondition, errors: tuple[float, float] = (1.0, 1.0)
+) -> FlexibleCatenaryData:
+    """A line designed for its wires' tension and mass in a condition; the same object where they are its own.
+
+    errors: tension of contact and messenger wire, relative to the remaining one.
+    """
+    contact, messenger = errors
+    left = {
+        "contact_wire": (1 - condition.lost_contact_tension) * contact,
+        "messenger_wire": (1 - condition.lost_messenger_tension) * messenger,
+    }
+    wires = {
+        name: wire.model_copy(update={"tension": share * wire.tension, "mass": wire.mass + condition.ice})
+        for name, share in left.items()
+        if (share != 1 or condition.ice) and (wire := getattr(data, name))
+    }
+    return data.model_copy(update=wires) if wires else data
+
+
+@remembered
+def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
+    """Static shape of a line for its wires as they are, with the mass and stiffness of the real droppers."""
+    if designed.overlaps:
+        both = zip(tension_lengths(designed), tension_lengths(left), strict=True)
+        return joined(left, [shape_left(own.line, now.line) for own, now in both])
+    was = solve(designed)
+    return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
+
+
+def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit:
+    """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
+    was, now = solve(designed), solve(left)
+    stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
+    arms = _arms(designed)
+    lift: Any = arms.stiffness * (arms.heights - now.contact.height(arms.places))
+    lift[arms.holding] += was.arm_force - now.arm_force
+    return Misfit(
+        too_long=was.dropper_length - now.dropper_length + stretch,
+        lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,
+        lift=lift[1:-1] if designed.sequence else lift,
+    )
+
+
+@remembered
+def _arms(designed: FlexibleCatenaryData) -> _Arms:
+    arms = [span.steady_arm for span in spans_of(designed, 1).each]
+    if designed.sequence:
+        arms.append(arms[-1])
+    x = np.array(designed.alignment().supports[: len(arms)])
+    return _Arms(
+        x,
+        np.array([arm.stiffness for arm in arms]),
+        solve(designed).contact.height(x),
+        np.array([arm.holds_wire for arm in arms]),
+    )
+
 
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
@@ -67,7 +147,7 @@ class DefectiveLine:
         each = spans_of(data, spans).each
         self._data, self._spans, self._condition = data, spans, condition
         alignment = data.alignment(spans)
-        self._broken, self._miscut, height = _locate(
+        self._broken, self._miscut, height = located_defects(
             data, [len(span.droppers.sag) for span in each], condition
         )
         self._own = own = locate(data, spans, condition)
@@ -96,7 +176,7 @@ class DefectiveLine:
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
-        self._repeats = not data.sequence
+        self._repeats, self.pieces = not data.sequence, len(self._lengths)
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
         self._size = per_node * len(number)
         self._in_band = places_in_band(self._unknowns, self._size)
@@ -140,7 +220,6 @@ class DefectiveLine:
         self._carry(left)
 
     def _stitch(self, messenger: Wire) -> None:
-        """Add the messenger and the stitch wires."""
         places, stitches, lengths, size = self._places, self._stitches, self._lengths, self._size
         above = self._unknowns + 2 * (MESSENGER - CONTACT)
         tensions = messenger.tension - stitches.deficit(places, places + lengths)
@@ -175,28 +254,6 @@ class DefectiveLine:
             self._error = self._miscut + np.tile(fit.too_long, self._times)
             self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
             self._load[self._masts] += fit.lift
-
-    def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
-        """The line with tables for ``rows`` defective ones, which ``write`` fills."""
-        droppers, real = len(self._static), line.link_static.dtype
-        return line._replace(
-            link_static=np.zeros((rows, droppers), dtype=real),
-            link_gap=np.zeros((rows, droppers), dtype=real),
-            rise=np.zeros((rows, len(self._unknowns), 5)),
-            rise_breaks=self.breaks,
-            rise_decay=np.full(rows, self.decay),
-        )
-
-    def write(
-        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
-    ) -> StaticState:
-        """Write the state under these errors, as ``solve`` takes them, into the line's tables."""
-        state = self.solve(scatter, heights)
-        line.link_static[row] = state.tension
-        line.link_gap[row] = state.gap
-        line.rise[row] = state.rise
-        line.rise_decay[row] = self.decay
-        return state
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
@@ -273,31 +330,23 @@ def _divided(
     return breaks, np.diff(breaks), index_at(breaks, span.droppers.positions)
 
 
-def _own(counts: Sequence[int], span: int) -> str:
-    last = min(span, len(counts))
-    return f"and span {last} has {counts[last - 1]} droppers"
-
-
-def check_places(data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition) -> None:
-    """Raise InputError for a dropper or support that a line has not; counts: of the droppers of each span."""
-    _locate(data, counts, condition)
-
-
-def _locate(
+def located_defects(
     data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
 ) -> tuple[Any, Array, Array]:
     """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m).
 
-    counts: of the droppers of each span.
+    counts: of the droppers of each span. Raises InputError for a dropper or support that the line has not.
     """
     spans, firsts = len(counts), np.cumsum([0, *counts])
 
     def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
         for span, number in places:
             if span > spans or number > counts[span - 1]:
+                last = min(span, spans)
+                each = f", and span {last} has {counts[last - 1]} droppers."
                 raise InputError(
                     f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans"
-                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else f", {_own(counts, span)}.")
+                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else each)
                 )
         return [int(firsts[span - 1]) + number - 1 for span, number in places]
 

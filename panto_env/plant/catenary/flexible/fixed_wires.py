@@ -14,20 +14,20 @@ from __future__ import annotations
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ....base.remember import remembered
+from ....base.checksums import remembered
+from ....base.errors import InputError, beside
 from ...line_condition import LineCondition
 from ..schema import LOWEST_TENSION
-from .defects import DefectiveLine
+from .defects import DefectiveLine, shape_left, with_tension_left
+from .overlaps import stitched
 from .schema import FlexibleCatenaryData
-from .stitches import stitched
-from .tension import shape_left, with_tension_left
+from .shape import Profile
+from .spans import spans_of
+from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, StaticShape, check_level
 
 UNCHANGED = (1.0, 1.0)
-SPANS = 9
-"""Spans of a uniform line, of which the middle one is looked at: anchors are felt within two."""
-POINT_DISTANCE = 0.05
-"""Distance (m) of points between which a wire counts as straight."""
+SPANS = 9  # spans of a uniform line, of which the middle one is looked at: anchors are felt within two
+POINT_DISTANCE = 0.05  # distance (m) of points between which a wire counts as straight
 
 
 def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
@@ -107,3 +107,32 @@ def _slack(data: FlexibleCatenaryData, condition: LineCondition, tensions: tuple
     wires = (shape.contact, shape.messenger)
     heights = [wire.height(x) + rise.height(x) for wire, rise in zip(wires, rises, strict=True)]
     return np.array([float(np.mean(np.diff(each) ** 2)) / (2 * step**2) for each in heights])
+
+
+ADVICE = (
+    "in this line_condition; take less ice, less lost tension, or a temperature nearer to that of its design."
+)
+
+
+def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, rise: Profile) -> None:
+    """Raise InputError where wires are too steep or too uneven for the model, or a support gives way.
+
+    left, shape: the line for its wires as they are, and its static shape. rise: change of the contact wire's
+    height, as the real droppers have another length.
+    """
+    _, heights, encumbrances = spans_of(left, spans)
+    supports = np.array(left.alignment(spans).supports)
+    given_way = float((np.add(heights, encumbrances) - shape.messenger.height(supports)).max())
+    if given_way > MOST_YIELD:
+        most = beside(given_way, MOST_YIELD, ".2g")
+        raise InputError(
+            f"At rest a support of line '{left.name}' would yield by {most} m, more than {MOST_YIELD} m, "
+            + ADVICE
+        )
+    share = np.linspace(0.0, 1.0, POINTS, endpoint=False)
+    for k, (begin, length) in enumerate(zip(supports, np.diff(supports), strict=False)):
+        x = begin + length * share
+        both = shape.contact.height(x) + rise.height(x), shape.messenger.height(x)
+        straight = (heights[k + 1] - heights[k]) * share
+        too_high = f", more than {HEIGHT_RANGE} m, {ADVICE}"
+        check_level(f"span {k + 1} of line '{left.name}'", x, both, straight, too_high, f", {ADVICE}")

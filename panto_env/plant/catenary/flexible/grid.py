@@ -1,25 +1,30 @@
-"""Finite differences of a flexible catenary: their weights, stability, and error at a point force."""
+"""Finite differences of a flexible catenary: weights, stability, error at a point force, waves carried.
+
+A force that changes at f Hz and travels at v sends waves ahead whose length shrinks with the train's distance
+from the wave speed: omega(k) = 2 pi f + k v, without bending 2 pi / k = (c - v) / f. A grid carries no wave
+of less than two nodes, and a clamp, which hangs on two nodes, reflects too little. Both limits were set where
+figures of the catalogue's lines and of drawn ones leave the bounds of ``fine_enough`` in ``resolution``.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ....backend import WIDTH, python_function
 from ....base.arrays import Array
-from ....base.remember import remembered
-from ...interpolation import cubic_weights, stencil
+from ....base.checksums import remembered
+from ...functions import cubic_weights, stencil
 from ..schema import Wire
 from .schema import FlexibleCatenaryData
 
 BEARABLE = 0.5
 """Share of the stiffness at which one spring is unstable that springs have at most; others are near."""
 
-FITTED = 1.6
-"""Angle from node to node up to which waves are fitted: four nodes per wave."""
-TURNED = 1.3
-"""Maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor."""
+FITTED = 1.6  # angle from node to node up to which waves are fitted: four nodes per wave
+TURNED = 1.3  # maximum angle (rad) by which such a wave turns in a step: beyond it the fit is poor
 
 
 def nodes_per_span(data: FlexibleCatenaryData, spacing: float) -> int:
@@ -48,13 +53,9 @@ def _stable(wire: Wire, dx: float, step: float, beta: float, lightest: float = 1
     return bool(squared.min() >= -1e-9 and squared.max() * (1 + 2 * beta / step) <= 4 + 1e-9)
 
 
-def finest_stable(data: FlexibleCatenaryData, step: float) -> float:
-    """Spacing (m) of the finest grid on which a step (s) is stable."""
-    return _finest_stable(data.wires, data.damping.beta, data.stride, step)
-
-
 @remembered
-def _finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+def finest_stable(wires: tuple[Wire, Wire], beta: float, stride: float, step: float) -> float:
+    """Spacing (m) of the finest grid on which a step (s) is stable; beta: s; stride: of a window (m)."""
     count = WIDTH * round(stride / (step * max(wire.wave_speed for wire in wires)) / WIDTH)
     while count > WIDTH and not all(_stable(wire, stride / count, step, beta) for wire in wires):
         count -= WIDTH
@@ -193,7 +194,6 @@ def _fitted(share: float) -> tuple[Array, Array]:
 
 
 def _frequency(wire: Wire, number: Any) -> Any:
-    """Frequency (rad/s) of a wire's free waves of a wavenumber (rad/m)."""
     return np.sqrt((wire.tension * number**2 + wire.bending_stiffness * number**4) / wire.mass)
 
 
@@ -213,3 +213,42 @@ def exact_answer(frequency: Array, step: float, beta: float) -> Array:
 def second_differences(weights: Array) -> Array:
     """The same stencil by second differences at a node, at its neighbours, and at those beyond them."""
     return np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 2.0], [0.0, 0.0, 1.0]]) @ weights
+
+
+CARRIED_HZ, CARRIED_NODES = 50.0, 2.4
+"""Frequency (Hz) up to which a grid carries the waves ahead, and its nodes per wave at this frequency.
+Impacts hold such frequencies, and what they do to the contact shows in figures below 20 Hz."""
+CLAMP_HZ, CLAMP_ERROR = 60.0, 8.0
+"""Frequency (Hz) of the waves that a clamp must reflect, and a limit of what is missing of their
+reflection: the clamp's reactance over the wire's, times the square of the phase from node to node."""
+
+
+def wave_ahead(wire: Wire, speed: float, frequency: float) -> float:
+    """Wavenumber (rad/m) of the wave that a train below the wave speed sends ahead at a frequency (Hz).
+
+    speed: m/s.
+    """
+    # (2 pi f + k v)^2 = (T k^2 + EI k^4) / mass, whose coefficients change sign once: one root is positive.
+    mass, shaken = wire.mass, 2 * math.pi * frequency
+    squared = wire.tension - mass * speed**2
+    roots = np.roots([wire.bending_stiffness, 0.0, squared, -2 * mass * speed * shaken, -mass * shaken**2])
+    return float(roots.real[(roots.real > 0) & (np.abs(roots.imag) < 1e-6 * np.abs(roots.real))].max())
+
+
+def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:
+    """Spacing (m) of the coarsest grid that carries the waves ahead of a train at a speed (m/s).
+
+    0 from the wave speed on, where every grid is too coarse.
+    """
+    wire = data.contact_wire
+    if speed >= wire.wave_speed:
+        return 0.0
+    carried = 2 * math.pi / wave_ahead(wire, speed, CARRIED_HZ) / CARRIED_NODES
+    return min(carried, _clamp_grid(data, speed))
+
+
+def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
+    wire, mass = data.contact_wire, max(own.contact_clamp_mass for own in data.dropper_tables)
+    number = wave_ahead(wire, speed, CLAMP_HZ)
+    share = (2 * math.pi * CLAMP_HZ + speed * number) * mass / (2 * wire.impedance)
+    return math.sqrt(CLAMP_ERROR / share) / number if share > 0 else math.inf

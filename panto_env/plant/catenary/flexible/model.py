@@ -1,8 +1,9 @@
-"""A flexible catenary for a number of lanes, intact or with defects."""
+"""A flexible catenary for a number of lanes, and the defects of its tension lengths in the line's tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -10,29 +11,161 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
-from ...side_wind import draw_side_wind
-from ..protocol import StartPoint, check_speeds
+from ...wind import draw_side_wind
+from ..protocol import LineView, StartPoint, check_speeds
 from ..schema import FEWEST_SPANS
-from ..view import LineView
-from .attached import dropper_positions
+from .arrays import Beside, FlexibleLine
 from .blown import air_about, start_wind
 from .build import Tensioned, at_rest, constants, of_tension, settle
-from .defective_parts import DefectiveParts
-from .defects import DefectiveLine
-from .fixed_wires import tensions_of_fixed
+from .defects import DefectiveLine, located_defects, shape_left, with_tension_left
+from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
-from .loaded import check_loaded
-from .overlaps import tension_lengths
+from .on_grid import dropper_positions
+from .overlaps import TensionLength, tension_lengths
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
-from .tension import shape_left, with_tension_left
 from .view import view_of
 from .wire_defects import locate
 
-DESIGNED = -1
-"""Key, instead of a lane's number, of the shape of all lanes without a shape of their own."""
-Own = tuple[StaticShape, Tensioned, DefectiveLine | DefectiveParts]
+
+class DefectiveParts:
+    """All tension lengths of a line with the defects of a condition; most lines have only one."""
+
+    def __init__(
+        self,
+        data: FlexibleCatenaryData,
+        spans: int,
+        condition: LineCondition,
+        tensions: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """Raises InputError for what the line has not.
+
+        In an overlap the droppers of a span count from the first one of the ending wires to the last one of
+        the beginning wires. Both messengers' supports at a mast are raised alike. Defects of the contact wire
+        itself are on the wire in use there.
+        """
+        self._parts = parts = tension_lengths(data, spans)
+        conditions = [condition]
+        if len(parts) > 1:
+            located_defects(data, _counts(parts, spans), condition)
+            locate(data, spans, condition)
+            conditions = [_of_part(part, data, condition) for part in parts]
+        self.lines = [
+            DefectiveLine(part.line, part.spans, own, tensions)
+            for part, own in zip(parts, conditions, strict=True)
+        ]
+        """The static state of each tension length."""
+        self._droppers = sum(len(part.droppers) for part in parts)
+        self._pieces = self._pieces_of(0), self._pieces_of(1)
+
+    def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
+        """The same line with wires of other tensions, as ``DrawnLine`` has them."""
+        other = copy(self)
+        other.lines = [each.with_tensions(tensions) for each in self.lines]
+        return other
+
+    def _pieces_of(self, pair: int) -> tuple[Array, int, list[slice]]:
+        """Limits of a pair's contact wire's pieces (m), their number, and which are those of each part."""
+        if len(self._parts) == 1:
+            own = self.lines[0]
+            return (np.zeros(0), 0, []) if pair else (own.breaks, own.pieces, [slice(None)])
+        breaks, pieces = [0.0], []
+        for part, own in zip(self._parts, self.lines, strict=True):
+            if part.pair == pair:
+                if part.begin > breaks[-1]:
+                    breaks.append(part.begin)
+                pieces.append(slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2))
+                breaks += (part.begin + own.breaks[1:]).tolist()
+        end = self._parts[-1].end
+        breaks += [end] if breaks[-1] < end else []
+        return np.array(breaks), len(breaks) - 1, pieces
+
+    def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
+        """The line with tables for ``rows`` defective ones, which ``write`` fills."""
+        real = line.link_static.dtype
+        (first, count, _), (second, others, _) = self._pieces
+        beside = Beside(line.beside.shape, np.zeros((rows, others, 5)), second)
+        return line._replace(
+            link_static=np.zeros((rows, self._droppers), dtype=real),
+            link_gap=np.zeros((rows, self._droppers), dtype=real),
+            rise=np.zeros((rows, count, 5)),
+            rise_breaks=first,
+            rise_decay=np.full(rows, self.lines[0].decay),
+            beside=beside if others else line.beside,
+        )
+
+    def write(
+        self, line: FlexibleLine, row: int, scatter: Array | None = None, heights: Array | None = None
+    ) -> Array:
+        """Write the state under these errors, as ``DefectiveLine.solve`` takes them, into the tables.
+
+        Returns the tension of all droppers (N).
+        """
+        tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
+        rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
+        places = [iter(slices) for _, _, slices in self._pieces]
+        for part, own in zip(self._parts, self.lines, strict=True):
+            inner = slice(part.first_span, part.first_span + part.spans - 1)
+            state = own.solve(
+                None if scatter is None else scatter[part.droppers],
+                None if heights is None else heights[inner],
+            )
+            tension[part.droppers], gap[part.droppers] = state.tension, state.gap
+            rises[part.pair][next(places[part.pair])] = state.rise
+        line.link_static[row], line.link_gap[row] = tension, gap
+        line.rise_decay[row] = self.lines[0].decay
+        return tension
+
+
+def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
+    counts = [0] * spans
+    for part in parts:
+        for k, table in enumerate(part.line.dropper_tables):
+            counts[part.first_span + k] += len(table.positions)
+    return counts
+
+
+def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCondition) -> LineCondition:
+    """The condition of one tension length, with its own numbers of spans, droppers and supports."""
+
+    def numbered(counts: list[int]) -> list[tuple[int, int]]:
+        """Span and number in it of all droppers, both from 1."""
+        return [(span, n) for span, count in enumerate(counts, 1) for n in range(1, count + 1)]
+
+    along = numbered(_counts(tension_lengths(data), data.spans))
+    its = numbered([len(table.positions) for table in part.line.dropper_tables])
+    own = dict(zip([along[k] for k in part.droppers.tolist()], its, strict=True))
+    supports, (begin, end) = data.alignment().supports, part.in_use
+    return condition.model_copy(
+        update={
+            "broken_droppers": tuple(own[place] for place in condition.broken_droppers if place in own),
+            "miscut_droppers": tuple(
+                (*own[span, number], wrong)
+                for span, number, wrong in condition.miscut_droppers
+                if (span, number) in own
+            ),
+            "raised_supports": tuple(
+                (support - part.first_span, wrong)
+                for support, wrong in condition.raised_supports
+                if 0 < support - part.first_span < part.spans
+            ),
+            "hard_spots": tuple(
+                (span - part.first_span, offset, *rest)
+                for span, offset, *rest in condition.hard_spots
+                if begin <= supports[span - 1] + offset < end
+            ),
+            "worn_stretches": tuple(
+                (span - part.first_span, offset, min(length, end - supports[span - 1] - offset), share)
+                for span, offset, length, share in condition.worn_stretches
+                if begin <= supports[span - 1] + offset < end
+            ),
+        }
+    )
+
+
+DESIGNED = -1  # key, instead of a lane's number, of the shape of all lanes without a shape of their own
+Own = tuple[StaticShape, Tensioned, DefectiveParts]
 """What depends on tensions: shape, stencil, and the line with its defects."""
 
 
@@ -99,7 +232,7 @@ class FlexibleCatenary:
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
         # Of the line drawn last: lanes of a fit mostly share their tensions.
         self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
-        self._defective: dict[LineCondition, DefectiveLine | DefectiveParts] = {}
+        self._defective: dict[LineCondition, DefectiveParts] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
@@ -113,9 +246,7 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        """Write the defects into the line, or tables for them where each lane draws its own."""
-        kind = DefectiveParts if data.overlaps else DefectiveLine
-        self._defective = {condition: kind(data, spans, condition, self._fixed) for condition in conditions}
+        self._defective = {each: DefectiveParts(data, spans, each, self._fixed) for each in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -140,27 +271,19 @@ class FlexibleCatenary:
                 self._latest = key, self._tensioned(self._designed, drawn)
             shape, tensioned, defective = self._latest[1]
             self._write_tension(row, shape, tensioned)
-        state = defective.write(self.line, row, drawn.scatter, drawn.heights)
-        self._tension[row] = state.tension
+        self._tension[row] = defective.write(self.line, row, drawn.scatter, drawn.heights)
 
     def _check_loaded(
         self, designed: FlexibleCatenaryData, left: FlexibleCatenaryData, condition: LineCondition, spans: int
     ) -> None:
         """Raise InputError where a tension length does not hang with its wires as they are."""
-        defective = self._defective[condition]
-        lines = defective.lines if isinstance(defective, DefectiveParts) else [defective]
+        lines = self._defective[condition].lines
         parts = zip(tension_lengths(designed, spans), tension_lengths(left, spans), lines, strict=True)
         for own, now, line in parts:
             check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
 
-    def _tensions(self, drawn: DrawnLine) -> tuple[float, float]:
-        """Tensions of a drawn line's wires, relative to those that they have not lost."""
-        (contact, messenger), fixed = drawn.tensions, self._fixed
-        return contact * fixed[0], messenger * fixed[1]
-
     def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
-        """What depends on the tensions of a drawn line."""
-        tensions = self._tensions(drawn)
+        tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]
         own = with_tension_left(designed, drawn.condition, tensions)
         shape = shape_left(designed, own)
         defective = self._defective[drawn.condition]
@@ -169,7 +292,6 @@ class FlexibleCatenary:
         return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
 
     def _write_tension(self, row: int, shape: StaticShape, tensioned: Tensioned) -> None:
-        """Write the stencil and the static shape for a lane's own tensions."""
         self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
         self._shapes[row] = shape
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.

@@ -2,14 +2,19 @@
 
 The kink of a wire under a force is narrower than the grid. A dropper has the compliance that is missing at
 its own place in its stiffness, and a contact point in the contact's. Near each other, the force of each moves
-the other too, by more or less than it does on the grid: by the table of ``near_build``.
+the other too, by more or less than it does on the grid: by the table of ``near_droppers``.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from ....backend import NOT_NEGATIVE, WIDTH, inlined
-from .near_arrays import NONE, REACH
+from .arrays import LOWER, NONE, REACH, Near
+from .grid import missing_between
+from .on_grid import OnGrid
 from .scattered import slot_of
+from .schema import FlexibleCatenaryData
 
 
 @inlined
@@ -21,7 +26,7 @@ def missing_at(near, part):
 
 
 @inlined
-def missing_between(near, cells, part, its_part):
+def missing_of_pair(near, cells, part, its_part):
     """Missing compliance (m/N) between a contact point and a dropper, which are some cells apart."""
     table = near.between
     last, m = table.shape[1] - 1, (cells + REACH) & NOT_NEGATIVE
@@ -54,7 +59,7 @@ def come_near_dropper(line, wire, lane, contact, pair, cell, part):
     else:
         number, apart, s, j = _of_span(line, pair, cell)
     if s >= 0:
-        missing = missing_between(near, apart, part, near.place[number])
+        missing = missing_of_pair(near, apart, part, near.place[number])
         wire.near_set[lane, contact], wire.near_segment[lane, contact] = s, j
         wire.near_missing[lane, contact] = missing
         wire.near_gap[lane, contact] = wire.gap[lane, s, j]
@@ -101,3 +106,41 @@ def _of_line(line, wire, lane, pair, cell):
         return number, apart, s, j
     s, j = slot_of(held.hung, lane, number - on_messenger)
     return number, apart, s + held.links.node.shape[1] if s >= 0 else s, j
+
+
+PLACES = 9  # places in a cell in the tables
+
+
+def near_droppers(
+    data: FlexibleCatenaryData, grid: OnGrid, dx: float, step: float, per_stride: int, strides: int
+) -> Near:
+    """per_stride: nodes of a span, of mean length where they differ. strides: of such a line, else 0."""
+    parts = np.linspace(0.0, 1.0, PLACES)
+    between = missing_between(data.contact_wire, dx, step, data.damping.beta, parts, REACH)
+    place, pair, cells = grid.links.position / dx, grid.links.wires[:, LOWER] // 2, strides * per_stride + 1
+    if strides:
+        order, period = np.concatenate(grid.along), 0
+    else:
+        order = np.flatnonzero(place < per_stride - 1e-9)
+        period, cells = len(order), per_stride
+    place, pair = place[order], pair[order]
+    # A dropper is near cells on both sides, which may lie in the spans before and after.
+    number = np.full((int(pair.max(initial=0)) + 1, cells), NONE)
+    distance = np.full(number.shape, np.inf)
+    cell = np.floor(place + 1e-9).astype(np.int64)
+    for further in (-1, 0, 1) if period else (0,):
+        for apart in range(-REACH, REACH + 1):
+            at = cell + further * cells + apart
+            inside = (at >= 0) & (at < cells)
+            own, there = pair[inside], at[inside]
+            away = np.abs(there + 0.5 - place[inside] - further * cells)
+            nearer = away < distance[own, there]
+            distance[own[nearer], there[nearer]] = away[nearer]
+            number[own[nearer], there[nearer]] = (np.flatnonzero(inside) + further * period)[nearer]
+    return Near(
+        own=between[REACH].diagonal().copy(),
+        between=between,
+        number=number,
+        cell=cell,
+        place=np.clip(place - cell, 0.0, 1.0),
+    )

@@ -1,4 +1,4 @@
-"""Masses of the nodes of a grid, and constants of the springs and links that are attached there."""
+"""What is attached to the wires, on the grid: springs to the ground, droppers, and stitch wires."""
 
 from __future__ import annotations
 
@@ -10,19 +10,242 @@ import numpy as np
 
 from ....backend import WIDTH
 from ....base.arrays import Array, Index
+from ....base.errors import InputError
+from ...functions import stencil
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
-from .attached import Links, Nodes, Springs
 from .grid import implicit_share, missing_yield, point_gain, spring_levels
-from .overlaps import TensionLength, pairs_of, tension_lengths
+from .overlaps import Stitches, TensionLength, pairs_of, tension_lengths
 from .schema import FlexibleCatenaryData
-from .segments import places
+from .spans import hung_at, spans_of
 from .static import StaticShape
-from .stitch_grid import StitchGrid, stitch_grid
-from .stitches import Stitches
 from .wire_defects import WireDefects
+from .wires import places
 
-STIFFEST = 1e8
-"""Maximum stiffness of a link on the grid (N/m), in tension."""
+
+class Springs(NamedTuple):
+    """Springs and dampers between wires and the ground: two at each mast, then hard spots."""
+
+    masts: int
+    number: Index  # (masts,): of the support along the line, counted from 0; -1 where uplift is not recorded
+    wire: Index  # (springs,)
+    place: Array  # (springs,): along the line, in nodes
+    levels: Array  # (springs, 3): weights of three time levels, newest first (N/m)
+    mass: Array  # (springs,): that moves with the wire (kg)
+
+
+class Links(NamedTuple):
+    """Droppers: links between two wires at one place along the line, which can only pull."""
+
+    wires: Index  # (links, 2): the lower and the upper one
+    stitch: Index  # (links,): number of the stitch wire, of those in the window, at the upper end; -1: a wire
+    position: Array  # (links,): m
+    stiffness: Array  # (links,): in tension (N/m)
+    mass: Array  # (links, 2): mass that moves with the lower and the upper end (kg)
+
+
+class Nodes(NamedTuple):
+    """The four nodes about each of some places."""
+
+    first: Index  # (places,): number of the first one
+    weights: Array  # (places, 4): for forces and displacements
+    shares: Array  # (places, 4): for masses
+
+    @classmethod
+    def about(cls, places: Array) -> Nodes:
+        """places: along the line, in nodes.
+
+        Masses hang on the two nearest nodes: with cubic weights some nodes would be lighter than bare wire,
+        or have negative mass, and be unstable.
+        """
+        first, weights = stencil(places, 1.0)
+        right = (places - (first + 1))[:, None]
+        return cls(first, weights, np.concatenate([0 * right, 1 - right, right, 0 * right], axis=1))
+
+    @property
+    def four(self) -> Index:
+        """Index of each node, (places, 4), in arrays that begin at node -PAD."""
+        return np.asarray((self.first + PAD)[:, None] + np.arange(4))
+
+
+def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
+    """Positions (m), (droppers,), of the droppers of a line with this number of spans."""
+    parts = tension_lengths(data, spans)
+    found = np.zeros(sum(len(part.droppers) for part in parts))
+    for part in parts:
+        found[part.droppers] = part.begin + hung_at(part.line, part.spans)
+    return found
+
+
+def springs_of(part: TensionLength, places: Array, step: float, spots: Array) -> Springs:
+    """At each mast the contact wire's steady arm, then the messenger's support; after all masts, hard spots.
+
+    places: of the masts of a tension length, in nodes. step: s. spots: stiffness of hard spots at each node
+    of its contact wire from node -PAD on (N/m), (nodes,).
+    """
+    each = spans_of(part.line, part.spans).each[1:]
+    levels = [
+        level
+        for span in each
+        for level in (
+            spring_levels(span.steady_arm.stiffness, 0.0, step),
+            spring_levels(span.support.stiffness, span.support.damping, step),
+        )
+    ]
+    hard = np.flatnonzero(spots)
+    held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
+    arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
+    return Springs(
+        masts=len(each),
+        number=part.first_span + np.arange(len(each)),
+        wire=part.wire + np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
+        place=np.append(np.repeat(places, 2), hard - PAD),
+        levels=np.array([*levels, *held]).reshape(-1, 3),
+        mass=np.append(arms, np.zeros(len(hard))),
+    )
+
+
+def links_of(data: FlexibleCatenaryData, spans: int, shape: StaticShape, stitches: Stitches) -> Links:
+    """The droppers of so many spans, whose static shape is ``shape``, or repeats it.
+
+    stitches: those that move.
+    """
+    half = np.tile(shape.dropper_mass / 2, spans // shape.spans)
+    wires, clamps = np.zeros((len(half), 2), dtype=np.int64), np.zeros((len(half), 2))
+    for part in tension_lengths(data, spans):
+        droppers = [span.droppers for span in spans_of(part.line, part.spans).each]
+        counts = [len(own.positions) for own in droppers]
+        both = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
+        wires[part.droppers] = part.wire + np.array([CONTACT, MESSENGER])
+        clamps[part.droppers] = np.repeat(np.array(both), counts, axis=0)
+    return Links(
+        wires=wires,
+        stitch=stitches.carrying,
+        position=dropper_positions(data, spans),
+        stiffness=np.tile(shape.dropper_stiffness, spans // shape.spans),
+        mass=half[:, None] + clamps,
+    )
+
+
+def joined_springs(each: Sequence[Springs]) -> Springs:
+    """Those of several tension lengths: masts in their order along the line, then all hard spots."""
+    masts = sorted(
+        (float(own.place[2 * n]), int(own.number[n]), k, n)
+        for k, own in enumerate(each)
+        for n in range(own.masts)
+    )
+    some = [(each[k], slice(2 * n, 2 * n + 2)) for _, _, k, n in masts]
+    some += [(own, slice(2 * own.masts, None)) for own in each]
+    wire, place, levels, mass = (
+        np.concatenate([np.asarray(own[k])[which] for own, which in some]) for k in range(2, 6)
+    )
+    return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)
+
+
+MOST_COURANT = 0.9  # maximum of omega dt / 2 of a stitch wire's grid, of 1 at which the leapfrog is unstable
+FEWEST = 8  # least number of intervals of a stitch wire
+COARSEST = 1.5
+"""Maximum spacing of its nodes over the line's: droppers that share nodes would be computed side by side."""
+
+
+class StitchGrid(NamedTuple):
+    """Constants of stitch wires on their grids; all of a line have equally many intervals."""
+
+    stitches: Stitches
+    intervals: int  # 0 where there are no stitch wires
+    spacing: Array  # (stitches,): m
+    clamps: Nodes  # of the messenger about both clamps of each: first ones (stitches 2,), and so on
+    inertia: Array  # (stitches, intervals + 1): bare mass over the node's; 0 at the ends, which clamps move
+    mobility: Array  # (stitches, intervals + 1): displacement of the node in a step by 1 N (m/N)
+    bare_mobility: Array  # (stitches,): the same of a node without a dropper (m/N)
+    node: Index  # (links,): of those on a stitch wire, the node before
+    share: Array  # (links,): how far they are on from there to the next one, in intervals
+    deficit: Array  # (pairs, nodes): by how much a messenger's tension is less from the node before to it (N)
+
+    @property
+    def shares(self) -> Array:
+        """Shares of both nodes in each link, (links, 2), for forces, displacements and masses."""
+        return np.stack([1 - self.share, self.share], axis=1)
+
+    @property
+    def missing_yield(self) -> Array:
+        """Compliance that the stitch wire lacks between two nodes (m/N), (links,): its kink is narrower."""
+        on = self.node >= 0
+        lacking = np.zeros(len(self.node))
+        k = self.stitches.carrying[on]
+        lacking[on] = (self.share * (1 - self.share))[on] * self.spacing[k] / self.stitches.tension[k]
+        return lacking
+
+    def gain(self, beta: float, step: float) -> Array:
+        """Of links on stitch wires as ``grid.point_gain`` (m/N), (links,), at a node; others 0.
+
+        A string's integral over its waves in closed form. beta, step: s.
+        """
+        on, found = self.node >= 0, np.zeros(len(self.node))
+        k = self.stitches.carrying[on]
+        squared = self.stitches.tension[k] / self.stitches.mass[k] * (step / self.spacing[k]) ** 2
+        room = 1 - squared * (1 + 2 * beta / step)
+        found[on] = self.bare_mobility[k] / 4 / np.sqrt(room)
+        return found
+
+
+def stitch_grid(
+    data: FlexibleCatenaryData, stitches: Stitches, links: Links, x: Array, step: float
+) -> StitchGrid:
+    """Grids of a line's stitch wires; x: positions of the line's nodes (m); step: s.
+
+    Raises InputError where the grid is too coarse, or a stitch wire too light for the step.
+    """
+    count, dx = len(stitches.support), float(x[1] - x[0])
+    none, settle = np.zeros((0, 1)), 1.0 + data.damping.alpha * step / 2
+    hung = np.full(len(links.position), -1)
+    if not count:
+        nothing, nodes = np.zeros(0), np.zeros((pairs_of(data), len(x)))
+        nowhere = Nodes.about(nothing)
+        return StitchGrid(stitches, 0, nothing, nowhere, none, none, nothing, hung, 0.0 * hung, nodes)
+    length = stitches.end - stitches.begin
+    speed = np.sqrt(stitches.tension / stitches.mass)
+    quickest = speed * step * np.sqrt(1 + 2 * data.damping.beta / step) / MOST_COURANT
+    intervals = int((length / np.maximum(dx, quickest)).min())
+    spacing = length / max(intervals, 1)
+    longest = length.max() / length.min() * COARSEST * dx
+    if intervals < FEWEST or spacing.max() > longest:
+        raise InputError(
+            f"A grid of {dx:.3g} m and a time step of {1e3 * step:.3g} ms are too coarse for the stitch "
+            f"wires of line '{data.name}', {length.min():g} m long with waves at {speed.max():.3g} m/s; give "
+            "a smaller spacing and time_step, or longer and heavier stitch wires."
+        )
+    places = np.stack([stitches.begin, stitches.end], axis=1).ravel()
+    on = links.stitch >= 0
+    carrying = links.stitch[on]
+    along = (links.position[on] - stitches.begin[carrying]) / spacing[carrying]
+    node, share = hung, np.zeros(len(hung))
+    node[on] = np.floor(along)
+    share[on] = along - node[on]
+    bare = (stitches.mass * spacing)[:, None]
+    mass = np.tile(bare, (1, intervals + 1))
+    np.add.at(mass, (carrying, node[on]), (1 - share[on]) * links.mass[on, 1])
+    np.add.at(mass, (carrying, node[on] + 1), share[on] * links.mass[on, 1])
+    moves = np.ones(intervals + 1)
+    moves[[0, -1]] = 0.0
+
+    def over(wire: int) -> Stitches:
+        return stitches.some(stitches.wire == wire, stitches.carrying[:0])
+
+    return StitchGrid(
+        stitches=stitches._replace(carrying=links.stitch),
+        intervals=intervals,
+        spacing=spacing,
+        clamps=Nodes.about(places / dx),
+        inertia=bare / mass * moves,
+        mobility=step**2 / mass / settle * moves,
+        bare_mobility=step**2 / bare[:, 0] / settle,
+        node=node,
+        share=share,
+        deficit=np.stack([over(2 * k).deficit(x - dx, x) for k in range(pairs_of(data))]),
+    )
+
+
+STIFFEST = 1e8  # maximum stiffness of a link on the grid (N/m), in tension
 
 
 class OnGrid(NamedTuple):

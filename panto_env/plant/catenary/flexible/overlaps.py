@@ -1,4 +1,4 @@
-"""Tension lengths of a line: pairs of wires from anchor to anchor, two of them side by side in each overlap.
+"""Tension lengths of a line, pairs of wires from anchor to anchor that overlap; and its stitch wires.
 
 Each is a line of its own: spans with heights of their own, its static shape, its defects. The wires of every
 second tension length form one pair of wires on the grid.
@@ -12,18 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....base.arrays import Array, Index
+from ....base.checksums import remembered
 from ....base.errors import InputError
-from ....base.remember import remembered
-from ..schema import FEWEST_SPANS
+from ..schema import FEWEST_SPANS, Wire
 from .arrays import CONTACT
-from .beams import Profile
-from .parts import Overlap, Span
+from .parts import CLOSEST, SAME, Overlap, Span, nearer
 from .schema import FlexibleCatenaryData
-from .shape import InUse, Rope, StaticShape
-from .spans import spans_of, valid
+from .shape import InUse, Profile, Rope, StaticShape
+from .spans import hung_at, spans_of, stitch_at_end, valid
 
-FAR = 100.0
-"""Height (m) at which a wire counts that is not there: no pantograph reaches it."""
+FAR = 100.0  # height (m) at which a wire counts that is not there: no pantograph reaches it
 
 
 class TensionLength(NamedTuple):
@@ -57,10 +55,11 @@ def tension_lengths(line: FlexibleCatenaryData, spans: int | None = None) -> tup
     if not line.overlaps:
         end = supports[-1]
         return (TensionLength(line, 0, len(each), 0.0, end, (0.0, end), np.arange(counts.sum()), 0),)
-    _check(line, len(each))
+    _check_overlaps(line, len(each))
     begins = [0, *(overlap.first_span - 1 for overlap in line.overlaps)]
     ends = [*(overlap.first_span - 1 + overlap.spans for overlap in line.overlaps), len(each)]
-    middles = [_middle(overlap, supports) for overlap in line.overlaps]
+    across = (overlap.first_span - 1 + overlap.spans // 2 for overlap in line.overlaps)
+    middles = [(supports[span] + supports[span + 1]) / 2 for span in across]
     # In an overlap twice as many droppers, the first half of which are the ending wires'.
     doubled = np.ones(len(each), dtype=np.int64)
     for overlap in line.overlaps:
@@ -95,13 +94,7 @@ def pairs_of(line: FlexibleCatenaryData) -> int:
     return 2 if line.overlaps else 1
 
 
-def _middle(overlap: Overlap, supports: tuple[float, ...]) -> float:
-    """Middle of an overlap's middle span (m): there trains pass from one wire to the other."""
-    span = overlap.first_span - 1 + overlap.spans // 2
-    return (supports[span] + supports[span + 1]) / 2
-
-
-def _check(line: FlexibleCatenaryData, spans: int) -> None:
+def _check_overlaps(line: FlexibleCatenaryData, spans: int) -> None:
     """Raise InputError for overlaps that do not lie one after the other within the line."""
     free = 1  # first span that the wires of a further overlap may begin in
     for number, overlap in enumerate(line.overlaps, start=1):
@@ -141,7 +134,6 @@ def _own_line(
     entering: Overlap | None,
     leaving: Overlap | None,
 ) -> FlexibleCatenaryData:
-    """The line of one tension length, whose contact wire rises over the line's own in overlaps."""
     each, _, encumbrances = spans_of(line)
     rise = np.zeros(last - first + 1)  # at its supports
     tables: list[dict[str, Any]] = [each[span].model_dump(exclude_none=True) for span in range(first, last)]
@@ -232,3 +224,131 @@ def heights_of_pair(
             ours = (x >= part.begin) & (x <= part.end)
             found[ours] = both[wire].height(x[ours] - part.begin)
     return found
+
+
+NEAREST = 1.0  # least distance of a dropper on a stitch wire from its clamps (m)
+MOST_TENSION = 0.9  # maximum share of the messenger's tension that a stitch wire takes
+
+
+class Stitches(NamedTuple):
+    """Stitch wires in their order along a line, one at most per support."""
+
+    support: Index  # (stitches,): number of its support, from 0 at the line's start
+    begin: Array  # (stitches,): where its clamps are (m)
+    end: Array
+    tension: Array  # (stitches,): N
+    mass: Array  # (stitches,): kg/m
+    clamp_mass: Array  # (stitches,): of each clamp (kg)
+    wire: Index  # (stitches,): number of the contact wire under each
+    carrying: Index  # (droppers,): number of the stitch wire that each dropper hangs from; -1 the messenger
+
+    @property
+    def clamps(self) -> Array:
+        """Places of all clamps (m), (2 stitches,)."""
+        return np.sort(np.append(self.begin, self.end))
+
+    def some(self, which: Any, carrying: Index) -> Stitches:
+        """Some of them, in another order, that carry droppers in this way."""
+        return Stitches._make([*(each[which] for each in self[:-1]), carrying])
+
+    def deficit(self, begin: Array, end: Array) -> Array:
+        """By how much the messenger's tension is less (N), the mean from ``begin`` to ``end`` (m), (n,)."""
+        total = np.zeros(len(begin))
+        for first, last, tension in zip(self.begin, self.end, self.tension, strict=True):
+            total += tension * np.clip(np.minimum(end, last) - np.maximum(begin, first), 0, None)
+        return np.asarray(total / (end - begin))
+
+
+@remembered
+def stitches_of(line: FlexibleCatenaryData, spans: int | None = None) -> Stitches:
+    """The stitch wires of a line of its own sequence, or of a number of equal spans; also at its ends.
+
+    Raises InputError, naming the support, for one that does not go with the line.
+    """
+    each = spans_of(line, spans).each
+    supports = line.alignment(len(each)).supports
+    found = [*(span.stitch_wire for span in each), stitch_at_end(line, each[-1])]
+    there = [k for k, stitch in enumerate(found) if stitch is not None and stitch.length > 0]
+    wires = [stitch for k in there if (stitch := found[k]) is not None]
+    place = np.array([supports[k] for k in there])
+    half = np.array([stitch.length / 2 for stitch in wires])
+    x = hung_at(line, spans)
+    begin, end, carrying = place - half, place + half, np.full(len(x), -1)
+    for number in range(len(there)):
+        carrying[(x > begin[number] + SAME) & (x < end[number] - SAME)] = number
+    stitches = Stitches(
+        np.array(there, dtype=np.int64),
+        begin,
+        end,
+        np.array([stitch.tension for stitch in wires]),
+        np.array([stitch.mass for stitch in wires]),
+        np.array([stitch.clamp_mass for stitch in wires]),
+        np.zeros(len(there), dtype=np.int64),
+        carrying,
+    )
+    _check_stitches(line, stitches, x)
+    return stitches
+
+
+@remembered
+def moving_stitches(line: FlexibleCatenaryData, spans: int) -> Stitches:
+    """The stitch wires of a line of so many spans that move, of all tension lengths, in their order."""
+    parts = tension_lengths(line, spans)
+    each = [moving(stitches_of(part.line, part.spans), part.spans) for part in parts]
+    if len(parts) == 1:
+        return each[0]
+    each = [
+        own._replace(begin=own.begin + part.begin, end=own.end + part.begin, wire=own.wire + part.wire)
+        for part, own in zip(parts, each, strict=True)
+    ]
+    firsts = np.append(0, np.cumsum([len(own.support) for own in each]))
+    all_of_them = Stitches(*(np.concatenate(found) for found in zip(*each, strict=True)))
+    order = np.argsort(all_of_them.begin, kind="stable")
+    rank = np.append(np.argsort(order), -1)  # the last entry is that of droppers on a messenger
+    carrying = np.full(sum(len(part.droppers) for part in parts), -1)
+    for first, own, part in zip(firsts, each, parts, strict=False):
+        carrying[part.droppers] = rank[np.where(own.carrying < 0, -1, first + own.carrying)]
+    return all_of_them.some(order, carrying)
+
+
+def moving(stitches: Stitches, spans: int) -> Stitches:
+    """Those of a line of so many spans that move: at its ends droppers hang from the anchored messenger."""
+    inner = np.flatnonzero((stitches.support > 0) & (stitches.support < spans))
+    number = np.full(len(stitches.support) + 1, -1)
+    number[inner] = np.arange(len(inner))  # the last entry is that of droppers on the messenger
+    return stitches.some(inner, number[stitches.carrying])
+
+
+def stitched(line: FlexibleCatenaryData) -> bool:
+    """Whether a line has any stitch wire."""
+    return stitches_of(line).support.size > 0
+
+
+def _check_stitches(line: FlexibleCatenaryData, stitches: Stitches, x: Array) -> None:
+    """Raise InputError for stitch wires that overlap, take too much tension, or hold a dropper at a clamp."""
+    which = [f"The stitch wire of line '{line.name}' at support {k + 1}" for k in stitches.support]
+    if not line.sequence:
+        which = [f"The stitch wire of line '{line.name}'"] * len(which)
+    messenger = line.messenger_wire.tension
+    for k, name in enumerate(which):
+        if stitches.tension[k] > MOST_TENSION * messenger:
+            raise InputError(
+                f"{name} has a tension of {stitches.tension[k]:g} N, more than {100 * MOST_TENSION:g} % of "
+                f"the messenger's {messenger:g} N, from which it takes it; give less."
+            )
+        if k and nearer(stitches.begin[k] - stitches.end[k - 1], CLOSEST):
+            raise InputError(f"{name} reaches to the one before it; give shorter ones (stitch_wire.length).")
+        near = np.abs(x[:, None] - [stitches.begin[k], stitches.end[k]]).min(axis=1)
+        close = np.flatnonzero(nearer(near, NEAREST) & (stitches.carrying == k))
+        if len(close):
+            raise InputError(
+                f"{name} carries a dropper {near[close[0]]:.2g} m from its clamp, and "
+                f"{NEAREST:g} m is the least; move the dropper, or change stitch_wire.length."
+            )
+
+
+def as_wire(stitches: Stitches, number: int) -> Wire:
+    """A stitch wire, which is a rope: it does not resist bending."""
+    return Wire(
+        tension=float(stitches.tension[number]), mass=float(stitches.mass[number]), bending_stiffness=0.0
+    )

@@ -10,13 +10,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ....base.arrays import Array, Index
-from ....base.explanation import comma_hint
-from ....base.ranges import Between
-from ....base.settings import Settings
+from ....base.settings import Between, Settings, comma_hint
 from ..schema import LONGEST_SPAN, MOST_SPANS, SpanLength, Wire
 
-CLOSEST = 0.1
-"""Least distance between two droppers, or between one and a support (m)."""
+CLOSEST = 0.1  # least distance between two droppers, or between one and a support (m)
 SAME = 1e-3
 """Places along a line that are no farther from each other are one (m). No line is set out more exactly, and
 shorter elements of a wire lose all digits: of one of 1e-6 m droppers became metres too long."""

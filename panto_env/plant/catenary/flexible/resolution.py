@@ -1,11 +1,14 @@
 """Grid, time step and window of a flexible catenary: fine enough for the runs that it is built for.
 
 A step is given by the speed as a share of the wave speed, and the grid is the finest that is stable with it:
-near that limit waves of all lengths travel as on the wire. A coarse grid fails in two ways. The waves ahead
-of a train are short: without bending stiffness a force at f Hz sends waves of length (c - v) / f ahead
-(``waves``). And a slow train passes a node every dx / v, and the force has a ripple of this period, which the
-20 Hz filter removes only while it is short. A long step makes the force of slow trains, which changes by
-little, too even. docs/validation.md compares the figures at every speed, on every line, with converged ones.
+near that limit waves of all lengths travel as on the wire. A coarse grid fails in two ways: the waves ahead
+of a train are short (``grid.wave_ahead``), and a slow train passes a node every dx / v, with a ripple of the
+force that the 20 Hz filter removes only while it is short. docs/validation.md compares the figures at every
+speed, on every line, with converged ones.
+
+What a line sends back from beyond the window is missing. Waves come back from the farther, the slower the
+train is, and first along the faster wire, whose wave speed decides how many spans are enough. A whole line is
+long enough if the train meets no wave from its far anchor before its pass ends.
 """
 
 from __future__ import annotations
@@ -17,16 +20,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ....backend import WIDTH
+from ....base.arrays import to_kmh
+from ....base.checksums import remembered
 from ....base.errors import AccuracyWarning, InputError
-from ....base.remember import remembered
-from ....base.units import to_kmh
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
-from .grid import finest_stable, nodes_per_span, stable
+from ..schema import CLEAR, MOST_SPANS, Wire
+from .defects import with_tension_left
+from .fixed_wires import tensions_of_fixed
+from .grid import carrying_grid, finest_stable, nodes_per_span, stable
+from .overlaps import stitched
 from .schema import FlexibleCatenaryData
-from .stitches import stitched
-from .waves import carrying_grid
-from .window import window_of
 
 STEPS = (
     (0.2, 1e-2 / 14),
@@ -47,25 +51,19 @@ PER_DAMPING, MOST_DAMPED = 1.6, 2.0
 the limit of a line damped five times as much as usual the maximum was wrong by 4 % of the mean force."""
 FINE = ((0.45, 0.3), (1.0, 0.2))
 """Up to a share of the wave speed: a grid (m) that is fine enough for shorter steps too."""
-COARSEST = 0.45
-"""Maximum grid (m)."""
+COARSEST = 0.45  # maximum grid (m)
 NODES_HZ = 27.0
 """Minimum rate at which a train passes nodes (Hz): well above the 20 Hz to which forces are filtered."""
-SLOWEST_HZ = 22.0
-"""Rate of nodes (Hz) below which their ripple is in the filtered force."""
-FINEST_GRID = 0.1
-"""Grid (m) for the slowest trains, and the finest one that is taken for any."""
-REACH = 1.2
-"""Up to this multiple of the grid that carries the waves ahead, figures were within their bounds."""
+SLOWEST_HZ = 22.0  # rate of nodes (Hz) below which their ripple is in the filtered force
+FINEST_GRID = 0.1  # grid (m) for the slowest trains, and the finest one that is taken for any
+REACH = 1.2  # up to this multiple of the grid that carries the waves ahead, figures were within their bounds
 NOT_CARRIED = (5, 4)
 """Errors beyond it, on the finest grid: of the standard deviation, maximum and minimum (%), and of the
 contact-loss ratio (points)."""
 LIMP, LIMP_STEP = 0.2, 0.6e-3
 """Grid (m) and time step (s) for a contact wire without bending stiffness, which kinks within a cell."""
-LIMP_NODES = 0.2
-"""Nodes to which a kink of another wire, sqrt(EI / T) wide, must spread."""
-HARD_CONTACT_GRID = 0.15
-"""Grid (m) for a hard contact."""
+LIMP_NODES = 0.2  # nodes to which a kink of another wire, sqrt(EI / T) wide, must spread
+HARD_CONTACT_GRID = 0.15  # grid (m) for a hard contact
 HARD_CONTACT_ERROR = 20
 """Error of the standard deviation (%) where a hard contact is lost, on ``HARD_CONTACT_GRID``."""
 HARD_CONTACT_MEAN_ERROR = 5
@@ -77,12 +75,10 @@ wrong where contact is lost most of the time."""
 HARD_SPOT_GRID = 0.3
 """Grid (m) for a lumped mass on the wire, which throws the head off: on 0.4 m it lands at another place, and
 the force over the spot was wrong by a tenth of what the spot does to it, here by a fiftieth."""
-DEEP = 0.5e-3
-"""Depth of wear waves (m) above which the grid must resolve the waves that they excite."""
+DEEP = 0.5e-3  # depth of wear waves (m) above which the grid must resolve the waves that they excite
 SAMPLES_PER_SHALLOW_WAVE = 4
 """Time steps in which a train passes the shortest wave of the wire, unless wear waves are deep."""
-DEEP_GRID = 0.125
-"""Finest grid (m) for them, unless clamps are heavy."""
+DEEP_GRID = 0.125  # finest grid (m) for them, unless clamps are heavy
 NODES_PER_WAVE = 4
 """Nodes per wave that runs ahead of the train at the rate at which it passes deep wear waves. With two, the
 contact loss at every wear wave was wrong by up to 6 points of 29."""
@@ -107,8 +103,7 @@ TRAIN_ON_UNLIKE_SPANS = 0.2, 1e-2 / 16
 the second one was wrong by up to 4 % of the mean force, of the first one by 3 %, where contact is lost."""
 FAST_GRIDS = ((0.6, 0.5), (0.72, 0.4), (1.0, 1 / 3))
 """Up to a share of the wave speed: the grid (m) for ``accuracy="fast"``."""
-FAST_NODES_HZ = 40.0
-"""Minimum rate at which a train passes nodes for ``accuracy="fast"`` (Hz)."""
+FAST_NODES_HZ = 40.0  # minimum rate at which a train passes nodes for ``accuracy="fast"`` (Hz)
 FAST_STEPS = (2.5e-3, 2e-3)
 """Time steps (s) for ``accuracy="fast"``: the longer one where it is stable on the grid, else the shorter
 one, on a coarser grid if necessary."""
@@ -145,7 +140,6 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
 
 @remembered
 def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple[Resolution, tuple[str, ...]]:
-    """The resolution, and what to warn of."""
     fast = numerics.accuracy == "fast"
     required = _fast(data, runs) if fast else fine_enough(data, runs, numerics.time_step)
     found = _stable(data, numerics, runs, required)
@@ -209,7 +203,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     samples = SAMPLES_PER_WAVE if deep else SAMPLES_PER_SHALLOW_WAVE
     longest = min(longest, runs.wave_step(samples))
     step = min(time_step or longest, runs.whole_part(longest))
-    near_limit = finest_stable(data, _margin(data, runs, step) * step)
+    near_limit = finest_stable(data.wires, data.damping.beta, data.stride, _margin(data, runs, step) * step)
     fine = _by_share(FINE, quick, wave_speed)
     return Required(min(spacing, max(near_limit, fine), COARSEST), longest)
 
@@ -258,7 +252,6 @@ def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
 
 
 def _lightest(runs: Runs) -> float:
-    """Mass of the most worn contact wire, as a share of a new one's."""
     worn = [share for condition in runs.conditions for *_, share in condition.worn_stretches]
     return 1 - max(worn, default=0.0)
 
@@ -266,7 +259,9 @@ def _lightest(runs: Runs) -> float:
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
-    window, lightest = _window(data, numerics, runs), _lightest(runs)
+    unlike, lightest = data.alignment().pitch is None, _lightest(runs)
+    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), unlike)
+    window = window and window + spans_of_train(data, runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
         step = runs.whole_part(required.time_step)
@@ -283,13 +278,6 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
         if stable(data, span / count, step, lightest):
             return Resolution(span / count, step, window)
     raise InputError(f"A time step of {1e3 * step:g} ms is too long for line '{data.name}' on any grid.")
-
-
-def _window(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
-    window = window_of(
-        data.wires, numerics, runs, bool(data.overlaps), stitched(data), data.alignment().pitch is None
-    )
-    return window and window + spans_of_train(data, runs)
 
 
 def spans_of_train(data: FlexibleCatenaryData, runs: Runs) -> int:
@@ -325,3 +313,113 @@ def _not_carried(data: FlexibleCatenaryData, found: Resolution, required: Requir
         f"{found.spacing:.3g} m in use standard deviation, maximum and minimum may be wrong by up to about "
         f"{force} %, the contact-loss ratio by {loss} points. Give a smaller spacing."
     ]
+
+
+ENOUGH = ((0.25, 32), (0.4, 24), (0.66, 16), (0.82, 8), (1.0, 4))
+"""Up to a share of the faster wire's wave speed: spans about the train that make figures as of an endless
+line, within 1 % of sigma, maximum and minimum within 1 % of the mean force (docs/validation.md)."""
+FAST = 8  # maximum number of spans about a train for ``accuracy="fast"``
+WITH_OVERLAPS = 10
+"""Minimum number of spans about a train that passes overlaps, whose anchors send waves back: with 5 or 8 of
+them sigma there is wrong by up to 13 or 6 %, with 10 by less than 1 %."""
+STITCHED = 40  # spans about a slow train on a line with stitch wires, past whose supports waves travel far
+UNLIKE_SHARE, UNLIKE = 0.58, 24
+"""Share of the faster wire's wave speed up to which a line with stitch wires, or of unlike spans, needs more
+spans than others, and how many: with 16 the minimum was wrong by 2.7 % of the mean force, sigma by 1.3 %."""
+STITCHED_SHARE, STITCHED_ERROR = 0.45, 4
+"""Share of the faster wire's wave speed below which a train there is slow, and even so many spans leave an
+error in sigma; the error (%)."""
+ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
+"""From a number of spans on: error (%) of figures where more are needed."""
+
+
+def enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False, unlike: bool = False) -> int:
+    """Spans about the slowest train that are enough for figures of an endless line."""
+    share = runs.speeds[0] / max(wire.wave_speed for wire in wires)
+    if stitched and share < STITCHED_SHARE:
+        return STITCHED
+    enough = next((spans for limit, spans in ENOUGH if share <= limit), ENOUGH[-1][1])
+    return max(enough, UNLIKE) if (stitched or unlike) and share <= UNLIKE_SHARE else enough
+
+
+def window_of(
+    wires: tuple[Wire, Wire],
+    numerics: Numerics,
+    runs: Runs,
+    overlaps: bool = False,
+    stitched: bool = False,
+    unlike: bool = False,
+) -> int:
+    """Spans computed about the train; 0: the whole line. overlaps, stitched, unlike: whether the line has
+    such, or spans that differ.
+
+    Raises InputError for a given window where the wire itself has defects, or is blown upon before a run.
+    """
+    whole = any(each.hard_spots or each.worn_stretches or each.side_wind for each in runs.conditions)
+    if whole and numerics.window:
+        raise InputError(
+            "A line with hard_spots, worn_stretches or side_wind is computed as a whole, not in a window "
+            f"that travels with the train: leave out window={numerics.window}, or set it to 0."
+        )
+    if numerics.window is not None or whole:
+        return numerics.window or 0
+    enough = enough_spans(wires, runs, stitched, unlike)
+    if numerics.accuracy != "full":
+        enough = min(enough, FAST)
+    return max(enough, WITH_OVERLAPS if overlaps else 0)
+
+
+def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last: int) -> int:
+    """As ``CatenaryKind.clear_spans``; a whole line needs more of them for a slower train.
+
+    Waves and the train leave the line's start together.
+    """
+    wires = _wires_in(data, runs)
+    window = window_of(wires, numerics, runs, stitched=stitched(data))
+    if window:
+        return max(CLEAR, window // 2)
+    speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
+    if not 0 < speed < math.inf:
+        return CLEAR  # refused later, in better words
+    needed = math.ceil(last * (fastest + speed) / (2 * speed))
+    if needed > MOST_SPANS:
+        raise InputError(
+            f"At {to_kmh(speed):.3g} km/h waves from a whole line's far anchor would meet the train unless "
+            f"the line had {needed:,} spans, but {MOST_SPANS:,} are the maximum; leave out window=0, or give "
+            "spans."
+        )
+    return max(CLEAR, needed - last)
+
+
+def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
+    """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires."""
+    wires, window = _wires_in(data, runs), numerics.window
+    if numerics.accuracy != "full":
+        return
+    enough = enough_spans(wires, runs)
+    if window and window < enough:
+        error = next(percent for spans, percent in ERRORS if window >= spans)
+        warnings.warn(
+            f"A window of {window} spans is too short at {to_kmh(runs.speeds[0]):.0f} km/h, where "
+            f"{enough} are needed: standard deviation, maximum and minimum may be wrong by up to about "
+            f"{error} %; leave out window.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+    limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
+    if window is None and stitched(data) and runs.speeds[0] < limit:
+        warnings.warn(
+            f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
+            f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
+            "spans; give window=0 for the whole line.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+
+
+def _wires_in(data: FlexibleCatenaryData, runs: Runs) -> tuple[Wire, Wire]:
+    """The wires with their tension and ice in these runs."""
+    condition = runs.conditions[0]
+    if not (condition.temperature or condition.ice):
+        return data.wires
+    return with_tension_left(data, condition, tensions_of_fixed(data, condition)).wires

@@ -15,9 +15,8 @@ from ....backend import (
     store_row,
 )
 from ...state import own_row
-from .arrays import MESSENGER, PAD
-from .scattered_arrays import MAST, SPRING, STITCH
-from .segments import row_of, segment_of, share_ends
+from .arrays import MAST, MESSENGER, PAD, SPRING, STITCH
+from .wires import row_of, segment_of, share_ends
 
 EASED_ALIKE, EASED = 4.0, 8.0
 """Share of a span, as its inverse, over which wires come to rest towards a new span, where spans are of one
@@ -177,7 +176,6 @@ def _ease_held(line, wire, lane, held, n, first, node, calm):
 
 @inlined
 def _ease_alike(line, wire, lane, calm):
-    """Bring the links in equal rows to rest as the wires."""
     for k in range(line.link_set.size):
         s, j = line.link_set[k], line.link_segment[k]
         _ease(line, wire, lane, s, j, j * line.rows + line.link_row[s] + 1 - PAD, calm)
@@ -219,7 +217,6 @@ def take_window(line, wire, lane):
 
 @inlined
 def _take_stitches(line, wire, lane, start, end, at_start, at_end, calm):
-    """Take in stitch wires, and the droppers that hang from them."""
     scattered, held = line.scattered, wire.scattered
     deficit, last = held.deficit[lane], line.rows * WIDTH
     for pair in range(deficit.shape[0]):

@@ -9,24 +9,27 @@ import numpy as np
 
 from ....backend import WIDTH, bind, pack
 from ....base.arrays import Array, Index
-from .arrays import LOWER, MESSENGER, PAD, FlexibleLine, FlexibleWire
-from .on_grid import OnGrid
-from .scattered import take_start
-from .scattered_arrays import (
+from .arrays import (
     HUNG,
     LINK,
     LINK_ROWS,
+    LOWER,
     MAST_ROWS,
+    MESSENGER,
+    PAD,
     STITCH,
     AlongLine,
+    FlexibleLine,
+    FlexibleWire,
     InWindow,
     Scattered,
     ScatteredWindow,
 )
+from .on_grid import OnGrid
+from .scattered import take_start
 
 NODES = 4
-HUNG_NODES = NODES + 2
-"""Nodes of a dropper on a stitch wire."""
+HUNG_NODES = NODES + 2  # nodes of a dropper on a stitch wire
 
 
 def scattered(grid: OnGrid | None, real: Any) -> Scattered:
@@ -73,7 +76,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     of_masts = np.concatenate([weights[arms], of_springs[arms], supports], axis=1)
     in_order = np.argsort(first[arms], kind="stable")
     ropes, (on_messenger, hung) = grid.ropes, grid.along
-    carrying = grid.links.stitch[hung]
+    carrying, deficit = grid.links.stitch[hung], ropes.deficit * grid.slope_mobility[MESSENGER::2]
     stitches = _stitches(grid, real)
     of_links[hung, HUNG.UPPER : HUNG.MOVE] = ropes.shares[hung]
     of_links[hung, HUNG.MOVE : LINK.PULL] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
@@ -108,7 +111,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         stitches=stitches,
         upper=ropes.node[hung],
         carrying=carrying,
-        deficit=_deficit(grid, real),
+        deficit=np.asarray(deficit if ropes.intervals else deficit[:, :0], dtype=real),
         stiff_arms=bool(levels[arms].any()),
     )
 
@@ -138,7 +141,6 @@ def _along(
 
 
 def _stitches(grid: OnGrid, real: Any) -> AlongLine:
-    """Stitch wires along the line."""
     ropes, count = grid.ropes, len(grid.ropes.spacing)
     empty = np.zeros(STITCH.INERTIA + ropes.intervals + 1, real)
     above = np.repeat(ropes.stitches.wire, 2)[:, None] + MESSENGER
@@ -155,12 +157,6 @@ def _stitches(grid: OnGrid, real: Any) -> AlongLine:
         axis=1,
     )
     return _along(ropes.clamps.first.reshape(count, 2), rows, empty, ropes.stitches.wire, np.arange(count))
-
-
-def _deficit(grid: OnGrid, real: Any) -> Array:
-    """Weights of slopes for the tension that stitch wires take from the messenger."""
-    missing = grid.ropes.deficit * grid.slope_mobility[MESSENGER::2]
-    return np.asarray(missing if grid.ropes.intervals else missing[:, :0], dtype=real)
 
 
 def room_for(line: FlexibleLine, lanes: int) -> ScatteredWindow:

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ....base.errors import InputError
-from ....base.ranges import Between
-from ....base.settings import Settings
+from ....base.settings import Between, Settings
 from ...alignment import Alignment
 from ...line_condition import LineCondition
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
@@ -45,8 +44,7 @@ __all__ = [
     "Support",
 ]
 
-SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}
-"""Values of a line whose spans differ."""
+SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}  # values of a line whose spans differ
 
 
 class Rayleigh(Settings):

@@ -13,12 +13,9 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ....base.explanation import explain
-from ....base.names import suggest
-from ....base.ranges import Between
-from ....base.remember import remembered
-from ....base.settings import Settings
+from ....base.checksums import remembered
+from ....base.errors import InputError, suggest
+from ....base.settings import Between, Settings, explain
 from ..schema import LONGEST_SPAN, SHORTEST_SPAN
 from .parts import CLOSEST, Span, StitchWire
 
@@ -136,6 +133,14 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
     )
 
 
+def hung_at(line: FlexibleCatenaryData, spans: int | None = None) -> Array:
+    """Places (m), (droppers,), of the droppers in spans as ``spans_of`` gives them, along the line."""
+    each = spans_of(line, spans).each
+    supports = line.alignment(len(each)).supports
+    hung = zip(supports, each, strict=False)
+    return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung])
+
+
 def stitch_at_end(line: FlexibleCatenaryData, last: Span) -> StitchWire | None:
     """Stitch wire at the last support of a line with this last span."""
     end = line.end_support
@@ -154,7 +159,6 @@ def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, 
 
 
 def _changed(own: Table, changes: Any, where: str) -> Span:
-    """A span with the values of a table in the place of its own."""
     if not isinstance(changes, Mapping):
         raise InputError(f"The {where} must be a table of a span's values.")
     table = {**own, **changes}

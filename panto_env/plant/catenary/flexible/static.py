@@ -1,43 +1,37 @@
 """Static shape of the two-wire catenary as it is designed: one span that repeats, or a whole line of spans.
 
 The contact wire is held at the catalogue's sags by droppers, which are cut so; the messenger wire hangs
-between its supports under the droppers' pull. Both are solved by exact beam elements (``beams``).
+between its supports under the droppers' pull. Both are solved by exact beam elements (``shape``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array
-from ....base.errors import InputError
-from ....base.remember import remembered
-from ....base.shown import beside
-from .beams import GRAVITY, PeriodicWire
-from .overlaps import joined, tension_lengths
+from ....base.checksums import remembered
+from ....base.errors import InputError, beside
+from ....base.table import Table
+from .overlaps import joined, stitches_of, tension_lengths
 from .parts import Span
 from .schema import FlexibleCatenaryData
-from .shape import StaticShape, settled, stiffness_of, unloaded
+from .shape import GRAVITY, PeriodicWire, StaticShape, settled, stiffness_of, unloaded
 from .spans import spans_of
-from .stitched_static import StitchedMessenger
-from .stitches import stitches_of
-from .whole_line import settle_line
+from .whole_line import StitchedMessenger, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
 
 HEIGHT_RANGE = 0.5
 """Maximum difference of the contact wire's heights along a span (m), beside the span's gradient; pantographs
 follow 0.3 m."""
-STEEPEST = 0.2
-"""Slope up to which a wire is nearly level (-): tension is then off by 2 % at most."""
+STEEPEST = 0.2  # slope up to which a wire is nearly level (-): tension is then off by 2 % at most
 MOST_STRETCH = 0.1
 """Stretch of a dropper at rest as a share of its length (-): ropes stretch by less than 1 %."""
-MOST_YIELD = 0.3
-"""Yield of the messenger's support at rest (m): cantilevers yield by millimetres."""
-POINTS = 401
-"""Number of points of a span at which heights are checked."""
+MOST_YIELD = 0.3  # yield of the messenger's support at rest (m): cantilevers yield by millimetres
+POINTS = 401  # number of points of a span at which heights are checked
 
 
 @remembered
@@ -99,7 +93,6 @@ def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
 
 
 def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
-    """Raise InputError for a support of the messenger that gives way, the one that yields most."""
     places, tops = np.zeros(1), np.full(1, line.encumbrance)
     if line.sequence:
         _, heights, encumbrances = spans_of(line)
@@ -125,20 +118,31 @@ def _check_wires(each: _Placed, shape: StaticShape) -> None:
             f"At rest the messenger wire of {each.where} would hang {below.max():.2g} m below "
             f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
         )
-    heights = float(np.ptp(contact - each.rise / each.span.span_length * x))
-    if heights > HEIGHT_RANGE:
-        raise InputError(
-            f"At rest the contact wire of {each.where} would differ by "
-            f"{beside(heights, HEIGHT_RANGE, '.2g')} m in height along a span, more than "
-            f"{HEIGHT_RANGE} m; give it more tension, or more droppers."
-        )
-    for name, height in (("contact", contact), ("messenger", messenger)):
+    straight = each.rise / each.span.span_length * x
+    too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+    too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
+    check_level(each.where, x, (contact, messenger), straight, too_high, too_steep)
+
+
+def check_level(
+    where: str, x: Array, heights: tuple[Array, Array], straight: Array, too_high: str, too_steep: str
+) -> None:
+    """Raise InputError for a wire that is too steep, or a contact wire of too many heights.
+
+    heights: of contact wire and messenger (m) at even places x (m) of a span, (n,); straight: of the line
+    between the supports (m). too_high, too_steep: ends of the sentences.
+    """
+    uneven = float(np.ptp(heights[0] - straight))
+    if uneven > HEIGHT_RANGE:
+        most = beside(uneven, HEIGHT_RANGE, ".2g")
+        raise InputError(f"At rest the contact wire of {where} would differ by {most} m in height{too_high}")
+    for name, height in zip(("contact", "messenger"), heights, strict=True):
         slope = float(np.abs(np.diff(height)).max()) / (x[1] - x[0])
         if slope > STEEPEST:
+            most = beside(slope, STEEPEST, ".2g")
             raise InputError(
-                f"At rest the {name} wire of {each.where} would have a slope of "
-                f"{beside(slope, STEEPEST, '.2g')}, more than {STEEPEST}, and the model is of nearly "
-                "level wires; give it more tension, or shorter spans."
+                f"At rest the {name} wire of {where} would have a slope of {most}, more than {STEEPEST}"
+                f"{too_steep}"
             )
 
 
@@ -170,7 +174,6 @@ def _check_droppers(each: _Placed, shape: StaticShape) -> None:
 
 
 def _settle(line: FlexibleCatenaryData) -> StaticShape:
-    """The static shape of a span that repeats."""
     droppers, messenger = line.droppers, line.messenger_wire
     x, sag = np.array(droppers.positions), np.array(droppers.sag)
     breaks = np.concatenate([[0.0], x, [line.span_length]])
@@ -210,7 +213,6 @@ def _settle(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
-    """The messenger about a support, with its stitch wire; None without one. x: of droppers (m)."""
     if line.stitch_wire is None:
         return None
     found = stitches_of(line, 1)
@@ -227,3 +229,83 @@ def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
         (-half, half),
         None,
     )
+
+
+HEADINGS = {
+    "position": "from support (m)",
+    "sag": "sag (m)",
+    "length": "length, unloaded (m)",
+    "static_force": "static force (N)",
+    "stretch": "stretch at rest (m)",
+}
+"""Headings of ``RestingDropper``, with units."""
+
+
+class RestingDropper(NamedTuple):
+    """One dropper of a line at rest, as designed."""
+
+    number: int  # from the support, from 1; in an overlap the ending wires' first
+    position: float  # from the support (m)
+    sag: float  # of the contact wire below the line from its height at one support to that at the next (m)
+    length: float  # unloaded: to which it is cut (m)
+    static_force: float  # at the contact wire, clamp and half its own weight included (N)
+    stretch: float  # under the static force (m)
+    span: int = 1  # number of its span, from 1; 1 where all are alike
+
+
+def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str] = str) -> Table:
+    """The droppers as a table to print, with sag and stretch in millimetres; name: of a span's number."""
+    differ = any(each.span > 1 for each in droppers)
+    rows = [
+        (
+            *([name(each.span)] if differ else []),
+            str(each.number),
+            f"{each.position:g}" if not differ else f"{each.position:.3f}",
+            f"{1e3 * each.sag:.1f}",
+            f"{each.length:.4f}",
+            f"{each.static_force:.1f}",
+            f"{1e3 * each.stretch:.2f}",
+        )
+        for each in droppers
+    ]
+    in_mm = HEADINGS | {"sag": "sag (mm)", "stretch": "stretch at rest (mm)"}
+    headings = (*(["span"] if differ else []), "dropper", *in_mm.values())
+    title = f"Droppers of {'all spans' if differ else 'a span'} at rest, as designed"
+    last = [k for k, each in enumerate(droppers[1:]) if each.span != droppers[k].span]
+    return Table(title, headings, rows, text_columns=0, section_ends=tuple(last))
+
+
+def as_rows(droppers: Sequence[RestingDropper]) -> list[dict[str, Any]]:
+    """The droppers as rows of a table to write; numbers of spans are among them only where spans differ."""
+    rows = [each._asdict() for each in droppers]
+    if not any(each.span > 1 for each in droppers):
+        for row in rows:
+            del row["span"]
+    return rows
+
+
+def droppers_at_rest(line: Any) -> list[RestingDropper]:
+    """The droppers of a span, in order, or of all spans where they differ; none for lines without.
+
+    Raises InputError where the line cannot hang.
+    """
+    line = getattr(line, "line", line)  # of a rig
+    if not isinstance(line, FlexibleCatenaryData):
+        return []
+    shape = hang(line)
+    stretch = shape.dropper_tension / shape.dropper_stiffness
+    rows = list(
+        zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
+    )
+    hung: dict[int, tuple[int, float, float]] = {}  # by number along the line: span, position and sag
+    for part in tension_lengths(line, None if line.sequence else 1):
+        numbers = iter(part.droppers.tolist())
+        for span, own in enumerate(spans_of(part.line, part.spans).each, start=part.first_span + 1):
+            for position, sag in zip(own.droppers.positions, own.droppers.sag, strict=True):
+                hung[next(numbers)] = span, position, sag
+    found: list[RestingDropper] = []
+    for k in range(len(rows)):
+        span, position, sag = hung[k]
+        number = found[-1].number + 1 if found and found[-1].span == span else 1
+        found.append(RestingDropper(number, position, sag, *rows[k], span))
+    return found

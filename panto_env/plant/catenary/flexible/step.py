@@ -12,8 +12,7 @@ step, acts on it. So the wire's displacement at the ends of a step is the mean o
 from __future__ import annotations
 
 from ....backend import NOT_NEGATIVE, WIDTH, any_of, choose, implements, inlined, larger, load_row
-from ...state import own_row
-from ...valid_range import ENDING
+from ...state import ENDING, own_row
 from ..protocol import (
     advance_wire,
     apply_force,
@@ -25,9 +24,9 @@ from ..protocol import (
     record_wire,
     rise_at_contact,
 )
-from .arrays import CONTACT, LOWER, MESSENGER, UPPER, FlexibleLine
+from .arrays import CONTACT, LINK, LOWER, MESSENGER, UPPER, FlexibleLine
 from .blown import blow
-from .links import difference, follow_links, pull_links
+from .links import begin_uneven, difference, follow_links, pull_links, pull_uneven, stretch_of_hung
 from .near import come_near_dropper, leave_droppers, rise_by_dropper
 from .scattered import (
     at_line_end,
@@ -36,10 +35,6 @@ from .scattered import (
     stretch_at,
     take_window,
 )
-from .scattered_arrays import LINK
-from .segments import shift_nodes
-from .stitched import stretch_of_hung
-from .uneven import begin_uneven, pull_uneven
 from .wires import (
     about,
     apply_springs,
@@ -51,6 +46,7 @@ from .wires import (
     leapfrog_weakened,
     move_place,
     rise_by_defects,
+    shift_nodes,
     static_height,
     yield_of_place,
 )

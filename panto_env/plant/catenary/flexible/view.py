@@ -8,21 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....base.arrays import Array, Index
-from ..view import LineView
+from ..protocol import NONE, LineView
 from .arrays import CONTACT, MESSENGER, PAD
-from .beams import Profile
-from .overlaps import FAR, heights_of_pair, tension_lengths
+from .overlaps import FAR, heights_of_pair, moving_stitches, tension_lengths
 from .scattered_build import present, rope_nodes
-from .segments import along
-from .shape import StaticShape
-from .stitches import moving_stitches
+from .shape import Profile, StaticShape
+from .wires import along
 
 if TYPE_CHECKING:
     from .model import FlexibleCatenary
 
-VIEW_POINTS = 401
-"""Number of points of a span at which the messenger's height is kept for pictures."""
-NONE = np.zeros(0)
+VIEW_POINTS = 401  # number of points of a span at which the messenger's height is kept for pictures
 
 
 def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> LineView:
@@ -73,7 +69,6 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
 
 
 def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
-    """Static change of a contact wire's height by defects (m), (n,), as ``rise_by_defects``."""
     if not tables.rise.shape[1]:
         return np.zeros(len(x))
     row = min(lane, len(tables.rise) - 1)
@@ -81,7 +76,6 @@ def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
 
 
 def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
-    """Height of a pair's messenger at rest (m), (n,)."""
     if model.data.overlaps:
         return heights_of_pair(model.data, shape, pair, x, MESSENGER)
     heights = messenger_heights(shape)
@@ -127,7 +121,6 @@ def _ends(
     messengers: list[Array],
     ropes: dict[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    """Heights of the upper and of the lower ends of droppers (m)."""
     pair = np.zeros(len(model.droppers), dtype=int)
     for part in tension_lengths(model.data, model.alignment.spans):
         pair[part.droppers] = part.pair

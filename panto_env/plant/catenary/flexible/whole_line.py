@@ -1,23 +1,166 @@
-"""Static shape of a line whose spans differ, from end to end.
+"""Static shape of a line whose spans differ, from end to end, and of a messenger with stitch wires.
 
 Both wires are solved along the whole line. Its ends are as if the line went on there, mirrored: at the
 gradient of the outermost span, with half of a support's stiffness and load. A line of equal spans that are
-symmetric has the shape of one span that repeats, up to its ends.
+symmetric has the shape of one span that repeats, up to its ends. Between the clamps of a stitch wire the
+messenger carries its tension less the stitch wire's.
 """
 
 from __future__ import annotations
 
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
 from ....base.arrays import Array
-from .beams import GRAVITY, LongWire
+from ..schema import Wire
+from .overlaps import Stitches, as_wire, stitches_of
+from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import StaticShape, settled, stiffness_of, unloaded
-from .spans import spans_of
-from .stitched_static import StitchedMessenger
-from .stitches import stitches_of
+from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, settled, stiffness_of, unloaded
+from .spans import hung_at, spans_of
+
+
+class StitchedMessenger:
+    """Unknowns are height (m) and slope (-) at nodes of the messenger, then of the stitch wires."""
+
+    def __init__(
+        self,
+        wire: Wire,
+        stitches: Stitches,
+        x: Array,
+        supports: Array,
+        springs: Array,
+        ends: tuple[float, float],
+        slopes: tuple[float, float] | None,
+    ) -> None:
+        """x: of droppers (m), (droppers,). supports: (m), (n,); springs: their stiffness (N/m), (n,).
+
+        ends: of what is solved (m). slopes: there, as ``LongWire`` has them; None where one end is the other
+        one again.
+        """
+        from scipy.sparse.linalg import splu  # slow to import
+
+        first, last = ends
+        own = stitches.carrying < 0
+        clamps = stitches.clamps[(stitches.clamps > first) & (stitches.clamps < last)]
+        self.breaks = places_of(ends, [*supports, *clamps, *x[own]])
+        count = len(self.breaks) - (slopes is None)
+        self._height = 2 * (np.arange(len(self.breaks)) % count)  # unknown of each node
+        self._size = 2 * count
+        self._held: list[tuple[int, float]] = []  # unknowns that are given, and their values
+        self._entries: list[tuple[Any, Any]] = []  # unknowns of elements, and their stiffness
+        self._loads: list[tuple[Any, Any]] = []  # unknowns, and forces and moments on them
+        self._pieces: list[tuple[Any, Any, Beams, Array]] = []  # of the messenger
+
+        unknowns = np.stack(
+            [self._height[:-1], self._height[:-1] + 1, self._height[1:], self._height[1:] + 1]
+        )
+        lengths = np.diff(self.breaks)
+        tensions = wire.tension - stitches.deficit(self.breaks[:-1], self.breaks[1:])
+        self._decay = np.zeros(len(lengths))
+        for tension in np.unique(np.round(tensions, 6)):
+            which = np.flatnonzero(np.round(tensions, 6) == tension)
+            beams, bulge = self._add(
+                wire.model_copy(update={"tension": float(tension)}), lengths[which], unknowns.T[which]
+            )
+            self._decay[which] = beams.decay
+            self._pieces.append((which, unknowns.T[which], beams, bulge))
+        self.tops: Any = np.zeros(len(x), dtype=np.int64)
+        """Unknown that is the height of each dropper's upper end, (droppers,)."""
+        self.tops[own] = self._at(x[own])
+        self.ropes: list[tuple[Array, Any]] = []
+        """Places of each stitch wire's nodes (m), and the unknowns that are their heights."""
+        for k in range(len(stitches.support)):
+            self._add_rope(stitches, k, x, ends, slopes)
+        weights = np.tile(-GRAVITY * stitches.clamp_mass, 2)
+        places = np.append(stitches.begin, stitches.end)
+        inside = (places > first) & (places < last)
+        self._loads.append((self._at(places[inside]), weights[inside]))
+        self.masts: Any = self._at(supports)  # unknown that is the messenger's height at each support
+        self._springs = springs
+        if slopes is not None:
+            self._held += [(1, slopes[0]), (self._height[-1] + 1, slopes[1])]
+            self._loads.append((self._height[[0, -1]], tensions[[0, -1]] * np.array([-1.0, 1.0]) * slopes))
+        self._weight = np.zeros(self._size)
+        for numbers, forces in self._loads:
+            np.add.at(self._weight, numbers, forces)
+        self._solve = splu(self._matrix()).solve
+
+    def _at(self, places: Array) -> Any:
+        return self._height[index_at(self.breaks, places)]
+
+    def _add(self, wire: Wire, lengths: Array, unknowns: Any) -> tuple[Beams, Array]:
+        beams = Beams(wire, lengths)
+        bulge = beams.bulge(np.full(len(lengths), -GRAVITY * wire.mass))
+        self._entries.append((unknowns, beams.stiffness))
+        self._loads.append((unknowns, beams.end_loads(bulge)))
+        return beams, bulge
+
+    def _add_rope(self, stitches: Stitches, k: int, x: Array, ends: tuple[float, float], slopes: Any) -> None:
+        """Add a stitch wire; where the line is cut in its middle, it goes on at the slope there."""
+        begin, end, (first, last) = stitches.begin[k], stitches.end[k], ends
+        hung = np.flatnonzero(stitches.carrying == k)
+        hung = hung[np.argsort(x[hung])]
+        places = np.concatenate([[max(begin, first)], x[hung], [min(end, last)]])
+        heights = self._size + 2 * np.arange(len(places))
+        self._size += 2 * len(places)
+        slope = heights + 1
+        self.tops[hung] = heights[1:-1]
+        for node, clamped, gradient in ((0, begin > first, 0), (-1, end < last, 1)):
+            if clamped:
+                self._held.append((heights[node], 0.0))  # of no use: it is the messenger's
+                heights[node] = self._at(places[[node]])[0]
+            else:
+                self._held.append((slope[node], slopes[gradient]))
+                pull = stitches.tension[k] * (2 * gradient - 1) * slopes[gradient]
+                self._loads.append((heights[[node]], np.array([pull])))
+        unknowns = np.stack([heights[:-1], slope[:-1], heights[1:], slope[1:]], axis=1)
+        self._add(as_wire(stitches, k), np.diff(places), unknowns)
+        self.ropes.append((places, heights))
+
+    def _matrix(self) -> Any:
+        from scipy.sparse import coo_array
+
+        rows = np.concatenate([np.repeat(unknowns, 4, axis=1).ravel() for unknowns, _ in self._entries])
+        columns = np.concatenate([np.tile(unknowns, (1, 4)).ravel() for unknowns, _ in self._entries])
+        values = np.concatenate([stiffness.ravel() for _, stiffness in self._entries])
+        held = np.array([number for number, _ in self._held], dtype=np.int64)
+        on_diagonal = np.concatenate([self.masts, held])
+        added = np.concatenate([self._springs, np.full(len(held), HELD)])
+        return coo_array(
+            (
+                np.append(values, added),
+                (np.append(rows, on_diagonal), np.append(columns, on_diagonal)),
+            ),
+            shape=(self._size, self._size),
+        ).tocsc()
+
+    def hang(self, tops: Array, forces: Array) -> Array:
+        """Unknowns with supports, unloaded, at ``tops`` (m), (n,), and upward forces on droppers (N)."""
+        load = self._weight.copy()
+        np.add.at(load, self.tops, forces)
+        np.add.at(load, self.masts, self._springs * tops)
+        for number, value in self._held:
+            load[number] = HELD * value
+        return np.asarray(self._solve(load))
+
+    def shapes(self, state: Array) -> tuple[Rope, ...]:
+        """The stitch wires, by the unknowns."""
+        return tuple(Rope(places, state[heights]) for places, heights in self.ropes)
+
+    def profile(self, state: Array, repeats: bool = True) -> Profile:
+        """Height along the messenger, by the unknowns; one that repeats begins at the support at 0."""
+        pieces = np.zeros((len(self.breaks) - 1, 5))
+        for which, unknowns, beams, bulge in self._pieces:
+            pieces[which] = beams.pieces(state[unknowns], bulge)
+        if not repeats:
+            return Profile(self.breaks, pieces, self._decay, repeats=False)
+        turn = int(index_at(self.breaks, 0.0))
+        order = np.roll(np.arange(len(pieces)), -turn)
+        lengths = np.diff(self.breaks)[order]
+        return Profile(np.append(0.0, np.cumsum(lengths)), pieces[order], self._decay[order])
 
 
 def settle_line(line: FlexibleCatenaryData) -> StaticShape:
@@ -27,9 +170,7 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     tops = heights + np.array(encumbrances)  # of the messenger's supports without load
     counts = [len(span.droppers.positions) for span in spans]
     own = [slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True)]
-    x = np.concatenate(
-        [begin + span.droppers.positions for begin, span in zip(supports, spans, strict=False)]
-    )
+    x = hung_at(line)
     sag = np.concatenate([span.droppers.sag for span in spans])
     masts = np.arange(len(supports)) + np.append(0, np.cumsum(counts))  # nodes
     hung = np.delete(np.arange(len(supports) + len(x)), masts)
@@ -99,6 +240,5 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
 
 
 def _end_slopes(supports: Array, heights: Array) -> tuple[float, float]:
-    """Slopes of the straight lines between the first two and the last two supports."""
     slopes = np.diff(heights) / np.diff(supports)
     return float(slopes[0]), float(slopes[-1])

@@ -20,12 +20,9 @@ from ..schema import Wire
 from .parts import places_of
 from .schema import FlexibleCatenaryData
 
-RAMP = 1.0
-"""Length over which the running surface rises at either end of a worn stretch (m), own choice."""
-COPPER = 8900.0
-"""Density of a contact wire (kg/m^3), for its diameter from its mass."""
-NEAREST = 0.02
-"""Minimum distance of two nodes (m): nearer places share one."""
+RAMP = 1.0  # length over which the running surface rises at either end of a worn stretch (m), own choice
+COPPER = 8900.0  # density of a contact wire (kg/m^3), for its diameter from its mass
+NEAREST = 0.02  # minimum distance of two nodes (m): nearer places share one
 
 
 class Spot(NamedTuple):
@@ -50,9 +47,6 @@ class WireDefects(NamedTuple):
 
     spots: tuple[Spot, ...] = ()
     stretches: tuple[Stretch, ...] = ()
-
-    def __bool__(self) -> bool:
-        return bool(self.spots or self.stretches)
 
     def within(self, begin: float, end: float) -> WireDefects:
         """Those that begin from one position of the line up to before another (m); the end cuts stretches."""

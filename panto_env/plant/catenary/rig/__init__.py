@@ -8,8 +8,7 @@ contact to a policy, is as on a line.
 
 from ..protocol import CatenaryKind
 from . import step as step
-from .build import Rig, check
-from .schema import Computer, Cylinder, LoadCell, RigData
+from .build import Computer, Cylinder, LoadCell, Rig, RigData, check
 
 __all__ = ["KIND", "Computer", "Cylinder", "LoadCell", "Rig", "RigData"]
 

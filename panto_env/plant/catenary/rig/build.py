@@ -1,31 +1,148 @@
-"""A rig for a number of lanes: the computed line, and the constants of cylinder, load cell and computer."""
+"""A hardware-in-the-loop rig: its data, and the constants of the computed line, cylinder and load cell."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from ....base.arrays import Array
 from ....base.errors import InputError
+from ....base.settings import Between, Settings
+from ...alignment import Alignment
 from ...line_condition import DrawnLine
 from ...numerics import Numerics, Runs
-from ...pantograph.build import exponential
+from ...pantograph.schema import exponential
 from ..flexible import KIND as FLEXIBLE
-from ..protocol import CatenaryModel, StartPoint
+from ..flexible import FlexibleCatenaryData
+from ..protocol import CatenaryModel, LineView, StartPoint
+from ..schema import CatenaryData
 from ..three_span import KIND as THREE_SPAN
-from ..view import LineView
-from .arrays import TERMS, FitRow, RigLine, RigRow, RigWire
-from .schema import Computer, RigData
+from ..three_span import ThreeSpanData
+from .step import TERMS, FitRow, RigLine, RigRow, RigWire
+
+
+class Cylinder(Settings):
+    """Hydraulic cylinder under displacement control: a second-order transfer function, and limits."""
+
+    natural_frequency: Annotated[float, Between(2, 1000, "Hz")] = Field(
+        60.0, description="natural frequency of the closed loop of displacement (Hz)"
+    )
+    damping_ratio: Annotated[float, Between(0.05, 5)] = Field(
+        0.7, description="damping ratio of the closed loop (-)"
+    )
+    speed_limit: Annotated[float, Between(0.01, 20, "m/s")] = Field(
+        1.0, description="speed at which the servo valve is fully open (m/s)"
+    )
+    stroke: Annotated[float, Between(0.01, 2, "m")] = Field(
+        0.4, description="distance from end to end, its middle at the wire's height at rest (m)"
+    )
+    stiffness: Annotated[float, Between(1e4, 5e8, "N/m")] = Field(
+        2e7, description="stiffness of oil and rod (N/m)"
+    )
+    displacement_noise: Annotated[float, Between(0, 0.01, "m")] = Field(
+        5e-6, description="rms noise of the measured displacement (m)"
+    )
+
+
+class LoadCell(Settings):
+    """The load cell between cylinder and collectors."""
+
+    force_range: Annotated[float, Between(10, 1e5, "N")] = Field(
+        1000.0, description="maximum force in either direction, beyond which the rig stops (N)"
+    )
+    noise: Annotated[float, Between(0, 100, "N")] = Field(0.5, description="rms noise of a sample (N)")
+    filter_frequency: Annotated[float, Between(5, 1e5, "Hz")] = Field(
+        300.0, description="corner of the second-order Butterworth filter before the converter (Hz)"
+    )
+    mass: Annotated[float, Between(0, 50, "kg")] = Field(
+        1.5, description="moving mass between load cell and strip, whose inertia falsifies the force (kg)"
+    )
+    compensated_mass: Annotated[float, Between(0, 50, "kg")] = Field(
+        1.5, description="mass whose inertia is compensated with an accelerometer (kg)"
+    )
+
+
+class Computer(Settings):
+    """What computes the line in real time, and its converters."""
+
+    interval: Annotated[float, Between(1e-4, 0.02, "s")] = Field(
+        1e-3, description="time between two samples of the force (s)"
+    )
+    delay: Annotated[float, Between(0, 0.1, "s")] = Field(
+        1e-3, description="time from a sample of the force to the resulting command (s)"
+    )
+    input_bits: Annotated[int, Between(4, 32)] = Field(
+        16, description="bits of the force's converter, over the load cell's range"
+    )
+    output_bits: Annotated[int, Between(4, 32)] = Field(
+        16, description="bits of the command's converter, over the cylinder's stroke"
+    )
+    compensation: Literal["none", "prediction", "inverse", "adaptive"] = Field(
+        "inverse",
+        description='compensation of delay and lag: "none"; "prediction": a polynomial through past '
+        'displacements, extrapolated (Horiuchi et al. 1999); "inverse": the inverse of the cylinder\'s '
+        'transfer function; "adaptive": the inverse, fitted during the run (Chae et al. 2013)',
+    )
+    assumed_frequency: Annotated[float, Between(2, 1000, "Hz")] | None = Field(
+        None, description="natural frequency that is compensated for (Hz), by default the cylinder's own"
+    )
+    assumed_damping: Annotated[float, Between(0.05, 5)] | None = Field(
+        None, description="damping ratio that is compensated for (-), by default the cylinder's own"
+    )
+    assumed_delay: Annotated[float, Between(0, 0.1, "s")] | None = Field(
+        None, description="computer's delay that is compensated for (s), by default its own"
+    )
+    seed: Annotated[int, Between(0, 1_000_000)] = Field(
+        0, description="seed of the noise of load cell and displacement, which is the same in each run"
+    )
+
+
+class RigData(CatenaryData):
+    """A pantograph on a hydraulic cylinder that follows a line's computed contact point (paper 2, section 2).
+
+    The data that lines of every kind have are those of ``line``.
+    """
+
+    kind: Literal["rig"] = "rig"
+    line: Annotated[FlexibleCatenaryData | ThreeSpanData, Field(discriminator="kind")]
+    cylinder: Cylinder = Cylinder()
+    load_cell: LoadCell = LoadCell()
+    computer: Computer = Computer()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_its_line(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        line = values.get("line")
+        known = line.model_dump() if isinstance(line, CatenaryData) else line
+        if not isinstance(known, dict):
+            return values
+        names = [name for name in CatenaryData.model_fields if name not in ("kind", "name", "description")]
+        return {name: known[name] for name in names if name in known} | values
+
+    def source_of(self, name: str) -> str:
+        """Source of a value that lines of every kind have, by default that of ``line``."""
+        return self.sources.get(name) or self.line.source_of(name)
+
+    @property
+    def contact_heights(self) -> tuple[float, ...]:
+        """Heights of the computed line at its supports."""
+        return self.line.contact_heights
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans of the computed line lie."""
+        return self.line.alignment(spans)
+
 
 LINES = {"flexible": FLEXIBLE, "three_span": THREE_SPAN}
-STEPS = 4
-"""Minimum number of time steps between two samples, for the load cell's filter and the cylinder."""
+STEPS = 4  # minimum number of time steps between two samples, for the load cell's filter and the cylinder
 NOISE_SAMPLES = 1 << 16
-ORDER = 3
-"""Order of the polynomial of "prediction", as in Horiuchi et al."""
+ORDER = 3  # order of the polynomial of "prediction", as in Horiuchi et al
 FIT_FREQUENCY, FIT_MEMORY = 25.0, 1.0
 """For "adaptive": corner (Hz) of the low-pass of both signals, and time (s) after which a sample has the
 weight exp(-1)."""
@@ -172,12 +289,6 @@ def second_order(omega: float, ratio: float, time_step: float) -> Array:
     return exponential(system * time_step)[:2].copy()
 
 
-def other_delays(computer: Computer) -> float:
-    """Delay (s) between command and cylinder without its own lag: the computer's, and the held output's."""
-    delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
-    return delay + computer.interval / 2
-
-
 def force_age(data: RigData) -> float:
     """Delay of a sample of the force (s): by its filter, and by half an interval, since it is held."""
     return math.sqrt(2) / (2 * np.pi * data.load_cell.filter_frequency) + data.computer.interval / 2
@@ -198,7 +309,8 @@ def assumed(data: RigData) -> Array:
     computer, cylinder = data.computer, data.cylinder
     omega = 2 * np.pi * (computer.assumed_frequency or cylinder.natural_frequency)
     ratio = cylinder.damping_ratio if computer.assumed_damping is None else computer.assumed_damping
-    delay = other_delays(computer)
+    delay = computer.delay if computer.assumed_delay is None else computer.assumed_delay
+    delay += computer.interval / 2  # of the output, which is held
     return np.array([1.0, 2 * ratio / omega + delay, 1 / omega**2 + 2 * ratio / omega * delay + delay**2 / 2])
 
 
@@ -212,8 +324,7 @@ def lead(data: RigData) -> Array:
 
 def bank(data: RigData) -> Array:
     """Each term of a command from the past heights of the contact point, an interval apart, (terms, past)."""
-    computer: Computer = data.computer
-    h = computer.interval
+    computer, h = data.computer, data.computer.interval
     if computer.compensation in ("inverse", "adaptive"):
         return np.array([[1, 0, 0, 0], np.array([3, -4, 1, 0]) / (2 * h), np.array([2, -5, 4, -1]) / h**2])
     weights = np.zeros((TERMS, 1))

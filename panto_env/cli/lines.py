@@ -1,0 +1,153 @@
+"""``panto line``: a line at rest, from the catalogue, a TOML file, or a table of its masts."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer import Argument, Option
+
+from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
+from ..analysis.options import print_criteria
+from ..analysis.plots import plot_line, save
+from ..base.errors import InputError
+from ..base.files import write_whole
+from ..base.settings import parse
+from ..catalog import load_catenary, load_drawn
+from ..catalog.loader import drawn_kind, parse_catenary
+from ..catalog.masts import line_from_masts
+from ..control.lines import line_of_seed
+from ..plant.catenary.flexible.as_run import as_run, as_run_tables
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.flexible.static import dropper_table
+from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
+from ..terminal import Json, Plot, alert, console, counting, into_file, print_json, print_table, written_last
+from .identify import given
+from .records import Heading, Unit
+
+
+def line(
+    name: Annotated[
+        str,
+        Argument(
+            help="Line: a name of the catalogue, a TOML file, or what to draw one from, such as "
+            "section:main-line."
+        ),
+    ],
+    masts: Annotated[
+        str | None,
+        Option(
+            help="CSV file with a row per mast: position or span (m); mast, a name; contact_height, "
+            "messenger_height or encumbrance (m); type, a name in span_types; stagger, radius, cant. All "
+            "else is the line's."
+        ),
+    ] = None,
+    unit: Unit = None,
+    column: Heading = None,
+    seed: Annotated[int, Option(min=0, help="Seed with which a line is drawn.")] = 0,
+    speed: Annotated[
+        float | None, Option(min=1, max=1000, help="Speed for the limits of gradients (km/h).")
+    ] = None,
+    force: Annotated[float, Option(min=1, max=1000, help="Force for the elasticity (N).")] = 100.0,
+    line_condition: Annotated[
+        str, Option(help="Condition, e.g. new:temperature=20, to show tensions, sag and droppers as run.")
+    ] = "new",
+    output: Annotated[
+        str | None, into_file("Write the line between the masts to this TOML file", (".toml",))
+    ] = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Show a line at rest: spans, droppers, gradients and elasticity; make one from a table of masts.
+
+    Exits with 1 if a limit of EN 50119 is broken.
+    """
+    if output is not None and masts is None:
+        raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
+    text = None if masts is None else line_from_masts(name, masts, *given(unit, column))
+    chosen: Any
+    if masts is not None and text is not None:
+        table = {"name": Path(output or masts).stem} | tomllib.loads(text)
+        chosen = parse_catenary(table, Path(masts))
+    elif drawn_kind(name):
+        chosen, *_ = line_of_seed(load_drawn(name), seed)
+    else:
+        chosen = load_catenary(name)
+    if not isinstance(chosen, FlexibleCatenaryData):
+        raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
+    found = check(chosen, force)
+    own = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
+    condition = together(chosen.as_found or NEW, own)
+    run = None if condition == NEW else as_run(chosen, condition, force)
+    criteria = found.criteria(speed)
+    broken = [each for each in criteria if each.kept is False]
+    with written_last() as later:
+        if output is not None and text is not None:
+            later(_write, text, output)
+        if plot is not None:
+            later(save, plot_line(found), plot)
+        if json:
+            print_json(
+                {
+                    "line": chosen.model_dump(mode="json"),
+                    "spans": [each._asdict() for each in found.spans],
+                    "droppers": [each._asdict() for each in found.droppers],
+                    "criteria": [each.as_dict() for each in criteria],
+                    "as_run": run and run.rows | {"droppers": [each._asdict() for each in run.droppers]},
+                }
+            )
+        else:
+            other, named = as_run_tables(chosen, run) if run else [], chosen.alignment().span_name
+            for each in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
+                print_table(each)
+            print_criteria(criteria, f"Line {chosen.name} at rest")
+            if chosen.sequence:
+                console.print(
+                    "Elasticity is left out in the first and the last span, where anchors hold the wires."
+                )
+            else:
+                print_table(elasticity_table([found]))
+            if run and not other:
+                console.print("This condition changes no tension along the line: it is run as designed.")
+            for limit in broken:
+                alert(f"{limit.name} is not kept.")
+    if broken:
+        raise typer.Exit(1)
+
+
+def _write(text: str, path: str) -> None:
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def family(
+    name: Annotated[str, Argument(help="Family or section, of the catalogue or a TOML file.")] = "high-speed",
+    seeds: Annotated[int, Option(min=1, max=100_000, help="Number of lines.")] = 100,
+    first: Annotated[int, Option(min=0, help="First seed.")] = 0,
+    json: Json = False,
+    markdown: Annotated[bool, Option("--markdown", help="Print the table for a document.")] = False,
+) -> None:
+    """Draw lines from a family or a section, run a passive pantograph on each, and print the ranges.
+
+    Each runs at the highest speed of its trains. Exits with 1 if a line is outside the family's or the
+    section's own bands of what is plausible.
+    """
+    chosen = load_drawn(name)
+    with counting("running") as progress:
+        lines = drawn_lines(chosen, range(first, first + seeds), progress)
+    outside = [one for one in lines if one.outside(chosen)]
+    if json:
+        print_json(facts(chosen, lines))
+    elif markdown:
+        print(table(chosen, lines).markdown)
+    else:
+        print_table(table(chosen, lines))
+        if outside:
+            seeds_of = ", ".join(str(one.seed) for one in outside[:10])
+            alert(f"{len(outside)} of {len(lines)} lines are not plausible.", f"First seeds: {seeds_of}.")
+        else:
+            console.print(f"All {len(lines)} lines hang, run and are plausible.")
+    if outside:
+        raise typer.Exit(1)
