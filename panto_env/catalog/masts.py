@@ -146,6 +146,8 @@ def _lengths(columns: Read, masts: str | Path) -> list[float]:
             f"{masts} needs either a column position (m) or a column span (m), of each mast; if "
             "it has one by another name, give --column position=HEADING."
         )
+    if not all(map(len, columns.values())):
+        raise InputError(f"{masts} has a header and no mast under it; give a row for each mast.")
     if "position" in columns:
         falls = columns["position"][-1:] < columns["position"][:1]
         lengths = _rounded(np.diff(columns["position"]) * (-1 if falls else 1))

@@ -74,6 +74,7 @@ def test_masts_name_types_of_the_base_line(tmp_path):
     ("text", "message"),
     [
         ("contact_height\n5\n5\n", "either a column position .* or a column span"),
+        ("position\n", "has a header and no mast under it"),
         ("span\n65\n60\n60\n60\n", "No span begins at the last mast"),
         ("span,type\n65,\n,\n60,\n60,\n,\n", "Mast 2 of .* has no span"),
         ("position\n0\n60\n50\n170\n", "Mast 3 of .* stands no farther than the one before"),
