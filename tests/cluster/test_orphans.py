@@ -82,7 +82,8 @@ def ended(command, begun, number, folder):
         children = family(process.pid)
         assert len(children) >= 2
         process.send_signal(number)
-        _, errors = process.communicate(timeout=10)
+        # A policy's process that is still being imported ends when it has been.
+        _, errors = process.communicate(timeout=30)
         wait_for(lambda: not any(map(alive, children)), 5)
         return process.returncode, errors
     finally:
