@@ -10,10 +10,13 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import pickle
 import re
+import select
 import subprocess
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from signal import Signals
@@ -50,6 +53,8 @@ END_LIMIT = 5.0
 """Time (s) within which its process ends by itself where another user's can't be killed."""
 DONE, FAILED = b"+", b"!"
 """First byte of an answer: followed by its content, or by a sentence about the policy's error."""
+ACT = b"@"
+"""First byte of an observation for the policy that was asked last; all other requests are pickled."""
 
 
 def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:
@@ -90,19 +95,23 @@ class PolicyApart:
 
     def _ask(self, when: str, limit: float, given: Any = None) -> bytes:
         """Content of the process's answer. Raises PolicyError where it fails, is late or ends."""
-        process, connection = _running.get(self._process) or _start(self._process)
+        running = _running.get(self._process) or _start(self._process)
         why = f"it took more than {limit:g} s"
         try:
-            connection.send((self._source, when, given))
-            if connection.poll(limit):
-                answer = connection.recv_bytes()
+            if when == "act" and running.asked == self._source:  # without pickling, which takes as long again
+                running.connection.send_bytes(ACT + given.tobytes())
+            else:
+                running.connection.send_bytes(pickle.dumps((self._source, when, given)))
+                running.asked = self._source
+            if running.arrival.poll(1000 * limit):
+                answer = running.connection.recv_bytes()
                 if answer[:1] == DONE:
                     return answer[1:]
                 why = ""
         except (OSError, EOFError):
             with suppress(subprocess.TimeoutExpired):
-                process.wait(END_LIMIT)
-            status = process.returncode
+                running.process.wait(END_LIMIT)
+            status = running.process.returncode
             why = "its process ended" if status is None else f"its process ended with status {status}"
             if status is not None and status < 0:
                 why = f"its process was killed by {Signals(-status).name}"
@@ -112,22 +121,32 @@ class PolicyApart:
         )
 
 
-_running: dict[tuple[str, int], tuple[subprocess.Popen[bytes], Connection]] = {}
+@dataclass
+class _Running:
+    """A process of policies."""
+
+    process: subprocess.Popen[bytes]
+    connection: Connection
+    arrival: select.poll  # of its answers; a selector made for each takes as long as the answer
+    asked: str = ""  # the policy that the last request was for
+
+
+_running: dict[tuple[str, int], _Running] = {}
 
 
 @atexit.register
 def close() -> None:
     """End this process's policies apart; another user's end as their connections are closed."""
     while _running:
-        process, connection = _running.popitem()[1]
-        connection.close()
+        running = _running.popitem()[1]
+        running.connection.close()
         with suppress(PermissionError):
-            process.kill()
+            running.process.kill()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(END_LIMIT)
+            running.process.wait(END_LIMIT)
 
 
-def _start(key: tuple[str, int]) -> tuple[subprocess.Popen[bytes], Connection]:
+def _start(key: tuple[str, int]) -> _Running:
     """Start a process. Raises InputError where that is not possible."""
     if os.name != "posix":
         raise InputError(
@@ -155,8 +174,10 @@ def _start(key: tuple[str, int]) -> tuple[subprocess.Popen[bytes], Connection]:
         ) from error
     finally:
         theirs.close()
-    _running[key] = process, ours
-    return process, ours
+    arrival = select.poll()
+    arrival.register(ours, select.POLLIN)
+    _running[key] = _Running(process, ours, arrival)
+    return _running[key]
 
 
 def _answer(policy: Policy, context: Context | None, source: str, when: str, given: Any) -> bytes:
@@ -177,7 +198,12 @@ def main() -> None:
     loaded, policy, context = "", None, None
     with suppress(EOFError, ConnectionError):
         while True:
-            source, when, given = connection.recv()
+            request = connection.recv_bytes()
+            given: Any
+            if request[:1] == ACT:
+                source, when, given = loaded, "act", np.frombuffer(bytearray(request[1:]), np.float32)
+            else:
+                source, when, given = pickle.loads(request)
             try:
                 if policy is None or source != loaded or when == "being loaded":
                     loaded, policy = source, find_policy(source)
