@@ -82,8 +82,7 @@ def ended(command, begun, number, folder):
         children = family(process.pid)
         assert len(children) >= 2
         process.send_signal(number)
-        # A policy's process that is still being imported ends when it has been.
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=10)
         wait_for(lambda: not any(map(alive, children)), 5)
         return process.returncode, errors
     finally:
