@@ -37,16 +37,6 @@ class Figures:
     loss_percent: float
 
     @property
-    def statistical_maximum(self) -> float:
-        """Mean and three standard deviations (N)."""
-        return self.mean + 3 * self.std
-
-    @property
-    def statistical_minimum(self) -> float:
-        """Mean less three standard deviations (N)."""
-        return self.mean - 3 * self.std
-
-    @property
     def uplift_mm(self) -> float:
         """Maximum at all supports of the stretch."""
         return max(self.uplifts_mm)

@@ -107,9 +107,6 @@ def test_a_band_is_limited_around_its_middle_and_keeps_the_time_of_its_samples()
     assert stride == 166  # 1,000 samples a second over six per second, of noise up to 3 Hz
 
 
-WRITTEN = {"record": "rig.csv", "static_force": 54.0, "force_source": "own choice"}
-
-
 @pytest.mark.parametrize("channel", ["y_p2", "y_p3"])
 def test_a_model_must_explain_the_displacements_that_it_was_identified_from(channel, tmp_path):
     """By half or more; what the force drives, and the force itself, are not what was fitted."""
