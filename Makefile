@@ -32,8 +32,8 @@ RESULTS := docs/benchmark
 benchmark: $(READY)
 	mkdir -p $(RESULTS)
 	for track in $(TRACKS); do \
-	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json --force || exit 1; done
-	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json) --output $(RESULTS)/index.html
+	  $(BIN)/panto benchmark --config benchmark/$$track --output $(RESULTS)/$$track.json.gz --force || exit 1; done
+	$(BIN)/panto report $(TRACKS:%=$(RESULTS)/%.json.gz) --output $(RESULTS)/index.html
 	$(BIN)/python -m tests.benchmark_tables
 
 lint: $(READY)
@@ -66,12 +66,12 @@ notebook: $(READY)
 
 # The films that the documentation shows.
 REAL := --actuator realistic --sensors realistic
-SMALL := --seconds 2.4 --size 1120 630
+SMALL := --seconds 2.4 --size 800 450
 films: $(READY)
 	mkdir -p docs/films
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 1120 840 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 880 660 \
 	  --output docs/films/passive-and-agent.mp4
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 800 600 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 600 450 \
 	  --output docs/films/passive-and-agent.gif
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \

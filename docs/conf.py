@@ -4,6 +4,8 @@ import shutil
 import sys
 from pathlib import Path
 
+from panto_baselines.report.page import save
+from panto_baselines.report.result import read_result
 from panto_env import __version__
 
 HERE = Path(__file__).parent
@@ -54,8 +56,10 @@ copybutton_prompt_text = "$ "
 def copy_beside(app, exception):
     """Films and the benchmark's own page lie beside the site's pages, where these look for them."""
     if exception is None and app.builder.format == "html":
-        for folder in ("films", "benchmark"):
-            shutil.copytree(HERE / folder, Path(app.outdir) / folder, dirs_exist_ok=True)
+        shutil.copytree(HERE / "films", Path(app.outdir) / "films", dirs_exist_ok=True)
+        page = Path(app.outdir) / "benchmark" / "index.html"
+        page.parent.mkdir(exist_ok=True)
+        save([read_result(path) for path in sorted((HERE / "benchmark").glob("*.json.gz"))], page)
 
 
 def setup(app):

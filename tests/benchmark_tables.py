@@ -32,7 +32,7 @@ SHOWN = {
 
 def with_tables(text: str) -> str:
     """The page's text with the tables of the stored results."""
-    for path in sorted(RESULTS.glob("*.json")):
+    for path in sorted(RESULTS.glob("*.json.gz")):
         result = read_result(path)
         table = summary(result)
         block = f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
@@ -44,7 +44,7 @@ def with_tables(text: str) -> str:
 
 def of_readme() -> str:
     """The README's table between its markers."""
-    standings = {each.policy: each for each in read_result(RESULTS / f"{TRACK}.json").standings}
+    standings = {each.policy: each for each in read_result(RESULTS / f"{TRACK}.json.gz").standings}
     rows = []
     for policy, what in SHOWN.items():
         own = standings[policy]

@@ -99,7 +99,7 @@ def _results(policy):
 
 @cache
 def _tracks():
-    return {path.stem: read_result(path) for path in sorted(RESULTS.glob("*.json"))}
+    return {path.name.partition(".")[0]: read_result(path) for path in sorted(RESULTS.glob("*.json.gz"))}
 
 
 def _section(policy):

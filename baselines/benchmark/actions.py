@@ -14,6 +14,7 @@ from panto_env import Trajectory
 from panto_env.base.arrays import Array
 from panto_env.base.checksums import checksum, read_arrays, write_arrays
 from panto_env.base.errors import InputError
+from panto_env.base.files import with_suffix
 from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
 from panto_env.plant.alignment import Spans
 
@@ -34,7 +35,7 @@ class Played(NamedTuple):
 
 def beside(result: str | Path) -> Path:
     """Path of the actions of a result."""
-    return Path(result).with_suffix(SUFFIX)
+    return with_suffix(result, SUFFIX)
 
 
 def digest(passes: Sequence[Played]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from panto_env.analysis.pool import Progress, check_passes, one_by_one
 from panto_env.base.checksums import __version__, write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import check_output, finite
+from panto_env.base.files import JSON, check_output, finite, suffix_of
 from panto_env.base.machine import cores
 from panto_env.base.table import TABLES, write_rows
 from panto_env.cluster import spread
@@ -37,7 +37,7 @@ from .settings import (
 from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
 from .statistics import Cell, compare
 
-SUFFIXES = (".json", *TABLES)
+SUFFIXES = (*JSON, *TABLES)
 """Suffixes of the files that an outcome can be saved to."""
 
 
@@ -78,7 +78,7 @@ class Benchmark:
         The actions of all passes are written beside a JSON.
         """
         check_output(path, SUFFIXES)
-        if Path(path).suffix.lower() != ".json":
+        if suffix_of(path) not in JSON:
             write_rows([row.as_dict() for row in self.rows], path, HEADINGS | ROW_HEADINGS)
             return
         write_checked(path, self.as_dict())

@@ -10,7 +10,7 @@ import typer
 
 from panto_env.analysis.options import DroppersFile, FiguresFile
 from panto_env.base.errors import InputError
-from panto_env.base.files import PAGES, check_output, write_whole
+from panto_env.base.files import JSON, PAGES, check_output, suffix_of, with_suffix, write_whole
 from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
@@ -72,10 +72,10 @@ def report(
 
     The page is self-contained, opens in any browser without a network, and can be printed.
     """
-    kinds = {file.suffix.lower() for file in files}
+    kinds = {suffix_of(file) for file in files}
     of_runs = kinds == {".parquet"} and not markdown
-    if kinds != {".json"} and not of_runs:
-        odd = next((file for file in files if file.suffix.lower() != ".json"), files[0])
+    if not kinds <= {*JSON} and not of_runs:
+        odd = next((file for file in files if suffix_of(file) not in JSON), files[0])
         raise InputError(
             f"{odd}: give either runs (.parquet) or results of the benchmark (.json), not both"
             f"{'; --markdown takes results of the benchmark' if markdown else ''}."
@@ -89,7 +89,7 @@ def report(
         tables = [summary(read_result(file)) for file in files]
         print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
         return
-    path = files[0].with_suffix(PAGES[0]) if output is None else output
+    path = with_suffix(files[0], PAGES[0]) if output is None else output
     check_output(path, PAGES)
     announce_overwriting(path)
     if of_runs:

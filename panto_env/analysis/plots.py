@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import plotting as marks
-from ..base.files import PICTURES, check_output, write_whole
+from ..base.files import PICTURES, check_output, suffix_of, write_whole
 from ..base.plotting import (
     BLUE,
     GREEN,
@@ -44,14 +44,28 @@ if TYPE_CHECKING:
 ACTUATORS = {"frame_force": "on the frame", "head_force": "on the head"}
 
 
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure, whole or not at all. Raises InputError for a name without a picture's suffix."""
+def save(figure: Figure, path: str | Path, dpi: int = 120) -> None:
+    """Write a figure, whole or not at all, a PNG with a palette of 256 colours: a third of the bytes.
+
+    Raises InputError for a name without a picture's suffix.
+    """
     check_output(path, PICTURES)
     _leave_odd_names(figure)
     picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
-    figure.savefig(picture, dpi=120, format=Path(path).suffix[1:].lower())
+    figure.savefig(picture, dpi=dpi, format=Path(path).suffix[1:].lower())
+    content = picture.getvalue()
     with write_whole(path) as temporary:
-        temporary.write_bytes(picture.getvalue())
+        temporary.write_bytes(with_palette(content) if suffix_of(path) == PICTURES[0] else content)
+
+
+def with_palette(png: bytes) -> bytes:
+    """A PNG with a palette of 256 colours instead of three bytes a pixel."""
+    from PIL import Image
+
+    smaller = BytesIO()
+    with Image.open(BytesIO(png)) as image:
+        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(smaller, "PNG", optimize=True)
+    return smaller.getvalue()
 
 
 def _leave_odd_names(figure: Figure) -> None:

@@ -6,6 +6,7 @@ Parquet and a model in safetensors all have it in their table of plain data, und
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import subprocess
@@ -19,7 +20,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from .errors import InputError
-from .files import read_text, write_whole
+from .files import JSON, read_text, suffix_of, write_whole
 
 __version__ = "0.2.0"
 
@@ -73,9 +74,13 @@ def without_checksum(table: Any, arrays: Mapping[str, NDArray[Any]] = NO_ARRAYS)
 
 
 def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:
-    """Write a table of plain data as JSON with its checksum. Raises InputError if it cannot be written."""
+    """Write a table of plain data as JSON with its checksum, compressed if the file is named ".json.gz".
+
+    Raises InputError if it cannot be written.
+    """
+    content = (json.dumps(with_checksum(table), indent=1) + "\n").encode()
     with write_whole(path) as temporary:
-        temporary.write_text(json.dumps(with_checksum(table), indent=1) + "\n", encoding="utf-8")
+        temporary.write_bytes(gzip.compress(content, mtime=0) if suffix_of(path) == JSON[1] else content)
 
 
 def read_checked(path: str | Path) -> dict[str, Any]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 import os
 import re
 import tomllib
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +20,9 @@ from .errors import InputError
 
 TRIAL = 4096
 """Bytes written to test whether a folder is writable: the smallest unit that a disk stores."""
+COMPRESSED = ".gz"
+JSON = (".json", ".json" + COMPRESSED)
+"""Suffixes of files for plain data, of which the second is compressed."""
 PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of files for plots."""
 PAGES = (".html",)
@@ -72,6 +77,18 @@ def _beside(path: str | Path) -> Path:
     return target.with_name(f".{target.stem}-{token_hex(4)}{Path(path).suffix}")
 
 
+def suffix_of(path: str | Path) -> str:
+    """Suffix of a file's name in lower case, that of a compressed file with both parts: ".json.gz"."""
+    suffixes = [suffix.lower() for suffix in Path(path).suffixes]
+    return "".join(suffixes[-2:] if suffixes[-1:] == [COMPRESSED] else suffixes[-1:])
+
+
+def with_suffix(path: str | Path, suffix: str) -> Path:
+    """The path with another suffix in the place of its own."""
+    target = Path(path)
+    return target.with_name(target.name[: len(target.name) - len(suffix_of(target))] + suffix)
+
+
 def _reason(error: OSError) -> str:
     """The system's own description of an error."""
     return os.strerror(error.errno) if error.errno else str(error).rstrip(".")
@@ -83,7 +100,7 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
     suffixes: the allowed ones, in lower case. The folder must exist: it is not made.
     """
     target = Path(path)
-    if target.suffix.lower() not in suffixes:
+    if suffix_of(target) not in suffixes:
         which = f"one of {', '.join(suffixes)}" if len(suffixes) > 1 else suffixes[0]
         raise InputError(f"{path} must end in {which}.")
     if os.path.isdir(target):
@@ -118,9 +135,17 @@ def make_folder(path: str | Path) -> None:
 
 
 def read_text(path: str | Path) -> str:
-    """The text of a file in UTF-8. Raises InputError, naming the file, where it cannot be read."""
+    """The text of a file in UTF-8, compressed by gzip if it is named so.
+
+    Raises InputError, naming the file, where it cannot be read.
+    """
     try:
-        return Path(path).read_text(encoding="utf-8-sig")  # editors of Windows begin a file with U+FEFF
+        opened = gzip.open if suffix_of(path).endswith(COMPRESSED) else open
+        with opened(path, "rt", encoding="utf-8-sig") as file:  # editors of Windows begin a file with U+FEFF
+            text: str = file.read()
+        return text
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise InputError(f"{path} could not be read: it is not compressed by gzip, or is damaged.") from error
     except FileNotFoundError as error:
         raise InputError(f"{path} could not be read: there is no such file; check the path.") from error
     except OSError as error:

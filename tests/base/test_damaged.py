@@ -1,6 +1,8 @@
 """What another program wrote anew, or mixed, or damaged, is refused; damage at random is in tests/fuzz."""
 
+import gzip
 import json
+import re
 
 import numpy as np
 import pyarrow as pa
@@ -63,10 +65,29 @@ def test_a_stored_table_is_read_again_and_has_a_line_for_each_of_its_keys(tmp_pa
     assert [line[:6] for line in lines if line[:2] == ' "'] == [' "sha2', ' "b": ', ' "a": ']
 
 
+def test_a_compressed_table_is_the_same_and_the_same_bytes_each_time(tmp_path):
+    table = {"b": [1, 2.5], "a": {"c": "\u03c3"}}
+    for name in ("it.json", "it.json.gz", "again.json.gz"):
+        write_checked(tmp_path / name, table)
+    content = (tmp_path / "it.json.gz").read_bytes()
+    assert content == (tmp_path / "again.json.gz").read_bytes()
+    assert gzip.decompress(content) == (tmp_path / "it.json").read_bytes()
+    assert read_checked(tmp_path / "it.json.gz") == table
+
+
+@pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"{}", lambda content: b""])
+def test_a_damaged_compressed_table_is_refused(damage, tmp_path):
+    path = tmp_path / "it.json.gz"
+    write_checked(path, {"a": list(range(1000))})
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(InputError, match=re.escape(str(path))):
+        read_checked(path)
+
+
 def test_what_comes_with_the_project_is_whole():
     for path in FOLDER.glob("*.safetensors"):
         read_model(path)
-    for path in (ROOT / "docs" / "benchmark").glob("*.json"):
+    for path in (ROOT / "docs" / "benchmark").glob("*.json.gz"):
         read_result(path)
     for path in stored.RESULTS.glob("*.json"):
         stored.read(path)

@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
+from panto_env.analysis.plots import save
+
 from .hermite import Array
 
 
@@ -100,4 +102,4 @@ def draw(runs: Mapping[str, Sequence[Run]], spans: tuple[int, int], path: Path) 
     picture.supylabel("contact force, below 20 Hz (N)", fontsize="medium")
     picture.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     path.parent.mkdir(parents=True, exist_ok=True)
-    picture.savefig(path, dpi=120 if count == 1 else 90)
+    save(picture, path, dpi=120 if count == 1 else 90)

@@ -26,6 +26,7 @@ from panto_baselines.policies.lanes_law import load_gains
 from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
 from panto_env.base.checksums import read_checked, write_arrays
+from panto_env.base.files import read_text
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import load_family, load_section, text_of
 from panto_env.catalog.masts import line_from_masts
@@ -83,7 +84,7 @@ def subjects(folder: Path) -> dict[str, Subject]:
         "motion": Subject("CSV", folder / "motion.csv", lambda path: read_motion(path, 120.0)),
         "evaluations": Subject("CSV", run.evaluations, _evaluations),
         "saved run": Subject("Parquet", folder / "run.parquet", Trajectory.load, checked=True),
-        "benchmark": Subject("JSON", ROOT / "docs" / "benchmark" / "head.json", read_result, checked=True),
+        "benchmark": Subject("JSON", _benchmark(folder), read_result, checked=True),
         "actions": _actions(folder),
         "oracles": Subject("JSON", stored.RESULTS / "known-lines.json", stored.read, checked=True),
         "speed": Subject("JSON", next((ROOT / "docs" / "speed").glob("*.json")), speed.read, checked=True),
@@ -114,6 +115,12 @@ def _pantograph(path: Path) -> Any:
 def _pass(line: Any, pantograph: Any, distance: float) -> Trajectory:
     with warnings.catch_warnings(action="ignore"):
         return simulate(line, pantograph, 200.0, distance=distance, accuracy="fast")
+
+
+def _benchmark(folder: Path) -> Path:
+    path = folder / "head.json"
+    path.write_text(read_text(ROOT / "docs" / "benchmark" / "head.json.gz"), encoding="utf-8")
+    return path
 
 
 def _study(folder: Path) -> Path:

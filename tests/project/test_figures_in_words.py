@@ -22,7 +22,7 @@ TRAILING = "front-preview:base='adaptive:gains=adaptive-trailing'"
 
 @cache
 def stored(track):
-    return read_checked(ROOT / "docs" / "benchmark" / f"{track}.json")
+    return read_checked(ROOT / "docs" / "benchmark" / f"{track}.json.gz")
 
 
 def standing(track, policy):
@@ -95,7 +95,7 @@ def ranked():
     apart = ("passive", "tape of", "blind of")
     return [
         each
-        for path in sorted((ROOT / "docs" / "benchmark").glob("*.json"))
+        for path in sorted((ROOT / "docs" / "benchmark").glob("*.json.gz"))
         for each in stored(path.stem)["standings"]
         if each["rank"] is not None and not each["policy"].startswith(apart)
     ]

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
+from panto_baselines.report.result import read_result
 from panto_env.control.settings import fields
 from panto_env.envs import IDS
 from panto_env.envs.settings import EnvironmentSettings
@@ -53,6 +54,12 @@ def test_it_needs_no_network(site):
         loaded = re.findall(r"<(?:script|img|video|source)[^>]*\ssrc=\"([^\"]+)\"", text)
         loaded += re.findall(r"<link[^>]*rel=\"stylesheet\"[^>]*href=\"([^\"]+)\"", text)
         assert not [each for each in loaded if each.startswith(("http:", "https:", "//"))], page
+
+
+def test_the_page_of_the_benchmark_has_every_track(site):
+    page = (site / "benchmark" / "index.html").read_text(encoding="utf-8")
+    for path in (DOCS / "benchmark").glob("*.json.gz"):
+        assert html.escape(read_result(path).title) in page
 
 
 def test_every_page_is_reached_from_the_first_one(site):
