@@ -71,7 +71,7 @@ films: $(READY)
 	mkdir -p docs/films
 	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 880 660 \
 	  --output docs/films/passive-and-agent.mp4
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 600 450 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 800 600 \
 	  --output docs/films/passive-and-agent.gif
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \

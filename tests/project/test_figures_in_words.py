@@ -96,7 +96,7 @@ def ranked():
     return [
         each
         for path in sorted((ROOT / "docs" / "benchmark").glob("*.json.gz"))
-        for each in stored(path.stem)["standings"]
+        for each in read_checked(path)["standings"]
         if each["rank"] is not None and not each["policy"].startswith(apart)
     ]
 
