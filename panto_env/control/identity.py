@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from ..base.checksums import __version__
 from ..base.files import finite
-from ..plant.catenary import CATENARIES
-from ..plant.pantograph.schema import PantographData
+from ..metrics.identity import Design, Identity
 from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
@@ -42,26 +40,19 @@ def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, 
     return {"version": __version__, **plain(settings), **resulting, **grid}
 
 
-def settings_of(identity: Mapping[str, Any], design: Mapping[str, Any]) -> dict[str, Any]:
+def settings_of(identity: Identity, design: Design) -> dict[str, Any]:
     """Settings with which a run of this identity can be repeated; the inverse of ``identity``.
 
-    design: line and pantograph by value, as in ``Trajectory.design``. Settings that only concern policies
-    are missing. Raises KeyError or ValueError where something is missing or not valid.
+    Settings that only concern policies are missing. Raises KeyError or ValueError where something is missing
+    or not valid.
     """
-    line = design["catenary"]
-    values = {
+    by_value = {"catenary": design.line, "pantograph": design.pantograph, "pantographs": design.pantographs}
+    values = {**identity.settings, **by_value, "known_pantograph": identity.known_pantograph}
+    return {
         name: value
-        for name, value in identity.items()
-        if name in RunSettings.model_fields and value is not None  # None: not given
+        for name, value in values.items()
+        if name in RunSettings.model_fields and value not in (None, ())  # not given
     }
-    values["catenary"] = CATENARIES[line["kind"]].schema.model_validate(line)
-    values["pantograph"] = PantographData.model_validate(design["pantograph"])
-    if "pantographs" in design:
-        values["pantographs"] = [PantographData.model_validate(own) for own in design["pantographs"]]
-        values["pantograph"] = values["pantographs"][0]
-    if "known_pantograph" in values:
-        values["known_pantograph"] = PantographData.model_validate(values["known_pantograph"])
-    return values
 
 
 def _data(value: Any) -> Any:
