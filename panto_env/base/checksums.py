@@ -19,7 +19,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from .errors import InputError
-from .files import read_text, write_whole
+from .files import read_text, write_text, write_whole
 
 __version__ = "0.2.0"
 
@@ -74,8 +74,7 @@ def without_checksum(table: Any, arrays: Mapping[str, NDArray[Any]] = NO_ARRAYS)
 
 def write_checked(path: str | Path, table: Mapping[str, Any]) -> None:
     """Write a table of plain data as JSON with its checksum. Raises InputError if it cannot be written."""
-    with write_whole(path) as temporary:
-        temporary.write_text(json.dumps(with_checksum(table), indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(with_checksum(table), indent=1) + "\n")
 
 
 def read_checked(path: str | Path) -> dict[str, Any]:

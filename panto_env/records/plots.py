@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,12 +11,12 @@ import numpy as np
 from ..base import plotting as marks
 from ..base.arrays import Array
 from ..base.checksums import __version__
-from ..base.files import PAGES, check_output, write_whole
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.files import PAGES, check_output, write_text
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above, panels
 from ..base.table import Alarm, Table
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from ..report.charts import drawn
+from ..report.charts import HIGHEST, drawn
 from ..report.page import FILTER, page_template
 from .compare import Comparison, acceptance_table, criterion_notes, figures_table, shift_sentence, spans_table
 from .judge import (
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-HIGHEST = 25.0
-"""Maximum frequency of spectra (Hz)."""
 MOST_BLOCKS = 10_000
 """Blocks of samples of a piece, of each of which no more than two are drawn."""
 MOST_SUPPORTS = 60
@@ -59,10 +56,7 @@ def _pair(
     draw_lower: Callable[[Axes, Any], None],
     grid: Literal["both", "y"],
 ) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    upper, lower = figure.subplots(2, 1, height_ratios=(3, 2))
+    figure, (upper, lower) = panels((10, 7), 2, height_ratios=(3, 2))
     draw_upper(upper, found)
     draw_lower(lower, found)
     upper.grid(color="0.92", axis="y")
@@ -89,9 +83,9 @@ def draw_force(axes: Axes, found: Judgement) -> None:
     begin, end = float(samples.position.min()), float(samples.position.max())
     label = "position (m)"
     if found.alignment is not None:
-        numbers = found.alignment.supports_within(begin, min(end, found.reach[1]))
-        if len(numbers) <= MOST_SUPPORTS:
-            marks.mark_supports(axes, map(found.alignment.support, numbers))
+        supports = found.alignment.supports_within(begin, min(end, found.reach[1]))
+        if len(supports) <= MOST_SUPPORTS:
+            marks.mark_supports(axes, supports)
             label = marks.POSITION
     axes.set(xlabel=label, ylabel="contact force (N)", xlim=(begin, end))
     legend_above(axes, 4)
@@ -131,7 +125,7 @@ def draw_overlay(axes: Axes, found: Comparison) -> None:
         axes.plot(samples.position[part], samples.in_place[part], color=ORANGE, linewidth=2.6, label=label)
     force = zero_phase_low_pass(run.contact_force, run.time_step)
     axes.plot(run.position, force, color=BLUE, linewidth=1.0, label="run")
-    marks.mark_supports(axes, map(run.alignment.support, run.alignment.supports_within(begin, end)))
+    marks.mark_supports(axes, run.alignment.supports_within(begin, end))
     axes.set(xlabel=marks.POSITION, xlim=(begin, end))
     axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
     legend_above(axes, 2)
@@ -190,16 +184,13 @@ def _save(
 ) -> None:
     check_output(path, PAGES)
     template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
-    style = (files("panto_env.report") / "templates" / "style.css").read_text(encoding="utf-8")
     text = template.render(
         version=__version__,
         title=title,
-        style=style,
         introduction=introduction,
         notes=notes,
         charts=charts,
         tables=shown,
         remarks=sentences,
     )
-    with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

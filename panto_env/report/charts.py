@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.plots import fit_force_axis
 from ..base import plotting as marks
-from ..base.plotting import BLUE, legend_above, series_colour
-from ..metrics import compliance as en50367
+from ..base.plotting import BLUE, legend_above, panels, series_colour
 from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from .findings import Findings
 
@@ -27,10 +27,8 @@ def drawn(draw: Callable[[Axes], Any], height: float = 3.2, *, along_line: bool 
     along_line: whether its vertical lines are supports, so that the grid has none.
     """
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, height), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = panels((9, height))
     draw(axes)
     axes.grid(color="0.92", axis="y" if along_line else "both")
     axes.set_axisbelow(True)
@@ -53,11 +51,8 @@ def force_along(one: Findings, found: Sequence[Findings]) -> str:
         axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
         axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
         marks.mark_losses(axes, [loss.position for loss in one.losses])
-        supply = run.line.system
-        limit, standard = en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply)
-        marks.fit_force_axis([axes], limit, standard, extremes)
-        supports = run.alignment.supports_within(position[0], position[-1])
-        marks.mark_supports(axes, map(run.alignment.support, supports))
+        fit_force_axis([axes], run, extremes)
+        marks.mark_supports(axes, run.alignment.supports_within(position[0], position[-1]))
         axes.set(xlabel=marks.POSITION, ylabel="contact force (N)", xlim=(position[0], position[-1]))
         legend_above(axes, 3)
 
@@ -74,8 +69,7 @@ def force_together(one: Findings) -> str:
             label = f"pantograph {k + 1}, {own.pantograph}"
             axes.plot(own.position[inside], smooth, color=series_colour(k), linewidth=1.1, label=label)
         run, position = one.run, one.run.position[one.inside]
-        supports = run.alignment.supports_within(position[0], position[-1])
-        marks.mark_supports(axes, map(run.alignment.support, supports))
+        marks.mark_supports(axes, run.alignment.supports_within(position[0], position[-1]))
         axes.set(xlabel=marks.POSITION, xlim=(position[0], position[-1]))
         axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
         legend_above(axes, 4)
