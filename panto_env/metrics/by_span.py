@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from .figures import SpanChoice, contact_loss
+from .figures import SpanChoice, contact_loss, statistics
 from .low_pass import low_pass
 
 if TYPE_CHECKING:
@@ -51,8 +51,7 @@ class SpanFigures(NamedTuple):
 
 def _of_force(filtered: Array, raw: Array) -> dict[str, float]:
     """Values of ``OF_FORCE`` of some samples of a force (N)."""
-    statistics = {name: float(getattr(filtered, name)()) for name in ("mean", "std", "max", "min")}
-    return statistics | {"contact_loss": contact_loss(raw)}
+    return statistics(filtered) | {"contact_loss": contact_loss(raw)}
 
 
 def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:

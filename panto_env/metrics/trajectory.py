@@ -17,7 +17,7 @@ from ..base.files import check_output
 from ..plant.alignment import Alignment, Spans
 from .by_span import evaluated, near_train
 from .compliance import SLOW, Criterion, LineFacts, compliance
-from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function
+from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function, statistics
 from .identity import Design, Identity
 from .low_pass import low_pass
 
@@ -133,8 +133,7 @@ class Trajectory:
         inside = self.inside(spans)
         begin, end = (0.0, float(self.position[-1])) if covered is None else self.alignment.limits(covered)
         force = self.contact_force[inside]
-        filtered = low_pass(self.contact_force, self.time_step)[inside]
-        mean, std = float(filtered.mean()), float(filtered.std())
+        found = statistics(low_pass(self.contact_force, self.time_step)[inside])
         near = (self.support_position > begin - 1e-6) & (self.support_position < end + 1e-6)
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
         frame, head = self.frame_force[inside], self.head_force[inside]
@@ -142,12 +141,9 @@ class Trajectory:
         ways = np.diff(self.position[inside]) if self.identity.drifts else self.stride
         changes = frame_change @ frame_change + head_change @ head_change
         return Figures(
-            mean=mean,
-            std=std,
-            statistical_max=mean + 3 * std,
-            statistical_min=mean - 3 * std,
-            max=float(filtered.max()),
-            min=float(filtered.min()),
+            **found,
+            statistical_max=found["mean"] + 3 * found["std"],
+            statistical_min=found["mean"] - 3 * found["std"],
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
             contact_loss=contact_loss(force),
             cost_function=cost_function(force, self.lift[inside], ways),
