@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import fit_force_axis, mark_supports_of_run
-from panto_env.base import plotting as marks
-from panto_env.base.plotting import LIMIT, series_colour
+from panto_env.base.plotting import LIMIT, POSITION, series_colour
 from panto_env.metrics import compliance as en50367
 from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
@@ -72,7 +71,7 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> 
     mark_supports_of_run(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
-        xlabel=marks.POSITION,
+        xlabel=POSITION,
         ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
         xlim=run.alignment.limits(shown),
     )

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports_of_run
-from panto_env.base import plotting as marks
-from panto_env.base.plotting import BLUE, legend_above, panels
+from panto_env.base.plotting import BLUE, POSITION, legend_above, panels
 from panto_env.base.table import Table
 from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
@@ -139,7 +138,7 @@ def plot(oracle: Oracle) -> Figure:
     for values, label in ((run.frame_force, "on the frame"), (run.head_force, "on the head")):
         if np.any(values):
             actuator.plot(position, values[inside], linewidth=0.9, label=label)
-    actuator.set(ylabel="actuator force (N)", xlabel=marks.POSITION)
+    actuator.set(ylabel="actuator force (N)", xlabel=POSITION)
     for axis in (force, actuator):
         mark_supports_of_run(axis, run)
         axis.set_xlim(position[0], position[-1])

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import plotting as marks
 from ..base.files import PICTURES, check_output, write_whole
 from ..base.plotting import (
     BLUE,
@@ -24,6 +23,7 @@ from ..base.plotting import (
     SUPPORT,
     VERMILION,
     legend_above,
+    mark_losses,
     mark_supports,
     series_colour,
     stacked,
@@ -105,7 +105,7 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
         mark_supports_of_run(axis, run)
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
-    figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
+    figure.axes[-1].set(xlabel=f"{POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
     words = f"{'pantographs' if several else 'pantograph'} {run.pantographs}"
     where = f"{words}, line {run.catenary}, {run.speed_kmh:g} km/h"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
@@ -123,9 +123,7 @@ def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans,
         mark_supports_of_run(axis, run)
     fit_force_axis(axes, runs[0])
     legend_above(axes[0])
-    axes[-1].set(
-        xlabel=f"{marks.POSITION}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans)
-    )
+    axes[-1].set(xlabel=f"{POSITION}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans))
     figure.suptitle(title)
     return figure
 
@@ -151,7 +149,7 @@ def fit_force_axis(axes: Sequence[Axes], run: Trajectory, others: Sequence[float
 
 def mark_supports_of_run(axis: Axes, run: Trajectory) -> None:
     """Draw dashed lines at the supports of a run."""
-    marks.mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
+    mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
 
 
 def say_what_is_hidden(axis: Axes) -> None:
@@ -176,7 +174,7 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
     axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")
     axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
-    marks.mark_losses(axis, position[losses_of_contact(run.contact_force[shown])[0]].tolist())
+    mark_losses(axis, position[losses_of_contact(run.contact_force[shown])[0]].tolist())
     axis.set(ylabel="contact force (N)")
 
 

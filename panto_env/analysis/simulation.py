@@ -170,7 +170,7 @@ def load_with_settings(path: str | Path) -> tuple[Trajectory, dict[str, Any]]:
     """
     run = Trajectory.load(path)
     try:
-        return run, _as_given(settings_of(run.identity, run.designed), run)
+        return run, _as_given(settings_of(run), run)
     except (KeyError, ValueError) as error:
         raise InputError(
             f"{path} was written by another version, {run.identity.version}, without its "

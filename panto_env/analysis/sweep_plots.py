@@ -7,10 +7,9 @@ from math import isnan
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from ..base import plotting as marks
 from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, panels, series_colour, stacked
+from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, NEAR, panels, series_colour, stacked
 from ..metrics import compliance as en50367
 from ..metrics.figures import LABELS, NUMBER
 
@@ -109,7 +108,7 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
     limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
     high = force.dataLim.y1
-    if min(limits) > marks.NEAR * high:
+    if min(limits) > NEAR * high:
         most = " or ".join(f"{limit:g}" for limit in sorted({*limits}))
         notes = [f"{en50367.maximum_source(rows[0]['system'])}'s maximum of {most} N is above the axis."]
     else:

@@ -8,7 +8,8 @@ from pydantic import BaseModel
 
 from ..base.checksums import __version__
 from ..base.files import finite
-from ..metrics.identity import Design, Identity
+from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
 from .settings import RunSettings
@@ -40,14 +41,19 @@ def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, 
     return {"version": __version__, **plain(settings), **resulting, **grid}
 
 
-def settings_of(identity: Identity, design: Design) -> dict[str, Any]:
-    """Settings with which a run of this identity can be repeated; the inverse of ``identity``.
+def settings_of(run: Trajectory) -> dict[str, Any]:
+    """Settings with which a run can be repeated, but for those that only concern policies.
 
-    Settings that only concern policies are missing. Raises KeyError or ValueError where something is missing
-    or not valid.
+    The inverse of ``identity``. Raises KeyError or ValueError where something is missing or not valid.
     """
-    by_value = {"catenary": design.line, "pantograph": design.pantograph, "pantographs": design.pantographs}
-    values = {**identity.settings, **by_value, "known_pantograph": identity.known_pantograph}
+    design, known = run.designed, run.settings.get("known_pantograph")
+    values = {
+        **run.settings,
+        "catenary": design.line,
+        "pantograph": design.pantograph,
+        "pantographs": design.pantographs,
+        "known_pantograph": PantographData.model_validate(known) if known else None,
+    }
     return {
         name: value
         for name, value in values.items()

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import plotting as marks
 from ..base.arrays import Array
 from ..base.errors import beside
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above, stacked
+from ..base.plotting import BLUE, LIMIT, ORANGE, POSITION, legend_above, mark_supports, stacked
 from ..base.table import Table
 from ..catalog import load_pantograph
 from ..fitting.stored import Stored
@@ -263,14 +262,14 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
-        marks.mark_supports(axis, evidence.alignment.supports_within(diagnosis.begin, diagnosis.end))
+        mark_supports(axis, evidence.alignment.supports_within(diagnosis.begin, diagnosis.end))
         for finding in diagnosis.findings:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {evidence.alignment.span_name(finding.span)}, {place(finding)}"
         above = force.get_xaxis_transform()
         force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
-    score.set(ylabel="score (-)", xlabel=marks.POSITION, xlim=(diagnosis.begin, diagnosis.end))
+    score.set(ylabel="score (-)", xlabel=POSITION, xlim=(diagnosis.begin, diagnosis.end))
     legend_above(score, 3)
     figure.suptitle(title)
     return figure

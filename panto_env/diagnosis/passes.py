@@ -40,7 +40,8 @@ def known_pantograph(run: Trajectory) -> PantographData:
     Raises InputError where the run does not hold them.
     """
     try:
-        return run.identity.known_pantograph or run.designed.pantograph
+        known = run.settings.get("known_pantograph")
+        return PantographData.model_validate(known) if known else run.designed.pantograph
     except (KeyError, ValidationError) as error:
         raise InputError(
             f"The run does not hold the masses and springs of its pantograph '{run.pantograph}', without "

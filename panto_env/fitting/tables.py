@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base import plotting as marks
-from ..base.plotting import legend_above, series_colour, stacked
+from ..base.plotting import POSITION, legend_above, mark_supports, series_colour, stacked
 from ..base.table import Alarm, Table
 from ..terminal import number
 from .fit import INTERVAL, WHITE, Fit, Found
@@ -152,8 +151,8 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     plan, before = fit.problem.fitting.values.design, fit.before
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
-        marks.mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
-    (others[-1] if others else force).set_xlabel(marks.POSITION)
+        mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
+    (others[-1] if others else force).set_xlabel(POSITION)
     return figure
 
 

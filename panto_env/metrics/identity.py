@@ -1,14 +1,14 @@
 """What a run was made with, by type: its settings, and its line and pantographs.
 
-A run holds both as plain data, as its file does, so that files of other versions can be read. Here alone
-these are read: each value when it is needed, since another version's need not be valid in this one.
+A run holds both as plain data, as its file does. Here alone they are read. Lines and pantographs are checked
+only when they are needed, since those of another version need not be valid in this one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.flexible.parts import Overlap
@@ -18,65 +18,43 @@ from ..plant.pantograph.schema import PantographData
 
 @dataclass(frozen=True)
 class Identity:
-    """Version, settings and resulting grid of a run."""
+    """Version, settings and resulting grid of a run, as far as they are read again."""
 
-    settings: Mapping[str, Any]  # plain data by name
+    version: str
+    controlled: tuple[int, ...]  # numbers of the controlled pantographs, 1 for the first
+    drifts: bool  # whether the train's speed drifts
+    conditions: tuple[Mapping[str, Any], ...]  # of the line, of which one was drawn; plain data
+    spacing: float | None  # of the grid (m); None for lines without one
+    window: int | None  # travelling spans, 0 for the whole line; None for lines without a grid
 
-    @property
-    def version(self) -> str:
-        """Version of the project that made the run."""
-        return str(self.settings.get("version", "unknown"))
-
-    @property
-    def controlled(self) -> tuple[int, ...]:
-        """Numbers of the controlled pantographs, 1 for the first."""
-        return tuple(self.settings.get("controlled", (1,)))
-
-    @property
-    def distances(self) -> tuple[float, ...]:
-        """Distance of each further pantograph behind the first (m)."""
-        return tuple(self.settings.get("distances", ()))
-
-    @property
-    def drifts(self) -> bool:
-        """Whether the train's speed drifts."""
-        return bool(self.settings.get("speed_drift"))
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Identity from a run's settings as plain data."""
+        return cls(
+            version=settings.get("version", "unknown"),
+            controlled=tuple(settings.get("controlled", (1,))),
+            drifts=bool(settings.get("speed_drift")),
+            conditions=tuple(settings.get("line_condition") or ()),
+            spacing=settings.get("spacing"),
+            window=settings.get("window"),
+        )
 
     @property
     def wind(self) -> float:
         """Mean wind along the track in which the run may have been made, the strongest (m/s); 0: none."""
-        conditions = self.settings.get("line_condition") or ()
-        return max((each.get("wind", 0.0) for each in conditions), key=abs, default=0.0)
+        return max((each.get("wind", 0.0) for each in self.conditions), key=abs, default=0.0)
 
     @property
     def line_condition(self) -> LineCondition:
-        """Condition of the line, the first of several to draw from. Raises ValueError where not valid."""
-        conditions = self.settings.get("line_condition")
-        return LineCondition.model_validate(conditions[0]) if conditions else NEW
-
-    @property
-    def known_pantograph(self) -> PantographData | None:
-        """Pantograph that policies assume, if it was given. Raises ValueError where it is not valid."""
-        known = self.settings.get("known_pantograph")
-        return PantographData.model_validate(known) if known else None
-
-    @property
-    def spacing(self) -> float | None:
-        """Spacing of the grid (m); None for lines without one."""
-        return self.settings.get("spacing")
-
-    @property
-    def window(self) -> int | None:
-        """Spans of the travelling window, 0 for a whole line; None for lines without a grid."""
-        return self.settings.get("window")
+        """Condition of the line, the first of several. Raises ValueError where it is not valid."""
+        return LineCondition.model_validate(self.conditions[0]) if self.conditions else NEW
 
 
 @dataclass(frozen=True)
 class Design:
     """Line and pantographs of a run by value, as designed.
 
-    Those properties that are lines or pantographs raise KeyError or ValueError where a run's file, of another
-    version, has none that are valid in this one.
+    A line or a pantograph that is missing or not valid raises KeyError or ValueError.
     """
 
     tables: Mapping[str, Any]  # plain data by "catenary", "pantograph" and, for a train, "pantographs"

@@ -71,7 +71,7 @@ class Trajectory:
     @property
     def identity(self) -> Identity:
         """Settings with which the run was made, by type."""
-        return Identity(self.settings)
+        return Identity.of(self.settings)
 
     @property
     def designed(self) -> Design:

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..base import plotting as marks
 from ..base.arrays import Array
 from ..base.checksums import __version__
 from ..base.files import PAGES, check_output, write_text
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above, panels
+from ..base.plotting import BLUE, LIMIT, ORANGE, POSITION, legend_above, mark_losses, mark_supports, panels
 from ..base.table import Alarm, Table
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from ..report.charts import HIGHEST, drawn
+from ..report.charts import HIGHEST, as_svg
 from ..report.page import FILTER, page_template
 from .compare import Comparison, acceptance_table, criterion_notes, figures_table, shift_sentence, spans_table
 from .judge import (
@@ -78,15 +77,15 @@ def draw_force(axes: Axes, found: Judgement) -> None:
             axes.plot(*_thin(position, samples.raw[part]), color="0.78", linewidth=0.7, label=raw)
             lost += position[losses_of_contact(samples.raw[part])[0]].tolist()
         axes.plot(*_thin(position, samples.in_place[part]), color=BLUE, linewidth=1.1, label=words)
-    marks.mark_losses(axes, lost)
+    mark_losses(axes, lost)
     axes.axhline(0.0, color=LIMIT, linewidth=0.9)
     begin, end = float(samples.position.min()), float(samples.position.max())
     label = "position (m)"
     if found.alignment is not None:
         supports = found.alignment.supports_within(begin, min(end, found.reach[1]))
         if len(supports) <= MOST_SUPPORTS:
-            marks.mark_supports(axes, supports)
-            label = marks.POSITION
+            mark_supports(axes, supports)
+            label = POSITION
     axes.set(xlabel=label, ylabel="contact force (N)", xlim=(begin, end))
     legend_above(axes, 4)
 
@@ -125,8 +124,8 @@ def draw_overlay(axes: Axes, found: Comparison) -> None:
         axes.plot(samples.position[part], samples.in_place[part], color=ORANGE, linewidth=2.6, label=label)
     force = zero_phase_low_pass(run.contact_force, run.time_step)
     axes.plot(run.position, force, color=BLUE, linewidth=1.0, label="run")
-    marks.mark_supports(axes, run.alignment.supports_within(begin, end))
-    axes.set(xlabel=marks.POSITION, xlim=(begin, end))
+    mark_supports(axes, run.alignment.supports_within(begin, end))
+    axes.set(xlabel=POSITION, xlim=(begin, end))
     axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
     legend_above(axes, 2)
 
@@ -145,17 +144,11 @@ def save_record_page(found: Judgement, title: str, path: str | Path) -> None:
     """Write the page of a record, whole or not at all. Raises InputError for a name with another suffix."""
     supports = found.alignment is not None
     charts = [
-        (
-            "Contact force along the line",
-            drawn(lambda axes: draw_force(axes, found), along_line=supports),
-        ),
-        ("Spectrum of the force as recorded", drawn(lambda axes: draw_spectrum(axes, found))),
+        ("Contact force along the line", as_svg(along_line=supports)(draw_force)(found)),
+        ("Spectrum of the force as recorded", as_svg()(draw_spectrum)(found)),
     ]
-    shown = [
-        whole_table(found, "Figures of the whole record"),
-        requirements_table(found),
-        *part_tables(found),
-    ]
+    whole = whole_table(found, "Figures of the whole record")
+    shown = [whole, requirements_table(found), *part_tables(found)]
     _save(title, FILTER, found.notes, charts, shown, requirement_remarks(found), path)
 
 
@@ -164,9 +157,9 @@ def save_comparison_page(found: Comparison, title: str, path: str | Path) -> Non
     charts = [
         (
             "Both forces by place, low-passed at 20 Hz, not delayed",
-            drawn(lambda axes: draw_overlay(axes, found), along_line=True),
+            as_svg(along_line=True)(draw_overlay)(found),
         ),
-        ("Standard deviation by span", drawn(lambda axes: draw_spans(axes, found))),
+        ("Standard deviation by span", as_svg()(draw_spans)(found)),
     ]
     shown = [acceptance_table(found), figures_table(found), spans_table(found)]
     words = f"The simulation is {found.verdict}. {shift_sentence(found)} {FILTER}"
