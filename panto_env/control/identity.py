@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel
-
 from ..base.checksums import __version__
 from ..base.files import finite
 from ..metrics.trajectory import Trajectory
@@ -22,15 +20,12 @@ NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "cost", "settle")
 
 def plain(settings: RunSettings) -> dict[str, Any]:
     """Settings by name as plain data; line and pantograph only by their names."""
-    values = {
-        name: getattr(settings, name) for name in type(settings).model_fields if name not in NOT_OF_A_RUN
-    }
-    names: dict[str, Any] = {name: values[name].name for name in ("catenary", "pantograph")}
+    alone = () if settings.pantographs else OF_TRAINS
+    values = settings.model_dump(mode="json", exclude={*NOT_OF_A_RUN, *alone}, serialize_as_any=True)
+    names: dict[str, Any] = {name: getattr(settings, name).name for name in ("catenary", "pantograph")}
     if settings.pantographs:
         names["pantographs"] = [own.name for own in settings.pantographs]
-    else:  # one pantograph: there is nothing to say
-        values = {name: value for name, value in values.items() if name not in OF_TRAINS}
-    table: dict[str, Any] = finite({name: _data(value) for name, value in (values | names).items()})
+    table: dict[str, Any] = finite(values | names)
     return table
 
 
@@ -59,9 +54,3 @@ def settings_of(run: Trajectory) -> dict[str, Any]:
         for name, value in values.items()
         if name in RunSettings.model_fields and value not in (None, ())  # not given
     }
-
-
-def _data(value: Any) -> Any:
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json")
-    return [_data(item) for item in value] if isinstance(value, tuple) else value
