@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from panto_env.analysis.plots import mark_supports_of_run
-from panto_env.base import plotting as marks
-from panto_env.base.arrays import from_kmh
-from panto_env.base.plotting import LIMIT, series_colour
+from panto_env.analysis.plots import fit_force_axis, mark_supports_of_run
+from panto_env.base.plotting import LIMIT, POSITION, series_colour
 from panto_env.metrics import compliance as en50367
 from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
@@ -69,12 +67,11 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> 
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
         axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
-    limit = en50367.maximum_limit(from_kmh(speed), run.line.system)
-    marks.fit_force_axis([axes], limit, en50367.maximum_source(run.line.system))
+    fit_force_axis([axes], run)
     mark_supports_of_run(axes, run)
     axes.set(
         title=f"at {speed:g} km/h, seed {seed}, spans {in_words(shown)}",
-        xlabel=marks.POSITION,
+        xlabel=POSITION,
         ylabel="contact force low-passed\nat 20 Hz, not delayed (N)",
         xlim=run.alignment.limits(shown),
     )

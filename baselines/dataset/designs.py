@@ -151,7 +151,7 @@ def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> 
         "nominal_force": run.nominal_force,
         "wave_speed": run.line.wave_speed,
         "time_step": run.time_step,
-        "spacing": run.settings["spacing"],
+        "spacing": run.identity.spacing,
     }
     # One that the run does not have, such as uplift on a line without supports, is null.
     kept = {name: figures[name] for name in FIGURES if name in figures}

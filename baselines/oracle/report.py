@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from panto_env.analysis.plots import mark_supports_of_run
-from panto_env.base import plotting as marks
-from panto_env.base.plotting import BLUE, legend_above
+from panto_env.base.plotting import BLUE, POSITION, legend_above, panels
 from panto_env.base.table import Table
 from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
@@ -129,20 +128,17 @@ def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
 
 def plot(oracle: Oracle) -> Figure:
     """Picture of contact force and actuator force along the evaluated spans, and of σ by iteration."""
-    from matplotlib.figure import Figure
-
     problem, run = oracle.problem, oracle.run
     inside = problem.passive.inside(problem.chosen)
     position = run.position[inside]
-    figure = Figure(figsize=(10, 9), layout="constrained")
-    force, actuator, search = figure.subplots(3, 1)
+    figure, (force, actuator, search) = panels((10, 9), 3)
     for values, colour, label in zip(oracle.forces, ("0.6", BLUE), ("passive", "oracle"), strict=True):
         force.plot(position, values[inside], color=colour, label=label)
     force.set(ylabel="contact force low-passed\nat 20 Hz, not delayed (N)")
     for values, label in ((run.frame_force, "on the frame"), (run.head_force, "on the head")):
         if np.any(values):
             actuator.plot(position, values[inside], linewidth=0.9, label=label)
-    actuator.set(ylabel="actuator force (N)", xlabel=marks.POSITION)
+    actuator.set(ylabel="actuator force (N)", xlabel=POSITION)
     for axis in (force, actuator):
         mark_supports_of_run(axis, run)
         axis.set_xlim(position[0], position[-1])

@@ -16,7 +16,7 @@ from pydantic import Field
 from panto_configs import find
 from panto_env.base.checksums import __version__, read_checked, with_checksum
 from panto_env.base.errors import InputError
-from panto_env.base.files import finite, read_toml, write_whole
+from panto_env.base.files import finite, read_toml, write_text
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.catalog.loader import is_entry
 from panto_env.control.identity import OF_TRAINS
@@ -210,8 +210,7 @@ def save(cells: Sequence[Mapping[str, Any]], path: str | Path, command: str) -> 
     """Write cells as JSON with a checksum, one line per cell and per pass, whole or not at all."""
     text = json.dumps(with_checksum(as_data(cells, command)), separators=(",", ":"))
     text = text.replace('{"seed"', '\n{"seed"').replace('{"catenary"', '\n{"catenary"')
-    with write_whole(path) as temporary:
-        temporary.write_text(f"{text}\n", encoding="utf-8")
+    write_text(path, f"{text}\n")
 
 
 def read(path: str | Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import typer
 
 from panto_env.analysis.options import DroppersFile, FiguresFile
 from panto_env.base.errors import InputError
-from panto_env.base.files import JSON, PAGES, check_output, suffix_of, with_suffix, write_whole
+from panto_env.base.files import JSON, PAGES, check_output, suffix_of, with_suffix, write_text
 from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
@@ -46,8 +46,7 @@ def page(results: Sequence[Result]) -> str:
 def save(results: Sequence[Result], path: str | Path) -> None:
     """Write the page, whole or not at all. Raises InputError for a file name without a page's suffix."""
     check_output(path, PAGES)
-    with write_whole(path) as temporary:
-        temporary.write_text(page(results), encoding="utf-8")
+    write_text(path, page(results))
 
 
 def report(

@@ -12,7 +12,7 @@ from pathlib import Path
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import __version__, read_checked, write_checked
 from panto_env.base.errors import InputError
-from panto_env.base.files import alone_in, check_output, write_whole
+from panto_env.base.files import alone_in, check_output, write_text
 from panto_env.base.table import Table
 from panto_env.catalog.loader import content_unless_catalogue
 from panto_env.cluster import identity, open_parts, spread
@@ -133,9 +133,7 @@ def store(path: Path, policy: str, tuning: Tuning) -> None:
     old = load_gains(path).tunings if os.path.isfile(path) else ()
     kept = [each for each in old if _case(each) != _case(tuning)]
     file = GainFile(policy=policy, tunings=(*kept, tuning)).model_dump(mode="json")
-    with write_whole(path) as temporary:
-        head = "# Gains of a policy, written by `panto tune`.\n"
-        temporary.write_text(head + as_toml(file), encoding="utf-8")
+    write_text(path, "# Gains of a policy, written by `panto tune`.\n" + as_toml(file))
 
 
 def _case(tuning: Tuning) -> tuple[str | float, ...]:

@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import plotting as marks
 from ..base.files import PICTURES, check_output, suffix_of, write_whole
 from ..base.plotting import (
     BLUE,
     GREEN,
+    LIMIT,
+    NEAR,
     ORANGE,
     POSITION,
     PURPLE,
     SUPPORT,
     VERMILION,
     legend_above,
+    mark_losses,
     mark_supports,
     series_colour,
+    stacked,
 )
 from ..metrics import compliance as en50367
 from ..metrics.figures import SpanChoice, in_words, losses_of_contact
@@ -39,7 +42,6 @@ from .line_check import LineCheck
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 ACTUATORS = {"frame_force": "on the frame", "head_force": "on the head"}
 
@@ -87,13 +89,11 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
 
     A train has a panel of the contact force for each pantograph, one below the other by place.
     """
-    from matplotlib.figure import Figure
-
     train, several = run.train, len(run.train) > 1
     acting = any(getattr(own, name).any() for own in train for name in ACTUATORS)
-    figure = Figure(figsize=(10, (8.6 if acting else 7) + 2.6 * (len(train) - 1)), layout="constrained")
     ratios = [1.6] * len(train) + ([1, 1] if acting else [1])  # limits of forces take room
-    axes = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios).tolist()
+    size = 10, (8.6 if acting else 7) + 2.6 * (len(train) - 1)
+    figure, axes = stacked(size, len(ratios), height_ratios=ratios)
     contacts, height, others = axes[: len(train)], axes[len(train)], axes[len(train) + 1 :]
     covered = run.common_spans(spans)
     for place, (contact, own) in enumerate(zip(contacts, train, strict=True)):
@@ -114,13 +114,12 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
                     axis.plot(position, getattr(own, name)[shown], color=colour, label=f"{words}{whose}")
             axis.set(ylabel="actuator force (N)")
     height.set(ylabel="height (mm)")
-    supply = run.line.system
-    marks.fit_force_axis(contacts, en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply))
+    fit_force_axis(contacts, run)
     for axis in figure.axes:
         mark_supports_of_run(axis, run)
         legend_above(axis)
     begin, end = (0.0, run.distance) if covered is None else run.alignment.limits(covered)
-    figure.axes[-1].set(xlabel=f"{marks.POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
+    figure.axes[-1].set(xlabel=f"{POSITION}; {_not_shown(run, covered)}", xlim=(begin, end))
     words = f"{'pantographs' if several else 'pantograph'} {run.pantographs}"
     where = f"{words}, line {run.catenary}, {run.speed_kmh:g} km/h"
     shown_spans = "the whole run" if covered is None else f"spans {in_words(covered)}"
@@ -130,28 +129,41 @@ def plot_run(run: Trajectory, spans: SpanChoice = None) -> Figure:
 
 def plot_forces(runs: Sequence[Trajectory], labels: Sequence[str], spans: Spans, title: str) -> Figure:
     """Contact forces of several runs over the same spans, one panel per run."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 1.6 + 2.1 * len(runs)), layout="constrained")
-    axes = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    figure, axes = stacked((10, 1.6 + 2.1 * len(runs)), len(runs), sharey=True)
     for axis, run, label in zip(axes, runs, labels, strict=True):
         _draw_force(axis, run, run.alignment.within(run.position, spans), raw="0.8")
         note = ", ended early" if run.terminated else ""
         axis.set_title(f"{label}{note}", loc="left", fontsize="medium")
         mark_supports_of_run(axis, run)
-    limit = en50367.maximum_limit(runs[0].speed, runs[0].line.system)
-    marks.fit_force_axis(axes.tolist(), limit, en50367.maximum_source(runs[0].line.system))
+    fit_force_axis(axes, runs[0])
     legend_above(axes[0])
-    axes[-1].set(
-        xlabel=f"{marks.POSITION}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans)
-    )
+    axes[-1].set(xlabel=f"{POSITION}; {_not_shown(runs[0], spans)}", xlim=runs[0].alignment.limits(spans))
     figure.suptitle(title)
     return figure
 
 
+def fit_force_axis(axes: Sequence[Axes], run: Trajectory, others: Sequence[float] = ()) -> None:
+    """Fit axes to the contact forces drawn (N), from 0 N on, and name the limit for a run in their legends.
+
+    The limit is within the axis where it is near the force: a force of 60 N would use a sixth of one up to
+    350 N. axes: all have the same extent. others: forces of pictures beside these (N), for the same extent.
+    """
+    limit = en50367.maximum_limit(run.speed, run.line.system)
+    low = min(0.0, *others, *(axis.dataLim.y0 for axis in axes))
+    high = max(1.0, *others, *(axis.dataLim.y1 for axis in axes))
+    near = limit <= NEAR * high
+    top = max(high, limit) if near else high
+    source, where = en50367.maximum_source(run.line.system), "" if near else ", above the axis"
+    for axis in axes:
+        words = f"{source}: at most {limit:g} N{where}"
+        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
+        axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
+        axis.set_ylim(low - 0.05 * top, 1.06 * top)
+
+
 def mark_supports_of_run(axis: Axes, run: Trajectory) -> None:
     """Draw dashed lines at the supports of a run."""
-    marks.mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
+    mark_supports(axis, map(run.alignment.support, range(run.alignment.span_of(run.position[-1]) + 1)))
 
 
 def say_what_is_hidden(axis: Axes) -> None:
@@ -176,7 +188,7 @@ def _draw_force(axis: Axes, run: Trajectory, shown: NDArray[np.bool_], raw: str)
     axis.plot(position, run.contact_force[shown], color=raw, linewidth=0.8, label="raw")
     axis.plot(position, filtered, color=BLUE, label="low-passed at 20 Hz, not delayed")
     axis.axhline(run.nominal_force, color="0.4", linestyle=":", label="nominal")
-    marks.mark_losses(axis, position[losses_of_contact(run.contact_force[shown])[0]].tolist())
+    mark_losses(axis, position[losses_of_contact(run.contact_force[shown])[0]].tolist())
     axis.set(ylabel="contact force (N)")
 
 
@@ -198,8 +210,6 @@ def plot_line(found: LineCheck) -> Figure:
 
     Heights are exaggerated. Of a line whose spans are all alike, three are drawn.
     """
-    from matplotlib.figure import Figure
-
     line, shape = found.line, hang(found.line)
     spans, heights, encumbrances = spans_of(line) if line.sequence else spans_of(line, SHOWN)
     supports = np.array(line.alignment(len(spans)).supports)
@@ -208,9 +218,9 @@ def plot_line(found: LineCheck) -> Figure:
     droppers = dropper_positions(line, len(spans))
     x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
     width = min(max(9.0, supports[-1] / 80.0), 40.0)
-    figure = Figure(figsize=(width, 8.2), layout="constrained")
-    wires, contact, elasticity = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
-    for axis in (wires, contact, elasticity):
+    figure, every = stacked((width, 8.2), 3, height_ratios=(3, 2, 2))
+    wires, contact, elasticity = every
+    for axis in every:
         mark_supports(axis, supports.tolist())
     tops = np.array(heights) + encumbrances
     wires.vlines(supports, min(heights) - 0.15, tops, color=SUPPORT, linewidth=2.5, label="support")

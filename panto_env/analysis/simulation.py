@@ -170,10 +170,10 @@ def load_with_settings(path: str | Path) -> tuple[Trajectory, dict[str, Any]]:
     """
     run = Trajectory.load(path)
     try:
-        return run, _as_given(settings_of(run.settings, run.design), run)
+        return run, _as_given(settings_of(run), run)
     except (KeyError, ValueError) as error:
         raise InputError(
-            f"{path} was written by another version, {run.settings.get('version', 'unknown')}, without its "
+            f"{path} was written by another version, {run.identity.version}, without its "
             "line or with other settings, so the run cannot be repeated; write it again with "
             "`panto simulate --output`."
         ) from error

@@ -264,7 +264,9 @@ def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
             "system": own.line.system,
             "speed_kmh": one_pass.arguments["speed_kmh"],
             "seed": own.seed,
-            **{name: own.settings[name] for name in ("time_step", "spacing", "window")},  # as the values need
+            "time_step": own.time_step,  # as the values need, and so the next two
+            "spacing": own.identity.spacing,
+            "window": own.identity.window,
             "nominal_force": own.nominal_force,
             "terminated": own.terminated,
             "ending": own.ending,

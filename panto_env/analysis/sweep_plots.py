@@ -7,10 +7,9 @@ from math import isnan
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from ..base import plotting as marks
 from ..base.arrays import from_kmh
 from ..base.errors import InputError
-from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, series_colour
+from ..base.plotting import HIGH_IS_BAD, LIMIT, LOW_IS_BAD, NEAR, panels, series_colour, stacked
 from ..metrics import compliance as en50367
 from ..metrics.figures import LABELS, NUMBER
 
@@ -59,15 +58,14 @@ def plot_sweep(
 
 
 def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Figure:
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     shown = [key for key in ("std", "contact_loss", "max_uplift") if not all(isnan(row[key]) for row in rows)]
     no_loss = all(row["contact_loss"] == 0 for row in rows)
     if no_loss:
         shown.remove("contact_loss")
-    figure = Figure(figsize=(8, 1 + 2.4 * (1 + len(shown))), layout="constrained")
-    force, *others = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    count = 1 + len(shown)
+    figure, (force, *others) = stacked((8, 1 + 2.4 * count), count)
     series = _series(rows)
     for k, own in enumerate(series.values()):
         values, colour = [row[parameter] for row in own], series_colour(k)
@@ -110,7 +108,7 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
     limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
     high = force.dataLim.y1
-    if min(limits) > marks.NEAR * high:
+    if min(limits) > NEAR * high:
         most = " or ".join(f"{limit:g}" for limit in sorted({*limits}))
         notes = [f"{en50367.maximum_source(rows[0]['system'])}'s maximum of {most} N is above the axis."]
     else:
@@ -123,12 +121,11 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
 
 def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str]) -> Figure:
     import numpy as np
-    from matplotlib.figure import Figure
 
     first, second = (np.array(sorted({row[name] for row in rows})) for name in parameters)
     series = _series(rows)
-    figure = Figure(figsize=(13, 1.2 + 3.5 * len(series)), layout="constrained")
-    axes = figure.subplots(len(series), len(MAPPED), sharex=True, sharey=True, squeeze=False)
+    shape, shared = (len(series), len(MAPPED)), {"sharex": True, "sharey": True, "squeeze": False}
+    figure, axes = panels((13, 1.2 + 3.5 * len(series)), *shape, **shared)
     for (key, colours), column in zip(MAPPED.items(), axes.T, strict=True):
         values = [row[key] for row in rows if not isnan(row[key])]
         low, high = (min(values), max(values)) if values else (0.0, 1.0)  # one scale for all policies

@@ -71,6 +71,12 @@ def write_whole(path: str | Path) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written: {_reason(error)}.") from error
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all. Raises InputError where it cannot be written."""
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def _beside(path: str | Path) -> Path:
     """A new name in the folder of a file, through links, with the same suffix, which sets its format."""
     target = Path(os.path.realpath(path))

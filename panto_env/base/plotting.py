@@ -1,4 +1,4 @@
-"""Colours, marks and legends that all pictures share."""
+"""Figures, colours, marks and legends that all pictures share."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
@@ -26,6 +27,20 @@ def series_colour(number: int) -> str:
     return SERIES[number % len(SERIES)]
 
 
+def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure of this size (inches) and its axes. Matplotlib is imported late: it is slow to import."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def stacked(size: tuple[float, float], count: int, **options: Any) -> tuple[Figure, list[Axes]]:
+    """A figure of this size (inches), and axes below each other along the same x."""
+    figure, axes = panels(size, count, sharex=True, squeeze=False, **options)
+    return figure, axes[:, 0].tolist()
+
+
 POSITION = "position (m); dashed lines: supports"
 """Label of the axis along the line."""
 NEAR = 1.4
@@ -43,23 +58,6 @@ def mark_losses(axis: Axes, places: Sequence[float]) -> None:
     if len(places):
         style: dict[str, Any] = {"linestyle": "", "marker": "s", "markersize": 5, "color": VERMILION}
         axis.plot(places, [0.0] * len(places), label="contact lost", zorder=3, clip_on=False, **style)
-
-
-def fit_force_axis(axes: Sequence[Axes], limit: float, standard: str, others: Sequence[float] = ()) -> None:
-    """Fit axes to the contact forces drawn (N), from 0 N on, and name a standard's limit in their legends.
-
-    The limit is within the axis where it is near the force: a force of 60 N would use a sixth of one up to
-    350 N. axes: all have the same extent. others: forces of pictures beside these (N), for the same extent.
-    """
-    low = min(0.0, *others, *(axis.dataLim.y0 for axis in axes))
-    high = max(1.0, *others, *(axis.dataLim.y1 for axis in axes))
-    near = limit <= NEAR * high
-    top = max(high, limit) if near else high
-    for axis in axes:
-        words = f"{standard}: at most {limit:g} N{'' if near else ', above the axis'}"
-        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
-        axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
-        axis.set_ylim(low - 0.05 * top, 1.06 * top)
 
 
 def legend_above(axis: Axes, columns: int = 5) -> None:

@@ -20,7 +20,7 @@ from ..estimation.estimate import tune as find
 from ..estimation.innovations import nis
 from ..estimation.model import EstimatorSettings
 from ..estimation.motion import Motion, read_motion, rezeroed
-from ..metrics.figures import LABELS
+from ..metrics.figures import LABELS, statistics
 from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData
 from ..terminal import (
@@ -159,8 +159,7 @@ def _sheet(found: Estimate) -> Sheet:
 def _figures(found: Estimate) -> dict[str, float]:
     """Statistics of the estimate behind EN 50317's low-pass (N), after the filter's start."""
     step = float(found.time[1] - found.time[0])
-    force = low_pass(found.force, step)[found.first :]
-    return {name: float(getattr(force, name)()) for name in ("mean", "std", "max", "min")}
+    return statistics(low_pass(found.force, step)[found.first :])
 
 
 def _scores(motion: Motion, found: Estimate) -> list[Score]:

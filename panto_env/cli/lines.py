@@ -13,7 +13,7 @@ from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, s
 from ..analysis.options import print_criteria
 from ..analysis.plots import plot_line, save
 from ..base.errors import InputError
-from ..base.files import write_whole
+from ..base.files import write_text
 from ..base.settings import parse
 from ..catalog import load_catenary, load_drawn
 from ..catalog.loader import drawn_kind, parse_catenary
@@ -85,7 +85,7 @@ def line(
     broken = [each for each in criteria if each.kept is False]
     with written_last() as later:
         if output is not None and text is not None:
-            later(_write, text, output)
+            later(write_text, output, text)
         if plot is not None:
             later(save, plot_line(found), plot)
         if json:
@@ -115,11 +115,6 @@ def line(
                 alert(f"{limit.name} is not kept.")
     if broken:
         raise typer.Exit(1)
-
-
-def _write(text: str, path: str) -> None:
-    with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def family(

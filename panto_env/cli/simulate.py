@@ -117,7 +117,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     console.print(f"{title}, policy {trajectory.policies}, spans {in_words(covered)}")
     for place, own in enumerate(train, start=1):
         if not math.isnan(own.target_mean):
-            at = ", both at the mean speed" if own.drifts else ""
+            at = ", both at the mean speed" if own.identity.drifts else ""
             whose = f"Pantograph {place}: applied" if len(train) > 1 else "Applied"
             console.print(
                 f"{whose} force {own.nominal_force:.1f} N, trimmed for a passive mean of "

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
-
-from pydantic import BaseModel
 
 from ..base.checksums import __version__
 from ..base.files import finite
-from ..plant.catenary import CATENARIES
+from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..plant.plant import Plant
 from .observation import OBSERVATION_SETTINGS
@@ -23,15 +20,12 @@ NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "cost", "settle")
 
 def plain(settings: RunSettings) -> dict[str, Any]:
     """Settings by name as plain data; line and pantograph only by their names."""
-    values = {
-        name: getattr(settings, name) for name in type(settings).model_fields if name not in NOT_OF_A_RUN
-    }
-    names: dict[str, Any] = {name: values[name].name for name in ("catenary", "pantograph")}
+    alone = () if settings.pantographs else OF_TRAINS
+    values = settings.model_dump(mode="json", exclude={*NOT_OF_A_RUN, *alone}, serialize_as_any=True)
+    names: dict[str, Any] = {name: getattr(settings, name).name for name in ("catenary", "pantograph")}
     if settings.pantographs:
         names["pantographs"] = [own.name for own in settings.pantographs]
-    else:  # one pantograph: there is nothing to say
-        values = {name: value for name, value in values.items() if name not in OF_TRAINS}
-    table: dict[str, Any] = finite({name: _data(value) for name, value in (values | names).items()})
+    table: dict[str, Any] = finite(values | names)
     return table
 
 
@@ -42,29 +36,21 @@ def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, 
     return {"version": __version__, **plain(settings), **resulting, **grid}
 
 
-def settings_of(identity: Mapping[str, Any], design: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with which a run of this identity can be repeated; the inverse of ``identity``.
+def settings_of(run: Trajectory) -> dict[str, Any]:
+    """Settings with which a run can be repeated, but for those that only concern policies.
 
-    design: line and pantograph by value, as in ``Trajectory.design``. Settings that only concern policies
-    are missing. Raises KeyError or ValueError where something is missing or not valid.
+    The inverse of ``identity``. Raises KeyError or ValueError where something is missing or not valid.
     """
-    line = design["catenary"]
+    design, known = run.designed, run.settings.get("known_pantograph")
     values = {
-        name: value
-        for name, value in identity.items()
-        if name in RunSettings.model_fields and value is not None  # None: not given
+        **run.settings,
+        "catenary": design.line,
+        "pantograph": design.pantograph,
+        "pantographs": design.pantographs,
+        "known_pantograph": PantographData.model_validate(known) if known else None,
     }
-    values["catenary"] = CATENARIES[line["kind"]].schema.model_validate(line)
-    values["pantograph"] = PantographData.model_validate(design["pantograph"])
-    if "pantographs" in design:
-        values["pantographs"] = [PantographData.model_validate(own) for own in design["pantographs"]]
-        values["pantograph"] = values["pantographs"][0]
-    if "known_pantograph" in values:
-        values["known_pantograph"] = PantographData.model_validate(values["known_pantograph"])
-    return values
-
-
-def _data(value: Any) -> Any:
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json")
-    return [_data(item) for item in value] if isinstance(value, tuple) else value
+    return {
+        name: value
+        for name, value in values.items()
+        if name in RunSettings.model_fields and value not in (None, ())  # not given
+    }

@@ -382,7 +382,7 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
                 f"{' and '.join(f'{force:.1f}' for force in forces)} N of static force: {run.ending}"
             )
         chosen = [
-            spans or settled_spans(each.distance, each.alignment, each.line_ends) or "all"
+            spans or settled_spans(each.distance, each.alignment, each.designed.line_ends) or "all"
             for each in run.train
         ]
         return tuple(
@@ -395,7 +395,7 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
 
 def _required_more(settings: RunSettings, run: Trajectory, spans: SpanChoice, collector: int = 0) -> float:
     required = target_mean(settings, run.speed, collector)
-    if required is None or not run.drifts:
+    if required is None or not run.identity.drifts:
         return 0.0
     speeds = run.speeds[run.inside(spans)].tolist()
     at_each = np.array([target_mean(settings, speed, collector) for speed in speeds], dtype=float)

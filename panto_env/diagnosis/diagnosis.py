@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import plotting as marks
 from ..base.arrays import Array
 from ..base.errors import beside
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.plotting import BLUE, LIMIT, ORANGE, POSITION, legend_above, mark_supports, stacked
 from ..base.table import Table
 from ..catalog import load_pantograph
 from ..fitting.stored import Stored
@@ -37,7 +36,6 @@ from .passes import Passes, side_by_side
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
 
 ENOUGH_PASSES = 10
 """Healthy passes from which on how they differ is well known: with fewer, what a pantograph unlike all of
@@ -252,13 +250,10 @@ def verdict(diagnosis: Diagnosis) -> list[str]:
 
 def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     """Force beside healthy passes, and the score with its threshold, findings, supports and droppers."""
-    from matplotlib.figure import Figure
-
     evidence = diagnosis.evidence
     shown = (evidence.position >= diagnosis.begin) & (evidence.position <= diagnosis.end)
     x = evidence.position[shown]
-    figure = Figure(figsize=(12, 6), layout="constrained")
-    force, score = figure.subplots(2, 1, sharex=True)
+    figure, (force, score) = stacked((12, 6), 2)
     force.plot(x, evidence.rest[shown], color=BLUE, linewidth=0.9)
     force.set(ylabel="force beside healthy passes (N)")
     score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
@@ -267,15 +262,14 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
-        supports = evidence.alignment.supports_within(diagnosis.begin, diagnosis.end)
-        marks.mark_supports(axis, map(evidence.alignment.support, supports))
+        mark_supports(axis, evidence.alignment.supports_within(diagnosis.begin, diagnosis.end))
         for finding in diagnosis.findings:
             axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
     for finding in diagnosis.findings:
         words = f"{finding.kind}, span {evidence.alignment.span_name(finding.span)}, {place(finding)}"
         above = force.get_xaxis_transform()
         force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
-    score.set(ylabel="score (-)", xlabel=marks.POSITION, xlim=(diagnosis.begin, diagnosis.end))
+    score.set(ylabel="score (-)", xlabel=POSITION, xlim=(diagnosis.begin, diagnosis.end))
     legend_above(score, 3)
     figure.suptitle(title)
     return figure

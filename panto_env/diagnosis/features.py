@@ -103,7 +103,7 @@ def candidates(evidence: Evidence, region: Region) -> list[Candidate]:
     droppers = evidence.droppers[np.abs(evidence.droppers - peak) < AHEAD]
     alignment = evidence.alignment
     near = max(SUPPORTS, 0.6 * alignment.length_at(peak))
-    supports = alignment.support(alignment.supports_within(peak - near, peak + near))
+    supports = alignment.supports_within(peak - near, peak + near)
     wire = np.arange(np.ceil(peak - AHEAD), peak + AHEAD)
     return [
         Candidate(float(position), sort)

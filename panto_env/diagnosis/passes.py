@@ -39,10 +39,10 @@ def known_pantograph(run: Trajectory) -> PantographData:
 
     Raises InputError where the run does not hold them.
     """
-    values = run.settings.get("known_pantograph") or run.design.get("pantograph")
     try:
-        return PantographData.model_validate(values)
-    except ValidationError as error:
+        known = run.settings.get("known_pantograph")
+        return PantographData.model_validate(known) if known else run.designed.pantograph
+    except (KeyError, ValidationError) as error:
         raise InputError(
             f"The run does not hold the masses and springs of its pantograph '{run.pantograph}', without "
             "which no force can be estimated; give its name or its TOML file with --pantograph."

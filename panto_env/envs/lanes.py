@@ -318,6 +318,11 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     return infos
 
 
+def final_infos(observation: Any, infos: dict[str, Any], ended: Any) -> dict[str, Any]:
+    """Infos with the final values of the lanes whose episodes have ended, (lanes,), in "SameStep"."""
+    return {"final_obs": observation, "_final_obs": ended, "final_info": infos, "_final_info": ended}
+
+
 def lane_figures(figures: Mapping[str, Array], lanes: Flags) -> dict[str, Any]:
     """Infos with the figures, (lanes,), by name, of the lanes whose episodes have ended.
 

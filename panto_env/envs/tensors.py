@@ -22,7 +22,7 @@ from .episodes import (
     checked_seed,
     one_at_a_time,
 )
-from .lanes import REWARD, Answer, lane_figures, lane_infos
+from .lanes import REWARD, Answer, final_infos, lane_figures, lane_infos
 from .settings import TensorSettings
 from .vector import SharedByLanes
 
@@ -141,17 +141,11 @@ class PantographTensorEnv(SharedByLanes):
         infos = lane_infos(answer)
         if bool(ended.any()):
             if self.autoreset_mode == AutoresetMode.SAME_STEP:
-                last = self._of(answer, ended)
-                final = lane_infos(last) | self._figures(ended)
-                own = {
-                    "final_obs": observation,
-                    "_final_obs": ended,
-                    "final_info": final,
-                    "_final_info": ended,
-                }
+                last = lane_infos(self._of(answer, ended)) | self._figures(ended)
+                final = final_infos(observation, last, ended)
                 self._begin(ended)
                 begun = self._answer(~self._none)
-                observation, infos = begun.results.observation, lane_infos(begun) | own
+                observation, infos = begun.results.observation, lane_infos(begun) | final
             else:
                 infos |= self._figures(ended)
         return observation, reward, terminated, truncated, infos

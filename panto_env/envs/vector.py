@@ -29,7 +29,7 @@ from .episodes import (
     checked_seeds,
     one_at_a_time,
 )
-from .lanes import REWARD, Answer, lane_figures, lane_infos, lanes_of
+from .lanes import REWARD, Answer, final_infos, lane_figures, lane_infos, lanes_of
 from .settings import VectorSettings, render_metadata
 
 if TYPE_CHECKING:
@@ -246,12 +246,7 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
         final_observation = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended).tolist():
             final_observation[lane] = answer.results.observation[lane].copy()
-        final = {
-            "final_obs": final_observation,
-            "_final_obs": ended,
-            "final_info": lane_infos(answer.of(ended)) | self._figures(),
-            "_final_info": ended,
-        }
+        final = final_infos(final_observation, lane_infos(answer.of(ended)) | self._figures(), ended)
         self._begin(ended, self._usual)
         begun = self._lanes.answer()
         return begun.results.observation, lane_infos(begun) | final

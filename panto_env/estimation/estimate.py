@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError, suggest
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above, stacked
 from ..base.settings import Between, ranges_of
 from ..metrics.low_pass import zero_phase_low_pass
 from ..plant.pantograph.schema import PantographData
@@ -36,7 +36,6 @@ from .motion import Motion, check_motion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
 
 SETTLING = 1.0
 """Time (s) after which a record's start is forgotten; figures and tests are of what comes later."""
@@ -331,10 +330,7 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
 
     measured: contact force of the record (N), (n,), drawn beside it.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    force, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    figure, (force, innovations) = stacked((10, 6), 2, height_ratios=(3, 1))
     begin = estimate.time[estimate.first]
     end = min(begin + SHOWN, estimate.time[-1])
     shown = (estimate.time >= begin) & (estimate.time <= end)

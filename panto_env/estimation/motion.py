@@ -64,12 +64,13 @@ def on_frame(run: Trajectory) -> Array:
 
 def warn_of_wind(run: Trajectory) -> None:
     """Warn where a run was in wind, whose lift an estimator does not know."""
-    if not run.wind:
+    wind = run.identity.wind
+    if not wind:
         return
-    coefficient = run.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
-    more = coefficient * (to_kmh(run.speed + run.wind) ** 2 - run.speed_kmh**2)
+    coefficient = run.designed.aerodynamic_coefficient or 0.0
+    more = coefficient * (to_kmh(run.speed + wind) ** 2 - run.speed_kmh**2)
     warnings.warn(
-        f"A run was in wind of {run.wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, "
+        f"A run was in wind of {wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, "
         "is missing in the force that is estimated from the motion.",
         AccuracyWarning,
         stacklevel=1,  # one place for all runs: the sentence comes once

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
-from ..base.files import check_output, write_whole
+from ..base.files import check_output, write_text
 from ..catalog.loader import file_of, parse_catenary, parse_pantograph
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
@@ -205,5 +205,4 @@ def _write(path: str | Path, text: str, what: str, parse: Callable[[dict[str, An
             f"The fit found values that no {what} may have, so none is written: {error} Check the line, the "
             "pantograph and the places of the records."
         ) from error
-    with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base import plotting as marks
-from ..base.plotting import legend_above, series_colour
+from ..base.plotting import POSITION, legend_above, mark_supports, series_colour, stacked
 from ..base.table import Alarm, Table
 from ..terminal import number
 from .fit import INTERVAL, WHITE, Fit, Found
@@ -143,11 +142,8 @@ def plain(fit: Fit) -> dict[str, Any]:
 
 def plot_fit(fit: Fit, title: str) -> Figure:
     """The record with the most left over beside the fitted force, and values along the line."""
-    from matplotlib.figure import Figure
-
     kinds = [kind for kind in ("droppers", "supports") if fit.of_kind(kind)]
-    figure = Figure(figsize=(11, 3.2 + 2.6 * len(kinds)), layout="constrained")
-    force, *others = np.atleast_1d(figure.subplots(1 + len(kinds), 1, sharex=True)).tolist()
+    figure, (force, *others) = stacked((11, 3.2 + 2.6 * len(kinds)), 1 + len(kinds))
     figure.suptitle(title)
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
@@ -155,8 +151,8 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     plan, before = fit.problem.fitting.values.design, fit.before
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
-        marks.mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
-    (others[-1] if others else force).set_xlabel(marks.POSITION)
+        mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
+    (others[-1] if others else force).set_xlabel(POSITION)
     return figure
 
 
@@ -176,11 +172,9 @@ def _draw_force(axes: Axes, fit: Fit) -> None:
 
 def plot_drift(drift: Drift, title: str) -> Figure:
     """Changes of droppers and supports along the line."""
-    from matplotlib.figure import Figure
-
     kinds = [kind for kind in ("droppers", "supports") if drift.of_kind(kind)]
-    figure = Figure(figsize=(11, 1.2 + 2.6 * max(len(kinds), 1)), layout="constrained")
-    every = np.atleast_1d(figure.subplots(max(len(kinds), 1), 1, sharex=True)).tolist()
+    count = max(len(kinds), 1)
+    figure, every = stacked((11, 1.2 + 2.6 * count), count)
     figure.suptitle(title)
     for axes, kind in zip(every, kinds, strict=False):
         found = drift.of_kind(kind)

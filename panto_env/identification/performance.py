@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from ..base.files import check_output, write_whole
-from ..base.plotting import BLUE, ORANGE
+from ..base.files import check_output, write_text
+from ..base.plotting import BLUE, ORANGE, stacked
 from ..base.settings import ranges_of
 from ..base.table import Alarm, Table
 from ..plant.pantograph.schema import PantographData
@@ -203,8 +203,7 @@ def write_pantograph(
         _entry("contact_stiffness", p["k1T"], source("k1T")),
         _entry("contact_damping", p["c1T"], source("c1T")),
     ]
-    with write_whole(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _entry(key: str, value: float | list[float], source: str) -> str:
@@ -222,16 +221,13 @@ SHOWN = 2000
 
 def plot_record(record: Record, title: str, seconds: float) -> Figure:
     """Contact force and displacements over the first ``seconds``, as paper 1's Figs 6 to 8."""
-    from matplotlib.figure import Figure
-
     inside = record.time <= record.start + seconds
     step = max(1, int(inside.sum()) // SHOWN)
     time = record.time[inside][::step]
     series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
     if record.force is not None:
         series = {"force": record.force} | series
-    figure = Figure(figsize=(7, 6.2), layout="constrained")
-    axes = figure.subplots(len(series), 1, sharex=True)
+    figure, axes = stacked((7, 6.2), len(series))
     for axis, (name, values) in zip(axes, series.items(), strict=True):
         symbol, unit, scale = _axis_of(name)
         axis.plot(time, scale * values[inside][::step], color=BLUE, linewidth=1)
@@ -244,12 +240,9 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
 
 def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float, last: float) -> Figure:
     """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
-    from matplotlib.figure import Figure
-
     inside = (time >= first) & (time <= last)
     step = max(1, int(inside.sum()) // SHOWN)
-    figure = Figure(figsize=(6.5, 0.8 + 1.5 * len(matches)), layout="constrained")
-    axes = figure.subplots(len(matches), 1, sharex=True, squeeze=False)[:, 0]
+    figure, axes = stacked((6.5, 0.8 + 1.5 * len(matches)), len(matches))
     for axis, match in zip(axes, matches, strict=True):
         symbol, unit, scale = _axis_of(match.channel)
         recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))

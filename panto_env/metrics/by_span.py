@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..plant.catenary.flexible.parts import Overlap
-from .figures import SpanChoice, contact_loss
+from .figures import SpanChoice, contact_loss, statistics
 from .low_pass import low_pass
 
 if TYPE_CHECKING:
@@ -52,8 +51,7 @@ class SpanFigures(NamedTuple):
 
 def _of_force(filtered: Array, raw: Array) -> dict[str, float]:
     """Values of ``OF_FORCE`` of some samples of a force (N)."""
-    statistics = {name: float(getattr(filtered, name)()) for name in ("mean", "std", "max", "min")}
-    return statistics | {"contact_loss": contact_loss(raw)}
+    return statistics(filtered) | {"contact_loss": contact_loss(raw)}
 
 
 def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
@@ -100,11 +98,10 @@ def by_stretch(run: Trajectory, spans: SpanChoice = None) -> list[StretchFigures
 
     Empty where the evaluated spans have no overlap. Raises InputError as ``Trajectory.summary`` does.
     """
-    overlaps = [Overlap(**each) for each in run.design.get("catenary", {}).get("overlaps") or ()]
     first, last = run.spans(spans) or (1, run.alignment.last_whole_span(float(run.position[-1]), 1e-9))
     evaluated = run.alignment.within(run.position, (first, last))
     inside, behind = np.zeros(len(run.position), dtype=bool), np.zeros(len(run.position), dtype=bool)
-    for overlap in overlaps:
+    for overlap in run.designed.overlaps:
         begin = run.alignment.support(overlap.first_span - 1)
         end = run.alignment.support(overlap.first_span - 1 + overlap.spans)
         inside |= (run.position >= begin) & (run.position < end)

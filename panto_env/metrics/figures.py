@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, Literal, Self, TypeAlias, get_type_hints
@@ -158,6 +159,14 @@ HEADINGS = {name: f"{name} ({label.si or label.unit})" for name, label in LABELS
     "slack": "slack (% of time)",
 }
 """Headings with units of figures and settings, which are in SI, in files of tables."""
+
+
+STATISTICS = ("mean", "std", "max", "min")
+
+
+def statistics(force: Array) -> dict[str, float]:
+    """The ``STATISTICS`` of a force, (n,), by name, in its unit; nan without samples."""
+    return {name: float(getattr(force, name)()) if force.size else math.nan for name in STATISTICS}
 
 
 def cost_function(force: Array, nominal_force: float | Array, stride: float | Array) -> float:

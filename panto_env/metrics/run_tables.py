@@ -11,7 +11,6 @@ import numpy as np
 from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.table import WORKBOOKS, Sheet, write_table, write_workbook
-from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible.static import HEADINGS as AT_REST
 from ..plant.catenary.flexible.static import as_rows, droppers_at_rest
 from .by_span import DROPPER_HEADINGS as MOVING
@@ -97,8 +96,7 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
     rows: list[dict[str, Any]] = []
     for run, covered, of_run in _each(runs, spans):
         try:
-            data = run.design["catenary"]
-            resting = as_rows(droppers_at_rest(CATENARIES[data["kind"]].schema.model_validate(data)))
+            resting = as_rows(droppers_at_rest(run.designed.line))
         except (KeyError, TypeError, ValueError):  # files of other versions may not hold it as this one does
             resting = []
         at_rest = {(each.get("span"), round(each["position"], 5)): each for each in resting}

@@ -1,11 +1,8 @@
-"""The record of one run along a line, its figures, and its Parquet file."""
+"""The record of one run along a line, and its figures."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,27 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, to_kmh
-from ..base.checksums import with_checksum, without_checksum
 from ..base.errors import InputError
-from ..base.files import check_output, write_whole
+from ..base.files import check_output
 from ..plant.alignment import Alignment, Spans
-from ..plant.pantograph.schema import PantographData
 from .by_span import evaluated, near_train
 from .compliance import SLOW, Criterion, LineFacts, compliance
-from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function
+from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function, statistics
+from .identity import Design, Identity
 from .low_pass import low_pass
-from .stored_run import check_stored
 
-FORMAT = 3
-OF_FOLLOWERS = ("pantograph", "nominal_force", "target_mean", "policy", "design", "reached")
-"""Facts that a collector behind the first has of its own; the others are those of the first."""
 FEWEST = 3
 """Samples that a speed is found from, by differences of second order."""
-KEY = b"panto_env"
-"""Key of the file's metadata that holds the facts as JSON, with a checksum of them and of all columns."""
-DAMAGED: tuple[type[Exception], ...] = (OSError, LookupError, TypeError, AttributeError, ValueError)
-DAMAGED += (ArithmeticError, RecursionError, MemoryError)
-"""Errors that reading a damaged file can raise, besides Arrow's own."""
 SUFFIXES = (".parquet",)
 """Suffixes of the file of a saved run, which can be read again."""
 OUTPUTS = (*SUFFIXES, ".csv", ".xlsx")
@@ -70,16 +57,26 @@ class Trajectory:
     nominal_force: float  # static force and aerodynamic uplift (N), at the mean speed where it drifts
     # Mean force (N) for which the static force was trimmed, at the mean speed; nan: it was not
     target_mean: float = math.nan
-    settings: Mapping[str, Any] = field(default_factory=dict)  # identity of the run, plain data
+    settings: Mapping[str, Any] = field(default_factory=dict)  # as ``identity`` reads them, plain data
     policy: str = "passive"
     seed: int = 0
     terminated: bool = False  # whether the run ended early, outside the plant's valid range
     ending: str = ""  # where and why it ended early, as a sentence
     line: LineFacts = field(default_factory=LineFacts)
-    design: Mapping[str, Any] = field(default_factory=dict)  # line and pantographs by value, plain data
+    design: Mapping[str, Any] = field(default_factory=dict)  # as ``designed`` reads it, plain data
     # Of a collector behind the first: where it came to (m). The first came as far as its samples show.
     reached: float = math.nan
     followers: tuple[Trajectory, ...] = ()  # records of the collectors behind this one, from the front
+
+    @property
+    def identity(self) -> Identity:
+        """Settings with which the run was made, by type."""
+        return Identity.of(self.settings)
+
+    @property
+    def designed(self) -> Design:
+        """Line and pantographs as designed, by type."""
+        return Design(self.design)
 
     @property
     def train(self) -> tuple[Trajectory, ...]:
@@ -89,19 +86,17 @@ class Trajectory:
     @property
     def controlled(self) -> Trajectory:
         """Record of the controlled collector, of several the first, also where there was no policy."""
-        first: int = self.settings.get("controlled", [1])[0]
-        return self.train[first - 1]
+        return self.train[self.identity.controlled[0] - 1]
 
     def worst_controlled(self, spans: SpanChoice = None) -> Trajectory:
         """Record of the controlled collector by which a train is judged: that with the largest sigma.
 
         spans: as in ``summary``. The first one where the run ended early. Raises InputError as ``summary``.
         """
-        numbers: list[int] = self.settings.get("controlled", [1])
+        numbers = self.identity.controlled
         if len(numbers) == 1 or self.terminated:
             return self.controlled
-        each = [self.train[number - 1] for number in numbers]
-        return max(each, key=lambda own: own.summary(spans).std)
+        return max((self.train[number - 1] for number in numbers), key=lambda own: own.summary(spans).std)
 
     @property
     def pantographs(self) -> str:
@@ -124,12 +119,7 @@ class Trajectory:
     @property
     def spans_differ(self) -> bool:
         """Whether the line is a sequence of spans, not one that is repeated."""
-        return self.alignment.pitch is None or self.line_ends
-
-    @property
-    def line_ends(self) -> bool:
-        """Whether the line ends with its own spans, as a sequence does; else wires go on behind them."""
-        return bool(self.design.get("catenary", {}).get("sequence"))
+        return self.alignment.pitch is None or self.designed.line_ends
 
     def summary(self, spans: SpanChoice = None) -> Figures:
         """Figures over spans (first, last), counted from 1 (EN 50318 takes 5 and 6), or "all".
@@ -143,21 +133,17 @@ class Trajectory:
         inside = self.inside(spans)
         begin, end = (0.0, float(self.position[-1])) if covered is None else self.alignment.limits(covered)
         force = self.contact_force[inside]
-        filtered = low_pass(self.contact_force, self.time_step)[inside]
-        mean, std = float(filtered.mean()), float(filtered.std())
+        found = statistics(low_pass(self.contact_force, self.time_step)[inside])
         near = (self.support_position > begin - 1e-6) & (self.support_position < end + 1e-6)
         uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
         frame, head = self.frame_force[inside], self.head_force[inside]
         frame_change, head_change = np.diff(frame), np.diff(head)
-        ways = np.diff(self.position[inside]) if self.drifts else self.stride
+        ways = np.diff(self.position[inside]) if self.identity.drifts else self.stride
         changes = frame_change @ frame_change + head_change @ head_change
         return Figures(
-            mean=mean,
-            std=std,
-            statistical_max=mean + 3 * std,
-            statistical_min=mean - 3 * std,
-            max=float(filtered.max()),
-            min=float(filtered.min()),
+            **found,
+            statistical_max=found["mean"] + 3 * found["std"],
+            statistical_min=found["mean"] - 3 * found["std"],
             max_uplift=float(uplift.max()) if uplift.size else float("nan"),
             contact_loss=contact_loss(force),
             cost_function=cost_function(force, self.lift[inside], ways),
@@ -178,7 +164,7 @@ class Trajectory:
             self.summary(spans),
             arcing(self.contact_force[inside], self.time_step),
             self.line,
-            float(self.speeds[inside].mean()) if self.drifts else self.speed,
+            float(self.speeds[inside].mean()) if self.identity.drifts else self.speed,
             self.alignment.mean_length,
             tension,
             tension[near_train(self, spans)] if tension.size else tension,
@@ -188,7 +174,7 @@ class Trajectory:
     @property
     def static_force(self) -> float | None:
         """Static force as it was set (N); nan where one force is for all speeds, None where not known."""
-        coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient")
+        coefficient = self.designed.aerodynamic_coefficient
         if coefficient == 0 and self.speed_kmh > SLOW:
             return math.nan
         return None if coefficient is None else self.nominal_force - coefficient * self.speed_kmh**2
@@ -210,28 +196,17 @@ class Trajectory:
         return to_kmh(self.speed)
 
     @property
-    def drifts(self) -> bool:
-        """Whether the train's speed drifts."""
-        return bool(self.settings.get("speed_drift"))
-
-    @property
-    def wind(self) -> float:
-        """Mean wind along the track in which the run may have been made, the strongest (m/s); 0: none."""
-        conditions = self.settings.get("line_condition") or ()
-        return max((each.get("wind", 0.0) for each in conditions), key=abs, default=0.0)
-
-    @property
     def speeds(self) -> Array:
         """Speed of the train at each sample, (n,) (m/s)."""
-        if not self.drifts or len(self.time) < FEWEST:
+        if not self.identity.drifts or len(self.time) < FEWEST:
             return np.full(len(self.time), self.speed)
         return np.asarray(np.gradient(self.position, self.time_step, edge_order=2))
 
     @property
     def lift(self) -> Array:
         """Static force and aerodynamic uplift in each step, (n,) (N), in still air: wind adds to it."""
-        coefficient = self.design.get("pantograph", {}).get("aerodynamic_coefficient", 0.0)
-        more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.drifts else 0.0
+        coefficient = self.designed.aerodynamic_coefficient or 0.0
+        more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.identity.drifts else 0.0
         return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)
 
     @property
@@ -241,7 +216,7 @@ class Trajectory:
         if not heights or "pantograph" not in self.design:
             return 0.0
         own = np.interp(self.position, self.alignment.supports[: len(heights)], heights)
-        return np.asarray(PantographData.model_validate(self.design["pantograph"]).lift_over(own))
+        return np.asarray(self.designed.pantograph.lift_over(own))
 
     @property
     def stride(self) -> float:
@@ -266,7 +241,7 @@ class Trajectory:
         """
         if choice is None and self.terminated:
             raise InputError(f"{self.ending} It has figures only for earlier spans, which must be given.")
-        spans = chosen_spans(choice, self.distance, self.alignment, self.line_ends)
+        spans = chosen_spans(choice, self.distance, self.alignment, self.designed.line_ends)
         if spans is None:
             return None
         _, end = self.alignment.limits(spans)
@@ -300,72 +275,17 @@ class Trajectory:
             from .run_tables import save_tables
 
             save_tables(self, path, spans)
-            return
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        else:
+            from .stored_run import write
 
-        columns = {name: getattr(self, name) for name in SERIES}
-        for number, follower in enumerate(self.followers, start=2):
-            columns |= follower_columns(follower, number, len(self.time))
-        for name in ("uplift", "dropper_force"):
-            for k, column in enumerate(getattr(self, name).T):
-                columns[f"{name}_{k}"] = np.ascontiguousarray(column)
-        facts = {"format": FORMAT} | {
-            name: value.tolist() if isinstance(value := getattr(self, name), np.ndarray) else value
-            for name in (each.name for each in dataclasses.fields(self))
-            if name not in {*SERIES, "uplift", "dropper_force", "followers"}
-        }
-        facts["line"] = vars(self.line)
-        masts = [self.alignment.masts] * bool(self.alignment.masts)
-        facts["alignment"] = self.alignment.supports, self.alignment.pitch, *masts
-        facts["followers"] = [
-            {name: getattr(follower, name) for name in OF_FOLLOWERS} for follower in self.followers
-        ]
-        table = pa.table(columns, metadata={KEY: json.dumps(with_checksum(facts, columns))})
-        with write_whole(path) as temporary:
-            pq.write_table(table, temporary, write_page_checksum=True)
+            write(self, path)
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
         """Read a file of ``save``. Raises InputError where it is not a whole trajectory, or is damaged."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from .stored_run import read
 
-        if not os.path.isfile(path):
-            raise InputError(f"The trajectory file {path} does not exist; check the path.")
-        if Path(path).suffix.lower() in OUTPUTS[1:]:
-            raise InputError(f"{path} is for other programs: a run is read from its .parquet file only.")
-        try:
-            with pq.ParquetFile(path, page_checksum_verification=True) as file:
-                table = file.read()
-            columns = {name: table[name].to_numpy() for name in table.column_names}
-            facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
-            if facts.pop("format") != FORMAT:
-                raise ValueError("it has another format")
-            check_stored(facts, columns)
-            for name in ("support_position", "dropper_position"):
-                facts[name] = np.array(facts[name], dtype=float)
-            heights = tuple(facts["line"].pop("contact_heights", ()))
-            facts["line"] = LineFacts(**facts["line"], contact_heights=heights)
-            supports, pitch, *masts = facts["alignment"]
-            facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
-            series = {name: columns[name] for name in SERIES}
-            for name, places in (("uplift", "support_position"), ("dropper_force", "dropper_position")):
-                count = sum(column.startswith(f"{name}_") for column in columns)
-                own = [columns[f"{name}_{k}"] for k in range(count)]
-                series[name] = np.array(own).T if own else np.zeros((table.num_rows, 0))
-                if count and count != len(facts[places]):
-                    raise ValueError(f"columns of {name} are missing")
-            followers = facts.pop("followers")
-            first = cls(**series, **facts)
-            own = [_follower_of(first, columns, *each) for each in enumerate(followers, start=2)]
-            return dataclasses.replace(first, followers=tuple(own))
-        except (pa.ArrowException, *DAMAGED) as error:
-            reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
-            raise InputError(
-                f"{path} is not a whole trajectory file ({reason}); write it again with "
-                "Trajectory.save or `panto simulate --output`."
-            ) from error
+        return read(path)
 
 
 def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
@@ -375,12 +295,3 @@ def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, 
     """
     before = np.full(rows - len(follower.time), math.nan)
     return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in SERIES}
-
-
-def _follower_of(first: Trajectory, columns: Mapping[str, Array], number: int, facts: Any) -> Trajectory:
-    """The inverse: the record from a file's columns, and what it has of its own."""
-    on_line = ~np.isnan(columns[f"{SERIES[0]}@{number}"])
-    series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
-    shared = {name: getattr(first, name)[on_line] for name in ("uplift", "dropper_force")}
-    own: dict[str, Any] = {**series, **shared, **facts}
-    return dataclasses.replace(first, **own)

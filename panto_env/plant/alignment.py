@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..backend import NOT_NEGATIVE, inlined
-from ..base.arrays import Array, Index
+from ..base.arrays import Array
 
 Spans = tuple[int, int]  # first and last span of a stretch, both included, counted from 1
 
@@ -133,10 +133,10 @@ class Alignment:
         position = np.array(self.supports)[first] + (number - first) * self.lengths[first]
         return float(position) if position.ndim == 0 else position
 
-    def supports_within(self, begin: float, end: float) -> Index:
-        """Numbers of the supports from begin to end (m), both included."""
+    def supports_within(self, begin: float, end: float) -> Array:
+        """Positions of the supports from begin to end, both included, (n,) (m)."""
         first, last = math.ceil(self.in_spans(begin)), math.floor(self.in_spans(end))
-        return np.arange(max(first, 0), last + 1)
+        return np.asarray(self.support(np.arange(max(first, 0), last + 1)))
 
     def limits(self, spans: Spans) -> tuple[float, float]:
         """Positions (m) at which the first span begins and the last one ends."""

@@ -16,7 +16,7 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..base.table import Table
 from ..metrics.compliance import Criterion, criteria_table
-from ..metrics.figures import LABELS
+from ..metrics.figures import LABELS, STATISTICS, statistics
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
@@ -89,7 +89,7 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     moved = [replace(piece, position=piece.position + found.value) for piece in same.pieces]
     samples = Samples(replace(same, pieces=tuple(moved)))
     spans, own, other = _spans(samples, run, begin, end)
-    figures = {name: (call(own), call(other)) for name, call in _STATISTICS.items()}
+    figures = _pairs(own, other)
     uplift, where = _uplift(samples, run, begin, end)
     heights = np.array([each.height_range for each in spans if not math.isnan(each.height_range[0])])
     height = 1e3 * float((heights[:, 1] - heights[:, 0]).mean()) if len(heights) else math.nan
@@ -127,12 +127,9 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
 
 
-_STATISTICS = {
-    "mean": lambda force: float(force.mean()),
-    "std": lambda force: float(force.std()),
-    "max": lambda force: float(force.max()),
-    "min": lambda force: float(force.min()),
-}
+def _pairs(one: Array, other: Array) -> dict[str, tuple[float, float]]:
+    ours, theirs = statistics(one), statistics(other)
+    return {name: (ours[name], theirs[name]) for name in STATISTICS}
 
 
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
@@ -173,8 +170,7 @@ def _spans(
         own.append(a)
         other.append(b)
         ranges = _range(measured, here), _range(heights, there)
-        each = {name: (call(a), call(b)) for name, call in _STATISTICS.items()}
-        found.append(SpanPair(span, first, last, **each, height_range=ranges))
+        found.append(SpanPair(span, first, last, **_pairs(a, b), height_range=ranges))
     if not found:
         raise InputError(
             "The record covers none of the run's evaluated spans without a gap; simulate a run along all "
@@ -256,12 +252,12 @@ def spans_table(found: Comparison) -> Table:
         (
             found.run.alignment.span_name(each.span),
             f"{each.begin:,.6g}",
-            *(number(value) for key in _STATISTICS for value in getattr(each, key)),
+            *(number(value) for key in STATISTICS for value in getattr(each, key)),
             _signed(deviation(each.std)),
         )
         for each in found.spans
     ]
-    short = [f"{LABELS[key].short} {whose}" for key in _STATISTICS for whose in ("rec.", "run")]
+    short = [f"{LABELS[key].short} {whose}" for key in STATISTICS for whose in ("rec.", "run")]
     return Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
 
 

@@ -16,7 +16,7 @@ from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
 from ..base.table import Table
 from ..metrics.compliance import Criterion, LineFacts, compliance, criteria_table, remarks
-from ..metrics.figures import ARC, HEADINGS, LABELS, Figures, arcing, contact_loss
+from ..metrics.figures import ARC, HEADINGS, LABELS, Figures, arcing, contact_loss, statistics
 from ..metrics.low_pass import amplitudes
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -133,15 +133,12 @@ def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) ->
     force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
     speed = float(samples.speed[inside].mean())
     whole = samples.shows_losses
-    mean, std = (float(force.mean()), float(force.std())) if force.size else (math.nan, math.nan)
+    found = statistics(force)
     figures = replace(
         Figures.none(),
-        mean=mean,
-        std=std,
-        statistical_max=mean + 3 * std,
-        statistical_min=mean - 3 * std,
-        max=float(force.max()) if force.size else math.nan,
-        min=float(force.min()) if force.size else math.nan,
+        **found,
+        statistical_max=found["mean"] + 3 * found["std"],
+        statistical_min=found["mean"] - 3 * found["std"],
         contact_loss=contact_loss(raw) if whole else math.nan,
         distance=speed * samples.step * len(raw),
     )

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..base import plotting as marks
 from ..base.arrays import Array
 from ..base.checksums import __version__
-from ..base.files import PAGES, check_output, write_whole
-from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above
+from ..base.files import PAGES, check_output, write_text
+from ..base.plotting import BLUE, LIMIT, ORANGE, POSITION, legend_above, mark_losses, mark_supports, panels
 from ..base.table import Alarm, Table
 from ..metrics.figures import losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
-from ..report.charts import drawn
+from ..report.charts import HIGHEST, as_svg
 from ..report.page import FILTER, page_template
 from .compare import Comparison, acceptance_table, criterion_notes, figures_table, shift_sentence, spans_table
 from .judge import (
@@ -34,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-HIGHEST = 25.0
-"""Maximum frequency of spectra (Hz)."""
 MOST_BLOCKS = 10_000
 """Blocks of samples of a piece, of each of which no more than two are drawn."""
 MOST_SUPPORTS = 60
@@ -59,10 +55,7 @@ def _pair(
     draw_lower: Callable[[Axes, Any], None],
     grid: Literal["both", "y"],
 ) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    upper, lower = figure.subplots(2, 1, height_ratios=(3, 2))
+    figure, (upper, lower) = panels((10, 7), 2, height_ratios=(3, 2))
     draw_upper(upper, found)
     draw_lower(lower, found)
     upper.grid(color="0.92", axis="y")
@@ -84,15 +77,15 @@ def draw_force(axes: Axes, found: Judgement) -> None:
             axes.plot(*_thin(position, samples.raw[part]), color="0.78", linewidth=0.7, label=raw)
             lost += position[losses_of_contact(samples.raw[part])[0]].tolist()
         axes.plot(*_thin(position, samples.in_place[part]), color=BLUE, linewidth=1.1, label=words)
-    marks.mark_losses(axes, lost)
+    mark_losses(axes, lost)
     axes.axhline(0.0, color=LIMIT, linewidth=0.9)
     begin, end = float(samples.position.min()), float(samples.position.max())
     label = "position (m)"
     if found.alignment is not None:
-        numbers = found.alignment.supports_within(begin, min(end, found.reach[1]))
-        if len(numbers) <= MOST_SUPPORTS:
-            marks.mark_supports(axes, map(found.alignment.support, numbers))
-            label = marks.POSITION
+        supports = found.alignment.supports_within(begin, min(end, found.reach[1]))
+        if len(supports) <= MOST_SUPPORTS:
+            mark_supports(axes, supports)
+            label = POSITION
     axes.set(xlabel=label, ylabel="contact force (N)", xlim=(begin, end))
     legend_above(axes, 4)
 
@@ -131,8 +124,8 @@ def draw_overlay(axes: Axes, found: Comparison) -> None:
         axes.plot(samples.position[part], samples.in_place[part], color=ORANGE, linewidth=2.6, label=label)
     force = zero_phase_low_pass(run.contact_force, run.time_step)
     axes.plot(run.position, force, color=BLUE, linewidth=1.0, label="run")
-    marks.mark_supports(axes, map(run.alignment.support, run.alignment.supports_within(begin, end)))
-    axes.set(xlabel=marks.POSITION, xlim=(begin, end))
+    mark_supports(axes, run.alignment.supports_within(begin, end))
+    axes.set(xlabel=POSITION, xlim=(begin, end))
     axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
     legend_above(axes, 2)
 
@@ -151,17 +144,11 @@ def save_record_page(found: Judgement, title: str, path: str | Path) -> None:
     """Write the page of a record, whole or not at all. Raises InputError for a name with another suffix."""
     supports = found.alignment is not None
     charts = [
-        (
-            "Contact force along the line",
-            drawn(lambda axes: draw_force(axes, found), along_line=supports),
-        ),
-        ("Spectrum of the force as recorded", drawn(lambda axes: draw_spectrum(axes, found))),
+        ("Contact force along the line", as_svg(along_line=supports)(draw_force)(found)),
+        ("Spectrum of the force as recorded", as_svg()(draw_spectrum)(found)),
     ]
-    shown = [
-        whole_table(found, "Figures of the whole record"),
-        requirements_table(found),
-        *part_tables(found),
-    ]
+    whole = whole_table(found, "Figures of the whole record")
+    shown = [whole, requirements_table(found), *part_tables(found)]
     _save(title, FILTER, found.notes, charts, shown, requirement_remarks(found), path)
 
 
@@ -170,9 +157,9 @@ def save_comparison_page(found: Comparison, title: str, path: str | Path) -> Non
     charts = [
         (
             "Both forces by place, low-passed at 20 Hz, not delayed",
-            drawn(lambda axes: draw_overlay(axes, found), along_line=True),
+            as_svg(along_line=True)(draw_overlay)(found),
         ),
-        ("Standard deviation by span", drawn(lambda axes: draw_spans(axes, found))),
+        ("Standard deviation by span", as_svg()(draw_spans)(found)),
     ]
     shown = [acceptance_table(found), figures_table(found), spans_table(found)]
     words = f"The simulation is {found.verdict}. {shift_sentence(found)} {FILTER}"
@@ -190,16 +177,13 @@ def _save(
 ) -> None:
     check_output(path, PAGES)
     template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
-    style = (files("panto_env.report") / "templates" / "style.css").read_text(encoding="utf-8")
     text = template.render(
         version=__version__,
         title=title,
-        style=style,
         introduction=introduction,
         notes=notes,
         charts=charts,
         tables=shown,
         remarks=sentences,
     )
-    with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)

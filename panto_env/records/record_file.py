@@ -23,7 +23,6 @@ from ..base.arrays import METRES_PER_SECOND, Array
 from ..base.errors import InputError, shortly
 from ..base.record_columns import JITTER, LENGTHS, TIME, Column, places_of, read_columns
 from ..base.table import Sheet, write_table
-from ..metrics.trajectory import KEY
 from .axes import RUNS_BACK, Break, axes_of, cut
 from .plausibility import check_axes, check_force, check_motion, check_speed
 from .record import Piece, Record
@@ -103,6 +102,8 @@ def _parquet(
 ) -> dict[str, Any]:
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
+
+    from ..metrics.stored_run import KEY
 
     try:
         table = pq.read_table(path)

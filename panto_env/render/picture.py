@@ -115,8 +115,7 @@ def _draw_chart(strip: Overview, moment: Moment, axis: float, size: float) -> No
         strip.canvas.line([(strip.margin, y), (strip.width, y)], colour)
         strip.canvas.words(strip.margin - 0.4 * size, y, f"{force:.0f} N", QUIET, 0.8 * size, anchor="right")
     end = strip.begin + (strip.width - strip.margin) / strip.per_metre
-    for number in moment.alignment.supports_within(strip.begin, end):
-        x = float(strip.across(moment.alignment.support(number)))
+    for x in strip.across(moment.alignment.supports_within(strip.begin, end)).tolist():
         for y in np.arange(top, bottom, 9):
             strip.canvas.line([(x, y), (x, min(y + 4, bottom))], SUPPORT)
 
@@ -337,8 +336,8 @@ def _draw_spring_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
     size = 0.9 * (WORDS * layout.height)
     canvas.words(x - 80, ceiling + size, words, QUIET, size, anchor="right")
     begin = moment.position - layout.pantograph / layout.per_metre
-    for number in moment.alignment.supports_within(begin, begin + layout.width / layout.per_metre):
-        at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
+    supports = moment.alignment.supports_within(begin, begin + layout.width / layout.per_metre)
+    for at in layout.across(supports, moment.position).tolist():
         if at < layout.width:
             canvas.line([(at, layout.roof - 26), (at, layout.roof)], QUIET, 2)
 
@@ -382,8 +381,8 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
 
 def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
     begin = moment.position - (layout.pantograph - layout.margin) / layout.per_metre
-    for number in moment.alignment.supports_within(begin, moment.position):
-        at = float(layout.across(np.array(moment.alignment.support(number)), moment.position))
+    supports = moment.alignment.supports_within(begin, moment.position)
+    for at in layout.across(supports, moment.position).tolist():
         for y in np.arange(layout.chart[0], layout.chart[1], 11):
             canvas.line([(at, y), (at, min(y + 6, layout.chart[1]))], SUPPORT)
     shown = moment.places >= begin

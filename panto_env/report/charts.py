@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, Concatenate, ParamSpec
 
 import numpy as np
 
-from ..base import plotting as marks
-from ..base.plotting import BLUE, legend_above, series_colour
-from ..metrics import compliance as en50367
+from ..analysis.plots import fit_force_axis
+from ..base.plotting import BLUE, POSITION, legend_above, mark_losses, mark_supports, panels, series_colour
 from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from .findings import Findings
 
@@ -21,144 +21,130 @@ HIGHEST = 25.0
 """Maximum frequency of the spectra (Hz)."""
 
 
-def drawn(draw: Callable[[Axes], Any], height: float = 3.2, *, along_line: bool = False) -> str:
-    """A function's drawing as SVG; the same drawing gives the same text.
+P = ParamSpec("P")
+Draw = Callable[Concatenate["Axes", P], None]
+
+
+def as_svg(height: float = 3.2, *, along_line: bool = False) -> Callable[[Draw[P]], Callable[P, str]]:
+    """Decorator of a function that draws on axes: it returns the drawing as SVG, always as the same text.
 
     along_line: whether its vertical lines are supports, so that the grid has none.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, height), layout="constrained")
-    axes = figure.subplots()
-    draw(axes)
-    axes.grid(color="0.92", axis="y" if along_line else "both")
-    axes.set_axisbelow(True)
-    file = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "panto-env"}):
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-    text = file.getvalue()
-    return text[text.index("<svg") :]
+    def decorate(draw: Draw[P]) -> Callable[P, str]:
+        @wraps(draw)
+        def svg(*given: P.args, **named: P.kwargs) -> str:
+            import matplotlib as mpl
+
+            figure, axes = panels((9, height))
+            draw(axes, *given, **named)
+            axes.grid(color="0.92", axis="y" if along_line else "both")
+            axes.set_axisbelow(True)
+            file = io.StringIO()
+            with mpl.rc_context({"svg.hashsalt": "panto-env"}):
+                figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+            text = file.getvalue()
+            return text[text.index("<svg") :]
+
+        return svg
+
+    return decorate
 
 
-def force_along(one: Findings, found: Sequence[Findings]) -> str:
+@as_svg(along_line=True)
+def force_along(axes: Axes, one: Findings, found: Sequence[Findings]) -> None:
     """Contact force along the evaluated spans; found: all runs of the page, for the same scale."""
     extremes = [
         extreme(each.run.contact_force[each.inside]) for each in found for extreme in (np.min, np.max)
     ]
-
-    def draw(axes: Axes) -> None:
-        run, inside = one.run, one.inside
-        position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
-        axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
-        axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
-        marks.mark_losses(axes, [loss.position for loss in one.losses])
-        supply = run.line.system
-        limit, standard = en50367.maximum_limit(run.speed, supply), en50367.maximum_source(supply)
-        marks.fit_force_axis([axes], limit, standard, extremes)
-        supports = run.alignment.supports_within(position[0], position[-1])
-        marks.mark_supports(axes, map(run.alignment.support, supports))
-        axes.set(xlabel=marks.POSITION, ylabel="contact force (N)", xlim=(position[0], position[-1]))
-        legend_above(axes, 3)
-
-    return drawn(draw, along_line=True)
+    run, inside = one.run, one.inside
+    position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
+    axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
+    axes.plot(position, smooth, color=BLUE, linewidth=1.1, label="low-passed at 20 Hz, not delayed")
+    mark_losses(axes, [loss.position for loss in one.losses])
+    fit_force_axis([axes], run, extremes)
+    mark_supports(axes, run.alignment.supports_within(position[0], position[-1]))
+    axes.set(xlabel=POSITION, ylabel="contact force (N)", xlim=(position[0], position[-1]))
+    legend_above(axes, 3)
 
 
-def force_together(one: Findings) -> str:
+@as_svg(along_line=True)
+def force_together(axes: Axes, one: Findings) -> None:
     """Contact forces of all pantographs of a train by place, low-passed; one: findings of the first."""
-
-    def draw(axes: Axes) -> None:
-        for k, own in enumerate(one.train):
-            inside = own.inside("all" if one.covered is None else one.covered)
-            smooth = zero_phase_low_pass(own.contact_force, own.time_step)[inside]
-            label = f"pantograph {k + 1}, {own.pantograph}"
-            axes.plot(own.position[inside], smooth, color=series_colour(k), linewidth=1.1, label=label)
-        run, position = one.run, one.run.position[one.inside]
-        supports = run.alignment.supports_within(position[0], position[-1])
-        marks.mark_supports(axes, map(run.alignment.support, supports))
-        axes.set(xlabel=marks.POSITION, xlim=(position[0], position[-1]))
-        axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
-        legend_above(axes, 4)
-
-    return drawn(draw, along_line=True)
+    for k, own in enumerate(one.train):
+        inside = own.inside("all" if one.covered is None else one.covered)
+        smooth = zero_phase_low_pass(own.contact_force, own.time_step)[inside]
+        label = f"pantograph {k + 1}, {own.pantograph}"
+        axes.plot(own.position[inside], smooth, color=series_colour(k), linewidth=1.1, label=label)
+    run, position = one.run, one.run.position[one.inside]
+    mark_supports(axes, run.alignment.supports_within(position[0], position[-1]))
+    axes.set(xlabel=POSITION, xlim=(position[0], position[-1]))
+    axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
+    legend_above(axes, 4)
 
 
-def force_folded(names: Mapping[Findings, str]) -> str:
+@as_svg()
+def force_folded(axes: Axes, names: Mapping[Findings, str]) -> None:
     """Contact force over the place within the span: median, minimum and maximum of all spans."""
-
-    def draw(axes: Axes) -> None:
-        for k, one in enumerate(names):
-            folded = one.folded
-            if folded is None:
-                continue
-            colour = series_colour(k)
-            axes.fill_between(folded.share, folded.low, folded.high, color=colour, alpha=0.2, linewidth=0)
-            axes.plot(folded.share, folded.median, color=colour, label=f"{names[one]}: median")
-        axes.set(
-            xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1)
-        )
-        axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
-        legend_above(axes, 4)
-
-    return drawn(draw)
+    for k, one in enumerate(names):
+        folded = one.folded
+        if folded is None:
+            continue
+        colour = series_colour(k)
+        axes.fill_between(folded.share, folded.low, folded.high, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(folded.share, folded.median, color=colour, label=f"{names[one]}: median")
+    axes.set(xlabel="place within the span, from support (0) to support (1); band: all spans", xlim=(0, 1))
+    axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
+    legend_above(axes, 4)
 
 
-def spectrum(names: Mapping[Findings, str]) -> str:
+@as_svg()
+def spectrum(axes: Axes, names: Mapping[Findings, str]) -> None:
     """Amplitudes of the force of runs, with the span and dropper frequencies of the first one."""
     first = next(iter(names))
     of = f", {names[first]}" if len(names) > 1 else ""
-
-    def draw(axes: Axes) -> None:
-        for k, one in enumerate(names):
-            frequency, amplitude = amplitudes(one.run.contact_force[one.inside], one.run.time_step)
-            shown = frequency <= HIGHEST
-            axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=names[one])
-        run = first.run
-        passing = {f"per span{of}": run.speed / run.alignment.mean_length}
-        places = np.diff([dropper.position for dropper in first.droppers])
-        if places.size:
-            passing[f"per dropper{of}"] = run.speed / float(np.median(places))
-        for (words, at), style in zip(passing.items(), (":", "-."), strict=False):
-            axes.axvline(at, color="0.4", linestyle=style, linewidth=1.2, label=f"{words}: {at:.2f} Hz")
-        axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N), raw force", xlim=(0, HIGHEST))
-        axes.set_ylim(bottom=0)
-        legend_above(axes, 4)
-
-    return drawn(draw)
+    for k, one in enumerate(names):
+        frequency, amplitude = amplitudes(one.run.contact_force[one.inside], one.run.time_step)
+        shown = frequency <= HIGHEST
+        axes.plot(frequency[shown], amplitude[shown], color=series_colour(k), label=names[one])
+    run = first.run
+    passing = {f"per span{of}": run.speed / run.alignment.mean_length}
+    places = np.diff([dropper.position for dropper in first.droppers])
+    if places.size:
+        passing[f"per dropper{of}"] = run.speed / float(np.median(places))
+    for (words, at), style in zip(passing.items(), (":", "-."), strict=False):
+        axes.axvline(at, color="0.4", linestyle=style, linewidth=1.2, label=f"{words}: {at:.2f} Hz")
+    axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N), raw force", xlim=(0, HIGHEST))
+    axes.set_ylim(bottom=0)
+    legend_above(axes, 4)
 
 
-def uplifts(names: Mapping[Findings, str]) -> str:
+@as_svg(2.6)
+def uplifts(axes: Axes, names: Mapping[Findings, str]) -> None:
     """Maximum uplift at each support."""
     supports = sorted({number for one in names for number, _, _ in one.uplifts})
-
-    def draw(axes: Axes) -> None:
-        for k, one in enumerate(names):
-            numbers = [number for number, _, _ in one.uplifts]
-            heights = [1e3 * uplift for _, _, uplift in one.uplifts]
-            width = 0.8 / len(names)
-            at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
-            axes.bar(at, heights, width, color=series_colour(k), label=names[one])
-        name, turned = next(iter(names)).run.alignment.mast, 90 if len(supports) > 8 else 0
-        axes.set(xlabel="support", ylabel="maximum uplift (mm)", xticks=supports)
-        if any(map(name, supports)):
-            axes.set_xticklabels([name(each) for each in supports], rotation=turned)
-        legend_above(axes, 4)
-
-    return drawn(draw, 2.6)
+    for k, one in enumerate(names):
+        numbers = [number for number, _, _ in one.uplifts]
+        heights = [1e3 * uplift for _, _, uplift in one.uplifts]
+        width = 0.8 / len(names)
+        at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
+        axes.bar(at, heights, width, color=series_colour(k), label=names[one])
+    name, turned = next(iter(names)).run.alignment.mast, 90 if len(supports) > 8 else 0
+    axes.set(xlabel="support", ylabel="maximum uplift (mm)", xticks=supports)
+    if any(map(name, supports)):
+        axes.set_xticklabels([name(each) for each in supports], rotation=turned)
+    legend_above(axes, 4)
 
 
-def stiffness(one: Findings) -> str:
+@as_svg(2.6)
+def stiffness(axes: Axes, one: Findings) -> None:
     """Elasticity along a span."""
     assert one.elasticity is not None
     places, lifts, _ = one.elasticity
-
-    def draw(axes: Axes) -> None:
-        axes.plot(places, 1e3 * lifts, color=BLUE)
-        place = "position along the line (m)" if one.run.spans_differ else "place within the span (m)"
-        axes.set(xlabel=place, ylabel="elasticity (mm/N)", xlim=(places[0], places[-1]))
-        axes.set_ylim(bottom=0)
-
-    return drawn(draw, 2.6)
+    axes.plot(places, 1e3 * lifts, color=BLUE)
+    place = "position along the line (m)" if one.run.spans_differ else "place within the span (m)"
+    axes.set(xlabel=place, ylabel="elasticity (mm/N)", xlim=(places[0], places[-1]))
+    axes.set_ylim(bottom=0)
 
 
 def names_of(found: Sequence[Findings]) -> dict[Findings, str]:

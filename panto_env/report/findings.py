@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -18,11 +20,9 @@ from ..metrics.figures import Figures, SpanChoice, losses_of_contact
 from ..metrics.low_pass import low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
-from ..plant.catenary import CATENARIES
 from ..plant.catenary.flexible import FlexibleCatenaryData
 from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables, non_uniformity
 from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest
-from ..plant.line_condition import NEW, LineCondition
 from ..plant.pantograph.schema import PantographData
 
 FOLDS = 240
@@ -92,26 +92,27 @@ class Findings:
     @cached_property
     def line(self) -> Any:
         """Data of the line. Raises InputError where the file does not hold them."""
-        return self._designed("catenary")
+        with self._of_this_version():
+            return self.run.designed.line
 
     @cached_property
     def pantograph(self) -> PantographData:
         """Data of the pantograph. Raises InputError where the file does not hold them."""
-        return self._designed("pantograph")  # type: ignore[no-any-return]
+        with self._of_this_version():
+            return self.run.designed.pantograph
 
     @cached_property
     def remarks(self) -> list[str]:
         """Sentences about values far from the catalogue's, as a wrong unit makes them."""
         if self.leads:
             return unusual(self.line) + unusual(self.pantograph)
-        known = [own.design["pantograph"] for own in self.train[: self.number - 1]]
-        return [] if self.run.design["pantograph"] in known else unusual(self.pantograph)
+        known = [own.designed.pantograph for own in self.train[: self.number - 1]]
+        return [] if self.pantograph in known else unusual(self.pantograph)
 
-    def _designed(self, part: str) -> Any:
+    @contextmanager
+    def _of_this_version(self) -> Iterator[None]:
         try:
-            table = self.run.design[part]
-            schema = PantographData if part == "pantograph" else CATENARIES[table["kind"]].schema
-            return schema.model_validate(table)
+            yield
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(
                 f"{self.file} was written by an older version, without its line and pantograph as this one "
@@ -201,10 +202,8 @@ class Findings:
         """The line at rest as it was run, at the mean force, if known; None for lines without wires."""
         if not isinstance(self.line, FlexibleCatenaryData):
             return None
-        given = self.run.settings.get("line_condition")  # several to draw from have the same wires
-        condition = LineCondition.model_validate(given[0]) if given else NEW
         force = self.run.nominal_force if self.figures is None else self.figures.mean
-        return as_run(self.line, condition, force)
+        return as_run(self.line, self.run.identity.line_condition, force)
 
     @cached_property
     def as_run_tables(self) -> list[Table]:

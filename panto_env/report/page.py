@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.checksums import __version__
 from ..base.errors import InputError
-from ..base.files import PAGES, check_output, write_whole
+from ..base.files import PAGES, check_output, write_text
 from ..catalog.values import values_of
 from ..metrics.compliance import limits_in_words, margin_in_words, value_in_words
 from ..metrics.figures import LABELS, in_words
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 
 def page_template(package: str, **filters: Callable[..., Any]) -> Template:
-    """The template of a package's page, with additional filters.
+    """The template of a package's page, with additional filters; it may extend the report's ``base``.
 
     All values are escaped, since they may come from untrusted files; an undefined name is an error.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined  # slow to import
 
     environment = Environment(
-        loader=PackageLoader(package),
+        loader=ChoiceLoader([PackageLoader(package), PackageLoader("panto_env.report")]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -123,9 +123,7 @@ def save(files: Sequence[str | Path], path: str | Path) -> None:
     """
     check_output(path, PAGES)
     found = [one for file in files for one in Findings.of(Trajectory.load(file), Path(file).name)]
-    text = page(found)
-    with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, page(found))
 
 
 def digits(value: float) -> str:

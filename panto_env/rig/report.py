@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.plots import mark_supports_of_run
-from ..base import plotting as marks
 from ..base.arrays import from_kmh
-from ..base.plotting import legend_above, series_colour
+from ..base.plotting import POSITION, legend_above, panels, series_colour
 from ..base.table import Table
 from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from ..plant.catenary.rig import RigData
@@ -159,10 +158,7 @@ PANELS = (
 
 def plot_pairs(pairs: Sequence[Pair]) -> Figure:
     """Dynamic part of the displacements and the force along some spans, and the force's spectrum below."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 11), layout="constrained")
-    axes = figure.subplots(4, 1)
+    figure, axes = panels((10, 11), 4)
     first = pairs[0].reference
     inside = first.inside(pairs[0].spans)
     begin = first.position[inside][0]
@@ -182,7 +178,7 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
         axis.grid(axis="y", color="0.92")
         mark_supports_of_run(axis, first)
     legend_above(axes[0], 4)
-    axes[2].set_xlabel(marks.POSITION)
+    axes[2].set_xlabel(POSITION)
     for k, (who, run) in enumerate(drawn.items()):
         force = run.contact_force[run.inside(pairs[0].spans)]
         frequency, amplitude = amplitudes(force, run.time_step)

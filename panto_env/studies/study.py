@@ -120,14 +120,6 @@ def tabled(
     return Table(title, tuple(heading for heading, _ in columns), rows, text_columns, ends)
 
 
-def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
-    """A figure of this size (inches) and its axes. Matplotlib is imported late: it is slow to import."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, figure.subplots(rows, columns, **options)
-
-
 def check_writable(folder: Path) -> None:
     """Raise InputError unless a study's numbers can be written into a folder; called before any work."""
     check_output(folder / NUMBERS, (".json",))

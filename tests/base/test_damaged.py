@@ -19,7 +19,7 @@ from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate
 from panto_env.base.checksums import CHECKSUM, read_checked, write_checked
 from panto_env.cluster import IDENTITY, open_parts
-from panto_env.metrics import trajectory
+from panto_env.metrics import stored_run
 
 from ..documents import ROOT
 
@@ -43,10 +43,10 @@ def test_what_has_no_checksum_is_refused(tmp_path):
     force = table["contact_force"].to_numpy().copy()
     force[10] = np.nextafter(force[10], np.inf)
     place = table.column_names.index("contact_force")
-    facts = json.loads(table.schema.metadata[trajectory.KEY])
+    facts = json.loads(table.schema.metadata[stored_run.KEY])
     del facts[CHECKSUM]
     changed = table.set_column(place, "contact_force", pa.array(force))
-    for each in (changed, table.replace_schema_metadata({trajectory.KEY: json.dumps(facts)})):
+    for each in (changed, table.replace_schema_metadata({stored_run.KEY: json.dumps(facts)})):
         pq.write_table(each, path)
         with pytest.raises(InputError, match=r"not a whole trajectory file \(it is damaged or was"):
             Trajectory.load(path)

@@ -131,7 +131,7 @@ def test_limits_are_those_of_the_mean_speed_over_the_spans():
     speeding = replace(
         RUN, position=40 * RUN.time + 25 * RUN.time**2, settings={"speed_drift": 5.0}, speed=50.0
     )
-    assert speeding.drifts
+    assert speeding.identity.drifts
     inside = speeding.inside((1, 1))
     mean = 40 + 50 * speeding.time[inside].mean()
     limits = {each.key: each for each in speeding.compliance((1, 1))}

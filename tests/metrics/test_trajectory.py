@@ -7,7 +7,7 @@ import pytest
 
 from panto_env import InputError, Trajectory, simulate
 from panto_env.base.checksums import with_checksum, without_checksum
-from panto_env.metrics import run_tables, trajectory
+from panto_env.metrics import run_tables, stored_run
 from panto_env.report.findings import Findings
 
 from ..crafted import ODD, changed, entries
@@ -64,7 +64,7 @@ def test_half_written_other_and_missing_files_are_refused(run, tmp_path):
 
 def test_files_of_another_format_are_refused(run, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory, "FORMAT", trajectory.FORMAT + 1)
+        patch.setattr(stored_run, "FORMAT", stored_run.FORMAT + 1)
         run.save(tmp_path / "run.parquet")
     with pytest.raises(InputError, match="it has another format"):
         Trajectory.load(tmp_path / "run.parquet")
@@ -74,7 +74,7 @@ def crafted(path):
     """Facts and columns of a run, each with one entry that is wrong."""
     table = pq.read_table(path)
     columns = {name: table[name].to_numpy() for name in table.column_names}
-    facts = without_checksum(json.loads(table.schema.metadata[trajectory.KEY]), columns)
+    facts = without_checksum(json.loads(table.schema.metadata[stored_run.KEY]), columns)
     for place in entries(facts):
         deep = place[0] in ("settings", "design") and place[1:] not in (("controlled",), ("pantograph",))
         if not (deep and len(place) > 1) and not (isinstance(place[-1], int) and place[-1] > 1):
@@ -94,7 +94,7 @@ def test_a_crafted_run_is_refused_in_a_sentence_or_shown(tmp_path):
     for facts, columns in list(crafted(path))[::6]:
         stored = json.dumps(with_checksum(facts, columns))
         try:
-            table = pa.table(columns, metadata={trajectory.KEY: stored})
+            table = pa.table(columns, metadata={stored_run.KEY: stored})
             pq.write_table(table, tmp_path / "crafted.parquet")
             again = Trajectory.load(tmp_path / "crafted.parquet")
             again.compliance((1, 2))

@@ -29,7 +29,7 @@ def test_limits_and_places_of_spans_of_nine_lengths_by_hand():
     assert NINE.length_at(120.0) == 42.5
     assert NINE.in_spans(50.0 + 65.0 / 4) == 1.25
     assert NINE.support(1.25) == 50.0 + 65.0 / 4
-    assert NINE.supports_within(50.0, 157.4).tolist() == [1, 2]
+    assert NINE.supports_within(50.0, 157.4).tolist() == [50.0, 115.0]
     assert NINE.within(np.array([49.9, 50.0, 157.4, 157.5]), (2, 3)).tolist() == [False, True, True, False]
     assert [NINE.last_whole_span(distance) for distance in (49.9, 50.0, 485.0)] == [0, 1, 9]
 

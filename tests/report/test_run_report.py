@@ -317,15 +317,14 @@ def test_titles_and_names_tell_runs_apart():
     assert [*charts.names_of(same).values()] == ["passive (1)", "pd (2)", "pd (3)"]
 
 
-def test_a_run_without_whole_spans_hides_no_other(monkeypatch):
+def test_a_run_without_whole_spans_hides_no_other():
     axes, share = Figure().subplots(), np.linspace(0.0, 1.0, 5)
-    monkeypatch.setattr(charts, "drawn", lambda draw: draw(axes))
     levels = (None, 100.0, None, 120.0)
     folded = [level and Folded(share, 0 * share + level, share + 90, share + 130) for level in levels]
     found = [Findings(RUN, "it") for _ in folded]
     for one, each in zip(found, folded, strict=True):
         one.__dict__["folded"] = each
-    charts.force_folded({one: f"run {k}" for k, one in enumerate(found)})
+    charts.force_folded.__wrapped__(axes, {one: f"run {k}" for k, one in enumerate(found)})
     assert [line.get_label() for line in axes.lines] == ["run 1: median", "run 3: median"]
     assert [line.get_color() for line in axes.lines] == [series_colour(1), series_colour(3)]
     assert [line.get_ydata()[0] for line in axes.lines] == [100.0, 120.0]

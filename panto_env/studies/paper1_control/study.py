@@ -20,11 +20,12 @@ from ...base.plotting import (
     SKY,
     VERMILION,
     legend_above,
+    panels,
     series_colour,
 )  # fmt: skip
 from ...base.table import Table
 from ...metrics.figures import LABELS
-from ..study import Columns, Comparison, Outcome, Report, panels, row, said, tabled
+from ..study import Columns, Comparison, Outcome, Report, row, said, tabled
 from . import passes
 from .passes import (
     ANGLE_SPEEDS,

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.arrays import Array
-from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, series_colour
+from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, panels, series_colour
 from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
 from ...identification.methods import equations
 from ...identification.performance import plot_matches, plot_record
-from ..study import panels
 from .published import PUBLISHED
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from ...analysis.simulation import simulate
-from ...base.plotting import BLUE, ORANGE
+from ...base.plotting import BLUE, ORANGE, panels
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...metrics.figures import Figures
-from ..study import Outcome, Report, panels, said
+from ..study import Outcome, Report, said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

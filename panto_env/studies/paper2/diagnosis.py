@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.pool import Progress, in_processes
-from ...base.plotting import LIMIT, legend_above, series_colour
+from ...base.plotting import LIMIT, legend_above, panels, series_colour
 from ...base.table import Table
 from ...diagnosis import diagnose
 from ...diagnosis.diagnosis import judge, plot_diagnosis
@@ -24,7 +24,7 @@ from ...diagnosis.healthy import Healthy
 from ...diagnosis.passes import Passes, side_by_side
 from ...diagnosis.training import SEVERITIES, Defect, Track, draw_defect, drive, every_defect
 from ...metrics.trajectory import Trajectory
-from ..study import Comparison, Outcome, Report, panels, said
+from ..study import Comparison, Outcome, Report, said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

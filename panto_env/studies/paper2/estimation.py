@@ -18,7 +18,7 @@ import numpy as np
 from ...analysis.pool import Progress, in_processes
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
-from ...base.plotting import ORANGE, legend_above, series_colour
+from ...base.plotting import ORANGE, legend_above, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...estimation.estimate import BANDS, COHERENT, Score, estimate, phases, score
@@ -37,7 +37,7 @@ from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData, with_scatter
 from ...terminal import number
-from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
+from ..study import Cell, Comparison, Outcome, Report, said, tabled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...base.errors import InputError
-from ...base.plotting import legend_above, series_colour
+from ...base.plotting import legend_above, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
@@ -41,7 +41,7 @@ from ...plant.numerics import Numerics, Runs
 from ...plant.plant import Plant
 from ...plant.state import Place, Row
 from ...plant.train import Train
-from ..study import Comparison, Outcome, Report, panels, said
+from ..study import Comparison, Outcome, Report, said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,11 +13,11 @@ import numpy as np
 
 from ...analysis.sweep import Row, sweep
 from ...base.arrays import from_kmh, to_kmh
-from ...base.plotting import POSITION, mark_supports, series_colour
+from ...base.plotting import POSITION, mark_supports, panels, series_colour
 from ...base.table import Table
 from ...metrics import compliance as en50367
 from ...metrics.figures import contact_loss
-from ..study import Comparison, Outcome, Report, panels, said, tabled
+from ..study import Comparison, Outcome, Report, said, tabled
 from .passes import (
     CATENARY,
     FACTORS,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.arrays import from_kmh
-from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, series_colour
+from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary
 from ...metrics.compliance import STD_OF_MEAN
-from ..study import Cell, Comparison, Outcome, Report, panels, said, tabled
+from ..study import Cell, Comparison, Outcome, Report, said, tabled
 from . import passes
 from .passes import BEST, THEORIES, Case, Curve, at_arrival, curves, fits
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...base.plotting import legend_above, series_colour
+from ...base.plotting import legend_above, panels, series_colour
 from ...base.table import Table
-from ..study import panels, tabled
+from ..study import tabled
 from .study import COUNTED, LINE_SPANS, SPEED_KMH
 
 if TYPE_CHECKING:
