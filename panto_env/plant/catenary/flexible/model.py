@@ -20,8 +20,7 @@ from .build import Tensioned, at_rest, constants, of_tension, settle
 from .defects import DefectiveLine, located_defects, shape_left, with_tension_left
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
-from .on_grid import dropper_positions
-from .overlaps import TensionLength, tension_lengths
+from .layout import Layout, TensionLength
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
@@ -33,11 +32,7 @@ class DefectiveParts:
     """All tension lengths of a line with the defects of a condition; most lines have only one."""
 
     def __init__(
-        self,
-        data: FlexibleCatenaryData,
-        spans: int,
-        condition: LineCondition,
-        tensions: tuple[float, float] = (1.0, 1.0),
+        self, layout: Layout, condition: LineCondition, tensions: tuple[float, float] = (1.0, 1.0)
     ) -> None:
         """Raises InputError for what the line has not.
 
@@ -45,18 +40,17 @@ class DefectiveParts:
         the beginning wires. Both messengers' supports at a mast are raised alike. Defects of the contact wire
         itself are on the wire in use there.
         """
-        self._parts = parts = tension_lengths(data, spans)
+        self._parts = parts = layout.tension_lengths
         conditions = [condition]
         if len(parts) > 1:
-            located_defects(data, _counts(parts, spans), condition)
-            locate(data, spans, condition)
-            conditions = [_of_part(part, data, condition) for part in parts]
+            located_defects(layout, condition)
+            locate(layout, condition)
+            conditions = [_of_part(part, layout, condition) for part in parts]
         self.lines = [
-            DefectiveLine(part.line, part.spans, own, tensions)
-            for part, own in zip(parts, conditions, strict=True)
+            DefectiveLine(part.layout, own, tensions) for part, own in zip(parts, conditions, strict=True)
         ]
         """The static state of each tension length."""
-        self._droppers = sum(len(part.droppers) for part in parts)
+        self._droppers = len(layout.droppers)
         self._pieces = self._pieces_of(0), self._pieces_of(1)
 
     def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
@@ -106,7 +100,7 @@ class DefectiveParts:
         rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
         places = [iter(slices) for _, _, slices in self._pieces]
         for part, own in zip(self._parts, self.lines, strict=True):
-            inner = slice(part.first_span, part.first_span + part.spans - 1)
+            inner = slice(part.first_span, part.first_span + len(part.layout.spans) - 1)
             state = own.solve(
                 None if scatter is None else scatter[part.droppers],
                 None if heights is None else heights[inner],
@@ -118,25 +112,11 @@ class DefectiveParts:
         return tension
 
 
-def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
-    counts = [0] * spans
-    for part in parts:
-        for k, table in enumerate(part.line.dropper_tables):
-            counts[part.first_span + k] += len(table.positions)
-    return counts
-
-
-def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCondition) -> LineCondition:
+def _of_part(part: TensionLength, layout: Layout, condition: LineCondition) -> LineCondition:
     """The condition of one tension length, with its own numbers of spans, droppers and supports."""
-
-    def numbered(counts: list[int]) -> list[tuple[int, int]]:
-        """Span and number in it of all droppers, both from 1."""
-        return [(span, n) for span, count in enumerate(counts, 1) for n in range(1, count + 1)]
-
-    along = numbered(_counts(tension_lengths(data), data.spans))
-    its = numbered([len(table.positions) for table in part.line.dropper_tables])
-    own = dict(zip([along[k] for k in part.droppers.tolist()], its, strict=True))
-    supports, (begin, end) = data.alignment().supports, part.in_use
+    both = zip(part.droppers.tolist(), part.layout.droppers, strict=True)
+    own = {layout.droppers[k][:2]: dropper[:2] for k, dropper in both}  # span and number
+    supports, (begin, end) = layout.supports, part.in_use
     return condition.model_copy(
         update={
             "broken_droppers": tuple(own[place] for place in condition.broken_droppers if place in own),
@@ -148,7 +128,7 @@ def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCon
             "raised_supports": tuple(
                 (support - part.first_span, wrong)
                 for support, wrong in condition.raised_supports
-                if 0 < support - part.first_span < part.spans
+                if 0 < support - part.first_span < len(part.layout.spans)
             ),
             "hard_spots": tuple(
                 (span - part.first_span, offset, *rest)
@@ -205,7 +185,8 @@ class FlexibleCatenary:
         shape = hang(designed)
         if data is not designed:
             shape = shape_left(designed, data)
-        own = locate(designed, spans, condition)
+        self.layout = layout = data.layout(spans)
+        own = locate(designed.layout(spans), condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
@@ -221,12 +202,12 @@ class FlexibleCatenary:
         about_one = self.line.window - spans_of_train(data, runs)
         window = about_one if about_one >= FEWEST_SPANS else 0
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": window}
-        self.alignment = alignment = data.alignment(spans)
+        self.alignment = alignment = layout.alignment
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
         self.supports = alignment.support(np.arange(1, spans))
-        self.droppers = dropper_positions(data, spans)
-        self._tension = np.tile(shape.dropper_tension, (1, spans // shape.spans))
+        self.droppers = layout.positions
+        self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
@@ -237,7 +218,10 @@ class FlexibleCatenary:
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
         if data is not designed:
-            self._check_loaded(designed, data, condition, spans)
+            both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
+            for (was, now), line in zip(both, self._defective[condition].lines, strict=True):
+                shape = shape_left(was.layout.line, now.layout.line)
+                check_loaded(now.layout, shape, line.rise(line.solve()))
         if any(each.side_wind for each in runs.conditions):
             air = air_about(self.line, data.wires, condition.ice, self.time_step)
             self.line = self.line._replace(air=air)
@@ -246,7 +230,7 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        self._defective = {each: DefectiveParts(data, spans, each, self._fixed) for each in conditions}
+        self._defective = {each: DefectiveParts(data.layout(spans), each, self._fixed) for each in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -272,15 +256,6 @@ class FlexibleCatenary:
             shape, tensioned, defective = self._latest[1]
             self._write_tension(row, shape, tensioned)
         self._tension[row] = defective.write(self.line, row, drawn.scatter, drawn.heights)
-
-    def _check_loaded(
-        self, designed: FlexibleCatenaryData, left: FlexibleCatenaryData, condition: LineCondition, spans: int
-    ) -> None:
-        """Raise InputError where a tension length does not hang with its wires as they are."""
-        lines = self._defective[condition].lines
-        parts = zip(tension_lengths(designed, spans), tension_lengths(left, spans), lines, strict=True)
-        for own, now, line in parts:
-            check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
 
     def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
         tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]

@@ -29,7 +29,6 @@ from ..schema import CLEAR, MOST_SPANS, Wire
 from .defects import with_tension_left
 from .fixed_wires import tensions_of_fixed
 from .grid import carrying_grid, finest_stable, nodes_per_span, stable
-from .overlaps import stitched
 from .schema import FlexibleCatenaryData
 
 STEPS = (
@@ -193,7 +192,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     if kink / LIMP_NODES < FINEST_GRID:
         longest = min(longest, LIMP_STEP)
     spacing = min(spacing, max(carrying_grid(data, quick), FINEST_GRID))
-    if stitched(data):
+    if data.layout().stitched:
         spacing = min(spacing, next(grid for share, grid in STITCHED_GRIDS if quick <= share * wave_speed))
     needed = [_by_clamps(data)]
     if runs.train_length and data.sequence and np.ptp(data.alignment().lengths) > 0:
@@ -225,13 +224,14 @@ def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
 
 def _heavy(data: FlexibleCatenaryData) -> bool:
     """Whether a clamp on the contact wire is a heavy one."""
-    return any(own.contact_clamp_mass > HEAVY_CLAMP for own in data.dropper_tables)
+    return any(span.droppers.contact_clamp_mass > HEAVY_CLAMP for span in data.layout(1).spans)
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
     """Grid (m) and time step (s) that the heaviest of the droppers' clamps requires."""
     heaviest = max(
-        mass for own in data.dropper_tables for mass in (own.contact_clamp_mass, own.messenger_clamp_mass)
+        max(span.droppers.contact_clamp_mass, span.droppers.messenger_clamp_mass)
+        for span in data.layout(1).spans
     )
     grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
     return grid, step
@@ -260,7 +260,7 @@ def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
     unlike, lightest = data.alignment().pitch is None, _lightest(runs)
-    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), unlike)
+    window = window_of(data.wires, numerics, runs, bool(data.overlaps), data.layout().stitched, unlike)
     window = window and window + spans_of_train(data, runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
@@ -375,7 +375,7 @@ def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last
     Waves and the train leave the line's start together.
     """
     wires = _wires_in(data, runs)
-    window = window_of(wires, numerics, runs, stitched=stitched(data))
+    window = window_of(wires, numerics, runs, stitched=data.layout().stitched)
     if window:
         return max(CLEAR, window // 2)
     speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
@@ -407,7 +407,7 @@ def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) ->
             stacklevel=3,
         )
     limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
-    if window is None and stitched(data) and runs.speeds[0] < limit:
+    if window is None and data.layout().stitched and runs.speeds[0] < limit:
         warnings.warn(
             f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
             f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
