@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections import Counter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
-from ....base.arrays import Array
+from ....base.arrays import Array, Index
 from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...numerics import Numerics
@@ -16,7 +17,7 @@ from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
 from .near import near_droppers
-from .on_grid import in_equal_rows, on_grid
+from .on_grid import OnGrid, on_grid
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
@@ -101,8 +102,60 @@ def constants(
         beside=Beside(tensioned.beside[None], np.zeros((1, 0, 5)), np.zeros(0)),
         near=near_droppers(data, grid, dx, resolution.time_step, per_stride, strides if differ else 0),
         air=NO_AIR,
-        **in_equal_rows(grid, differ, rows, real),
+        **_in_equal_rows(grid, differ, rows, real),
     )
+
+
+class Sets:
+    """Things attached to the wires, in sets: at most one per segment, all on the same wires and rows."""
+
+    def __init__(self, wires: Index, node: Index, rows: int) -> None:
+        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
+        row, self.segment = places(node, rows)
+        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
+        self.number = np.zeros(len(node), dtype=np.int64)
+        there: Counter[tuple[int, ...]] = Counter()
+        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
+            own = (*place, int(self.segment[k]))
+            self.number[k] = found.setdefault((*place, there[own]), len(found))
+            there[own] += 1
+        keys = np.array(list(found), dtype=np.int64).reshape(len(found), 2 + wires.shape[1])
+        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
+
+    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
+        """Values, (things, ...), as (sets, ..., WIDTH), ``empty`` where a segment has none of a set."""
+        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
+        array[self.number, self.segment] = values
+        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
+
+
+def _in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str, Any]:
+    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows.
+
+    differ: whether spans do. All is scattered then.
+    """
+    its = those = slice(0, 0) if differ else slice(None)
+    springs, links, yielding = grid.springs, grid.links, grid.spring_yield
+    held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
+    joined = Sets(links.wires[those], grid.at_links.first[those], rows)
+    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
+
+    def of_links(values: Array, empty: float = 0.0) -> Array:
+        return joined.of(values[those], real, empty)
+
+    return {
+        "spring_wire": held.wires[:, 0],
+        "spring_row": held.row,
+        "spring_pull": held.of(pull[its], real),
+        "link_wire": joined.wires,
+        "link_row": joined.row,
+        "link_weight": of_links(grid.at_links.weights),
+        "link_move": of_links(grid.move.reshape(len(grid.move), -1)),
+        "link_pull": of_links(grid.pull),
+        "link_room": of_links(grid.room, 1.0),
+        "link_set": joined.number,
+        "link_segment": joined.segment,
+    }
 
 
 class Tensioned(NamedTuple):

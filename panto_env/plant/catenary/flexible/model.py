@@ -51,6 +51,7 @@ class DefectiveParts:
         ]
         """The static state of each tension length."""
         self._droppers = len(layout.droppers)
+        self._rises = [slice(None)] * len(parts)  # which pieces of its pair each tension length has
         self._pieces = self._pieces_of(0), self._pieces_of(1)
 
     def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
@@ -59,26 +60,26 @@ class DefectiveParts:
         other.lines = [each.with_tensions(tensions) for each in self.lines]
         return other
 
-    def _pieces_of(self, pair: int) -> tuple[Array, int, list[slice]]:
-        """Limits of a pair's contact wire's pieces (m), their number, and which are those of each part."""
+    def _pieces_of(self, pair: int) -> tuple[Array, int]:
+        """Limits of a pair's contact wire's pieces (m), and their number."""
         if len(self._parts) == 1:
             own = self.lines[0]
-            return (np.zeros(0), 0, []) if pair else (own.breaks, own.pieces, [slice(None)])
-        breaks, pieces = [0.0], []
-        for part, own in zip(self._parts, self.lines, strict=True):
+            return (np.zeros(0), 0) if pair else (own.breaks, own.pieces)
+        breaks = [0.0]
+        for k, (part, own) in enumerate(zip(self._parts, self.lines, strict=True)):
             if part.pair == pair:
                 if part.begin > breaks[-1]:
                     breaks.append(part.begin)
-                pieces.append(slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2))
+                self._rises[k] = slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2)
                 breaks += (part.begin + own.breaks[1:]).tolist()
         end = self._parts[-1].end
         breaks += [end] if breaks[-1] < end else []
-        return np.array(breaks), len(breaks) - 1, pieces
+        return np.array(breaks), len(breaks) - 1
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
         """The line with tables for ``rows`` defective ones, which ``write`` fills."""
         real = line.link_static.dtype
-        (first, count, _), (second, others, _) = self._pieces
+        (first, count), (second, others) = self._pieces
         beside = Beside(line.beside.shape, np.zeros((rows, others, 5)), second)
         return line._replace(
             link_static=np.zeros((rows, self._droppers), dtype=real),
@@ -98,15 +99,14 @@ class DefectiveParts:
         """
         tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
         rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
-        places = [iter(slices) for _, _, slices in self._pieces]
-        for part, own in zip(self._parts, self.lines, strict=True):
+        for part, own, its_rise in zip(self._parts, self.lines, self._rises, strict=True):
             inner = slice(part.first_span, part.first_span + len(part.layout.spans) - 1)
             state = own.solve(
                 None if scatter is None else scatter[part.droppers],
                 None if heights is None else heights[inner],
             )
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
-            rises[part.pair][next(places[part.pair])] = state.rise
+            rises[part.pair][its_rise] = state.rise
         line.link_static[row], line.link_gap[row] = tension, gap
         line.rise_decay[row] = self.lines[0].decay
         return tension

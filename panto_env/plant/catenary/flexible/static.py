@@ -18,8 +18,8 @@ from ....base.errors import InputError, beside
 from ....base.table import Table
 from .layout import Layout
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, PeriodicWire, StaticShape, cut_droppers, joined
-from .whole_line import StitchedMessenger, settle_line
+from .shape import GRAVITY, PeriodicWire, StaticShape, joined
+from .whole_line import StitchedMessenger, cut_droppers, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
 

@@ -8,16 +8,18 @@ messenger carries its tension less the stitch wire's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.errors import InputError
 from ..schema import Wire
-from .layout import Stitches
+from .layout import Layout, Stitches
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, cut_droppers
+from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape
 
 
 class StitchedMessenger:
@@ -159,6 +161,44 @@ class StitchedMessenger:
         order = np.roll(np.arange(len(pieces)), -turn)
         lengths = np.diff(self.breaks)[order]
         return Profile(np.append(0.0, np.cumsum(lengths)), pieces[order], self._decay[order])
+
+
+MOST_ROUNDS = 200
+"""Rounds in which the droppers' weight, which depends on their length, must settle; usual lines take ten."""
+SETTLED, USABLE = 1e-12, 1e-9
+"""Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
+
+
+def cut_droppers(
+    layout: Layout, lift: Array, lower: Array, hang: Callable[[Array], tuple[Array, Array]]
+) -> tuple[Array, tuple[Array, Array, Array, Array]]:
+    """Unknowns of the messenger, and tension, length, stiffness and mass of the droppers of ``StaticShape``.
+
+    lift: upward forces that hold the contact wire at the droppers (N); lower: its heights there (m). hang:
+    the messenger's unknowns and heights at the droppers (m) by what these pull down with (N). Raises
+    InputError where the lengths do not settle.
+    """
+    stiffness, elastic, per_length, below, over = map(
+        layout.of_droppers,
+        ("stiffness", "axial_stiffness", "mass", "contact_clamp_mass", "messenger_clamp_mass"),
+    )
+    by_length = np.isnan(stiffness)
+    length = np.array([layout.spans[dropper.span - 1].encumbrance for dropper in layout.droppers])
+    for _ in range(MOST_ROUNDS):
+        mass = per_length * length
+        tension = lift + GRAVITY * (mass / 2 + below)
+        above, tops = hang(tension + GRAVITY * (mass / 2 + over))
+        loaded = tops - lower
+        new = np.where(by_length, loaded / (1 + tension / elastic), loaded - tension / stiffness)
+        change, length = np.abs(new - length).max(), new
+        if change < SETTLED:
+            break
+    if not change < USABLE:  # nor where it is nan
+        raise InputError(
+            f"The static shape of line '{layout.line.name}' does not settle in {MOST_ROUNDS} rounds: its "
+            "droppers or clamps are too heavy for its wires; give less mass, or more tension."
+        )
+    return above, (tension, length, np.where(by_length, elastic / length, stiffness), mass)
 
 
 def settle_line(line: FlexibleCatenaryData) -> StaticShape:
