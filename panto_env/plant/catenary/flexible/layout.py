@@ -100,6 +100,9 @@ class Layout:
     contact_heights: tuple[float, ...]  # (spans + 1,): of the contact wire over the nominal height (m)
     encumbrances: tuple[float, ...]  # (spans + 1,): of the messenger over the contact wire (m)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Layout:
+        return self  # nothing in it changes
+
     @cached_property
     def alignment(self) -> Alignment:
         """Where supports stand."""
