@@ -138,15 +138,17 @@ class DefectiveLine:
         condition: LineCondition,
         tensions: tuple[float, float] = (1.0, 1.0),
         nodes: Sequence[float] = (),
+        located: tuple[Any, Array, Array] | None = None,
     ) -> None:
         """layout: of the line as designed. tensions: as ``DrawnLine`` has them. nodes: further positions at
-        which a force may act (m); where spans are alike, in each of them.
+        which a force may act (m); where spans are alike, in each of them. located: defects of droppers and
+        supports, as ``located_defects`` gives them, instead of those of the condition.
 
         Raises InputError for what a line of so many spans has not.
         """
         data, each, alignment = layout.line, layout.spans, layout.alignment
         self._data, self._spans, self._condition = data, len(each), condition
-        self._broken, self._miscut, height = located_defects(layout, condition)
+        self._broken, self._miscut, height = located or located_defects(layout, condition)
         self._own = own = locate(layout, condition)
         self._stitches = stitches = layout.moving
         stitched = len(stitches.support) > 0

@@ -57,6 +57,11 @@ class TensionLength(NamedTuple):
         """Number of its contact wire on the grid; the messenger's is the next one."""
         return 2 * self.pair
 
+    @property
+    def inner(self) -> slice:
+        """The supports between two of its spans, among those between two spans of the line."""
+        return slice(self.first_span, self.first_span + len(self.layout.spans) - 1)
+
 
 class Stitches(NamedTuple):
     """Stitch wires in their order along a line, one at most per support."""

@@ -41,13 +41,15 @@ class DefectiveParts:
         itself are on the wire in use there.
         """
         self._parts = parts = layout.tension_lengths
-        conditions = [condition]
-        if len(parts) > 1:
-            located_defects(layout, condition)
-            locate(layout, condition)
-            conditions = [_of_part(part, layout, condition) for part in parts]
+        broken, error, height = located_defects(layout, condition)
         self.lines = [
-            DefectiveLine(part.layout, own, tensions) for part, own in zip(parts, conditions, strict=True)
+            DefectiveLine(
+                part.layout,
+                condition if len(parts) == 1 else _on_wire(part, layout, condition),
+                tensions,
+                located=(broken[part.droppers], error[part.droppers], height[part.inner]),
+            )
+            for part in parts
         ]
         """The static state of each tension length."""
         self._droppers = len(layout.droppers)
@@ -100,10 +102,9 @@ class DefectiveParts:
         tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
         rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
         for part, own, its_rise in zip(self._parts, self.lines, self._rises, strict=True):
-            inner = slice(part.first_span, part.first_span + len(part.layout.spans) - 1)
             state = own.solve(
                 None if scatter is None else scatter[part.droppers],
-                None if heights is None else heights[inner],
+                None if heights is None else heights[part.inner],
             )
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
             rises[part.pair][its_rise] = state.rise
@@ -112,33 +113,17 @@ class DefectiveParts:
         return tension
 
 
-def _of_part(part: TensionLength, layout: Layout, condition: LineCondition) -> LineCondition:
-    """The condition of one tension length, with its own numbers of spans, droppers and supports."""
-    both = zip(part.droppers.tolist(), part.layout.droppers, strict=True)
-    own = {layout.droppers[k][:2]: dropper[:2] for k, dropper in both}  # span and number
-    supports, (begin, end) = layout.supports, part.in_use
+def _on_wire(part: TensionLength, layout: Layout, condition: LineCondition) -> LineCondition:
+    """A condition with the defects of the contact wire of one tension length, by its own numbers of spans."""
+    supports, (begin, end), first = layout.supports, part.in_use, part.first_span
+    spots = [row for row in condition.hard_spots if begin <= supports[row[0] - 1] + row[1] < end]
+    worn = [row for row in condition.worn_stretches if begin <= supports[row[0] - 1] + row[1] < end]
     return condition.model_copy(
         update={
-            "broken_droppers": tuple(own[place] for place in condition.broken_droppers if place in own),
-            "miscut_droppers": tuple(
-                (*own[span, number], wrong)
-                for span, number, wrong in condition.miscut_droppers
-                if (span, number) in own
-            ),
-            "raised_supports": tuple(
-                (support - part.first_span, wrong)
-                for support, wrong in condition.raised_supports
-                if 0 < support - part.first_span < len(part.layout.spans)
-            ),
-            "hard_spots": tuple(
-                (span - part.first_span, offset, *rest)
-                for span, offset, *rest in condition.hard_spots
-                if begin <= supports[span - 1] + offset < end
-            ),
+            "hard_spots": tuple((span - first, *rest) for span, *rest in spots),
             "worn_stretches": tuple(
-                (span - part.first_span, offset, min(length, end - supports[span - 1] - offset), share)
-                for span, offset, length, share in condition.worn_stretches
-                if begin <= supports[span - 1] + offset < end
+                (span - first, offset, min(length, end - supports[span - 1] - offset), share)
+                for span, offset, length, share in worn
             ),
         }
     )
