@@ -7,7 +7,7 @@ own, in its tables too. Droppers need no table: they stand at a spacing, and the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -37,6 +37,20 @@ class Spacing(Settings):
     pre_sag: Annotated[float, Between(-0.2, 0.5, "m")] = Field(
         0.0, description="how far the contact wire hangs below its outer droppers in the middle of a span (m)"
     )
+
+
+class Spans(NamedTuple):
+    """A line's spans in the order of travel, and heights at its supports, as ``Layout`` has them."""
+
+    each: tuple[Span, ...]
+    contact_heights: tuple[float, ...]
+    encumbrances: tuple[float, ...]
+
+
+def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
+    """The spans of a line's ``layout``, and heights at its supports."""
+    layout = line.layout(spans)
+    return Spans(layout.spans, layout.contact_heights, layout.encumbrances)
 
 
 def parabola(x: Array, depth: float) -> Array:
