@@ -19,7 +19,6 @@ from ..metrics.compliance import Criterion
 from ..plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from ..plant.catenary.flexible.parts import index_at
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest, hang
 from .pool import Progress, in_processes
 from .simulation import simulate
@@ -92,9 +91,9 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
     hang(line)
     droppers = droppers_at_rest(line)
     places, elasticities = elasticity(line, force)
-    spans, heights, _ = spans_of(line)
-    supports = line.alignment().supports
-    slopes, changes = gradients(heights, supports)
+    layout = line.layout()
+    spans, supports = layout.spans, layout.supports
+    slopes, changes = gradients(layout.contact_heights, supports)
     parts = per_span(places, elasticities)
     inner = range(len(spans)) if not line.sequence else range(1, len(spans) - 1)
     yields = {k: parts[n if line.sequence else 0] for n, k in enumerate(inner)}
@@ -215,9 +214,8 @@ def drawn_line(lines: LineFamily | LineSection, seed: int) -> DrawnLine:
     run = simulate(line, lines.plausible.pantograph, speed_kmh, record_droppers=False)
     figures = None if run.terminated else run.summary()
     _, yields = elasticity(line, run.nominal_force)
-    each, heights, encumbrances = spans_of(line)
-    alignment = line.alignment()
-    slopes, changes = gradients(heights, alignment.supports)
+    layout, alignment = line.layout(), line.alignment()
+    slopes, changes = gradients(layout.contact_heights, alignment.supports)
     return DrawnLine(
         seed=seed,
         draws=draws,
@@ -228,9 +226,9 @@ def drawn_line(lines: LineFamily | LineSection, seed: int) -> DrawnLine:
         longest_span=float(alignment.lengths.max()),
         gradient=float(np.abs(slopes).max()),
         gradient_change=float(np.abs(changes).max()),
-        droppers=float(np.mean([len(span.droppers.positions) for span in each])),
-        encumbrance=float(np.mean(encumbrances)),
-        pre_sag=max(max(span.droppers.sag) for span in each),
+        droppers=float(np.mean([len(span.droppers.positions) for span in layout.spans])),
+        encumbrance=float(np.mean(layout.encumbrances)),
+        pre_sag=max(max(span.droppers.sag) for span in layout.spans),
         contact_tension=line.contact_wire.tension / 1e3,
         messenger_tension=line.messenger_wire.tension / 1e3,
         wave_speed_kmh=to_kmh(line.contact_wire.wave_speed),

@@ -15,7 +15,7 @@ from ..control.settings import run_settings
 from ..plant.catenary import CatenaryData, check_line
 from ..plant.catenary.flexible.parts import Droppers, Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.spans import Spacing, droppers_of, spans_of
+from ..plant.catenary.flexible.spans import Spacing, droppers_of
 from ..plant.pantograph.schema import PantographData
 
 S = TypeVar("S", bound=Settings)
@@ -126,7 +126,7 @@ def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
     changed = type(entry).model_validate(table)
     if isinstance(entry, FlexibleCatenaryData) and entry.sequence and changed != entry:
         assert isinstance(changed, FlexibleCatenaryData)
-        if spans_of(changed) == spans_of(entry) and keys <= Span.model_fields.keys():
+        if changed.layout() == entry.layout() and keys <= Span.model_fields.keys():
             raise InputError(
                 f"Each span in the sequence of line '{entry.name}' has values of its own in the place of "
                 f"{', '.join(sorted(keys))}, so nothing would change; change them in its file."

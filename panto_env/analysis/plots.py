@@ -33,9 +33,7 @@ from ..metrics.figures import SpanChoice, in_words, losses_of_contact
 from ..metrics.low_pass import zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
-from ..plant.catenary.flexible.on_grid import dropper_positions
-from ..plant.catenary.flexible.overlaps import profiles
-from ..plant.catenary.flexible.spans import spans_of
+from ..plant.catenary.flexible.shape import profiles
 from ..plant.catenary.flexible.static import hang
 from .line_check import LineCheck
 
@@ -211,19 +209,18 @@ def plot_line(found: LineCheck) -> Figure:
     Heights are exaggerated. Of a line whose spans are all alike, three are drawn.
     """
     line, shape = found.line, hang(found.line)
-    spans, heights, encumbrances = spans_of(line) if line.sequence else spans_of(line, SHOWN)
-    supports = np.array(line.alignment(len(spans)).supports)
+    layout = line.layout(SHOWN)
+    supports, droppers = np.array(layout.supports), layout.positions
     between = [np.linspace(*ends, POINTS) for ends in pairwise(supports)]
-    parts = profiles(line, shape, len(spans))
-    droppers = dropper_positions(line, len(spans))
+    parts = profiles(layout, shape)
     x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
     width = min(max(9.0, supports[-1] / 80.0), 40.0)
     figure, every = stacked((width, 8.2), 3, height_ratios=(3, 2, 2))
     wires, contact, elasticity = every
     for axis in every:
         mark_supports(axis, supports.tolist())
-    tops = np.array(heights) + encumbrances
-    wires.vlines(supports, min(heights) - 0.15, tops, color=SUPPORT, linewidth=2.5, label="support")
+    tops, lowest = np.add(layout.contact_heights, layout.encumbrances), min(layout.contact_heights)
+    wires.vlines(supports, lowest - 0.15, tops, color=SUPPORT, linewidth=2.5, label="support")
     bottoms = np.zeros(len(droppers))
     for part, lower, upper in parts:
         own = x[(x >= part.begin) & (x <= part.end)]
@@ -233,10 +230,10 @@ def plot_line(found: LineCheck) -> Figure:
     for rope in shape.ropes:
         for begin in [0.0] if line.sequence else supports:
             wires.plot(begin + rope.places, rope.heights, color=ORANGE, linewidth=1.0, label="stitch wire")
-    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
-    tops_of_droppers = bottoms + np.tile(stretched, len(droppers) // len(stretched))
-    wires.vlines(droppers, bottoms, tops_of_droppers, color="0.3", linewidth=0.8, label="dropper")
-    for k, span in enumerate(spans):
+    over = shape.over(len(layout.spans))
+    stretched = over.dropper_length + over.dropper_tension / over.dropper_stiffness
+    wires.vlines(droppers, bottoms, bottoms + stretched, color="0.3", linewidth=0.8, label="dropper")
+    for k, span in enumerate(layout.spans):
         wires.annotate(
             f"{line.alignment().mast(k) or k + 1}\n{span.span_length:.3g} m",
             ((supports[k] + supports[k + 1]) / 2, tops.max()),

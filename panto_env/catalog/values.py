@@ -12,7 +12,6 @@ from pydantic import BaseModel
 from ..plant.catenary import CatenaryData
 from ..plant.catenary.flexible.parts import Span
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
-from ..plant.catenary.flexible.spans import spans_of
 from ..plant.catenary.schema import BY_DEFAULT
 
 NOT_VALUES = ("sources", "name", "kind", "description")
@@ -139,8 +138,8 @@ def remarks(entry: Any, usual: Ranges) -> list[str]:
 
 def _hogging(line: FlexibleCatenaryData) -> Iterator[str]:
     """A sentence where the contact wire stands above its supports, or above the outer droppers."""
-    each, name = spans_of(line, 1).each, line.alignment().span_name
-    for number, span in enumerate(each, start=1):
+    name = line.alignment().span_name
+    for number, span in enumerate(line.layout(1).spans, start=1):
         sag = span.droppers.sag
         outer = min(sag[0], sag[-1])
         above, than = max((-min(sag), "at the supports"), (outer - min(sag), "at the outer droppers"))
@@ -175,7 +174,7 @@ def _values(entry: Any) -> Iterator[tuple[str, str, Any, str]]:
         if not (sequence and key.partition(".")[0] in Span.model_fields):
             yield key, "", given, meaning
     if sequence:
-        for number, span in enumerate(spans_of(entry).each, start=1):
+        for number, span in enumerate(entry.layout().spans, start=1):
             where = f" in span {entry.alignment().span_name(number)}"
             for key, given, meaning, _ in leaves(span):
                 yield key, where, given, meaning

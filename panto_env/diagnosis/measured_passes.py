@@ -77,7 +77,8 @@ def measured_passes(
         # What the first record's speed makes is the others', too: only what differs is the line's.
         away = np.interp(position - before, part.measured.place, part.measured.back(seen - usual))
         measured.append(healthy.mean(axis=0) + away)
-    facts = (alignment, first, per_span, plan.droppers + before, line.name, from_kmh(float(speeds.mean())))
+    droppers, speed = plan.layout.positions + before, from_kmh(float(speeds.mean()))
+    facts = (alignment, first, per_span, droppers, line.name, speed)
     wave_speed = line.contact_wire.wave_speed
     both = Passes(np.array(measured), *facts, wave_speed), Passes(healthy, *facts, wave_speed)
     return *both, (*notes, *ready.of_records)

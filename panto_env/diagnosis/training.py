@@ -103,16 +103,17 @@ def draw_defect(track: Track, kind: str, severity: float, span: int, random: np.
     """A defect at a place drawn in a span, counted from 1."""
     data = track.data
     alignment = data.alignment()
-    begin, number = alignment.support(span - 1), int(random.integers(len(data.droppers.positions)))
-    at = begin + data.droppers.positions[number]
+    begin, number = alignment.support(span - 1), 1 + int(random.integers(len(data.droppers.positions)))
+    layout = data.layout(SPANS)
+    at = layout.droppers[layout.index(span, number)].position
     if kind == TENSION:
         lost = {"lost_contact_tension": severity, "lost_messenger_tension": severity}
         return Defect(kind, severity, lost, float("nan"))
     if kind == BROKEN:
-        return Defect(kind, severity, {"broken_droppers": [(span, number + 1)]}, at)
+        return Defect(kind, severity, {"broken_droppers": [(span, number)]}, at)
     if kind in (LONG, SHORT):
         wrong = severity if kind == LONG else -severity
-        return Defect(kind, severity, {"miscut_droppers": [(span, number + 1, wrong)]}, at)
+        return Defect(kind, severity, {"miscut_droppers": [(span, number, wrong)]}, at)
     if kind in (RAISED, SUNK):
         height = severity if kind == RAISED else -severity
         return Defect(kind, severity, {"raised_supports": [(span, height)]}, alignment.support(span))
@@ -151,8 +152,7 @@ def drive(track: Track, number: int, defects: tuple[Defect, ...] = ()) -> Trajec
         accuracy="fast",
         record_droppers=False,
     )
-    begins = data.alignment().support(np.arange(SPANS))
-    return replace(run, dropper_position=np.add.outer(begins, data.droppers.positions).ravel())
+    return replace(run, dropper_position=data.layout(SPANS).positions)
 
 
 LINES = ("en50318-2002", "beijing-shanghai", "re250")

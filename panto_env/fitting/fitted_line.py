@@ -153,14 +153,12 @@ def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     line = design.catenary
     known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
     sources = {key: line.sources.get(f"as_found.{key}", "not given") for key in known}
-    spans = line.alignment(design.spans).span_of(design.droppers)
     cut = {(span, number): wrong for span, number, wrong in known.get("miscut_droppers", ())}
     raised = dict(known.get("raised_supports", ()))
     # All of them, also those that the records hardly tell: droppers were found together with these.
     found = {kind: fit.of_kind(kind) for kind in ("droppers", "supports", "tensions")}
     for each in found["droppers"]:
-        k = each.value.index[0]
-        place = int(spans[k]) + before, int(k - (spans < spans[k]).sum()) + 1
+        place = design.place(each.value.index[0])
         cut[place] = cut.get(place, 0.0) + each.difference
     for each in found["supports"]:
         number = each.value.index[0] + 1 + before

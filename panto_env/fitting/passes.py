@@ -172,8 +172,7 @@ class Passes:
         self.window = int(first.model.grid["window"])  # spans; 0: the whole line
         self._numerics = numerics.model_copy(update=same)
         self.steps = int(distance / (speed * self.time_step))
-        self.droppers, self.supports = first.model.droppers, first.model.supports
-        self.alignment = first.alignment
+        self.layout, self.alignment = catenary.layout(spans), first.alignment
         self.position = speed * self.time_step * (np.arange(self.steps) + 0.5)
         """Of the samples, (steps,) (m)."""
 

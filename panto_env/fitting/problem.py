@@ -17,7 +17,6 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..metrics.figures import FIRST_SETTLED
-from ..plant.catenary.flexible.overlaps import tension_lengths
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
 from ..plant.line_condition import DrawnLine, LineCondition, together
@@ -189,8 +188,6 @@ def problem(
     condition = condition_of(line, free, tolerances, first_span, spans)
     parts, notes, shifts = [], [], []
     of_records = [f"{record.name}: {note}" for record in records for note in record.notes]
-    droppers: Array = np.zeros(0)
-    supports: Array = np.zeros(0)
     for record in records:
         for k, piece in enumerate(record.pieces):
             name = f"{record.name}, piece {k + 1}" if len(record.pieces) > 1 else record.name
@@ -203,7 +200,6 @@ def problem(
                 continue
             facts = line, pantograph, condition, piece.speed, min(own_stretch[1] + END, distance), spans
             fine = Passes(*facts, NUMERICS)
-            droppers, supports = fine.droppers, fine.supports
             fair = Passes(*facts, Numerics(accuracy="fast", window=fine.window))
             coarse = Passes(*facts, Numerics(accuracy="fast"))
             parts.append(Part(own, fine, fair, coarse, name, is_low_passed(piece)))
@@ -213,7 +209,7 @@ def problem(
         raise InputError(f"No record can be compared. {' '.join(of_records)}")
     begin = min(float(part.measured.place[0]) for part in parts)
     end = max(float(part.measured.place[-1]) for part in parts)
-    design = Design(line, pantograph, condition, spans, droppers, supports, first_span)
+    design = Design(line, pantograph, condition, spans, first_span)
     span = alignment.mean_length
     freed = begin - (FIRST_SETTLED - 1) * span - 1.0, end + BEYOND * span
     values = Values(design, free, freed, dict(tolerances or {}))
@@ -223,9 +219,7 @@ def problem(
             f"The records have {told} coefficients for {len(values)} values, so noise is hardly known, and "
             f"intervals may be too narrow; give more passes, or free less, for {ENOUGH:g} times as many."
         )
-    crossed = sum(
-        begin < length.in_use[1] and length.in_use[0] < end for length in tension_lengths(line, spans)
-    )
+    crossed = sum(begin < part.in_use[1] and part.in_use[0] < end for part in design.layout.tension_lengths)
     if crossed > 1 and "tensions" in free:
         notes.append(
             f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; "

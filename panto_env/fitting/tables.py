@@ -148,10 +148,10 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
         _draw_values(axes, fit.of_kind(kind), fit.before)
-    plan, before = fit.problem.fitting.values.design, fit.before
+    supports = fit.before + np.array(fit.problem.fitting.values.design.layout.supports[1:-1])
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
-        mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])
+        mark_supports(axes, supports[(supports >= low) & (supports <= high)].tolist())
     (others[-1] if others else force).set_xlabel(POSITION)
     return figure
 

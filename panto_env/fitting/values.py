@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.arrays import Array, Index
 from ..base.errors import InputError, suggest
+from ..plant.catenary.flexible.layout import Layout
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import IRREGULARITY, LINE_CONDITIONS, DrawnLine, LineCondition
 from ..plant.pantograph.schema import PantographData
@@ -61,9 +62,17 @@ class Design:
     pantograph: PantographData
     condition: LineCondition
     spans: int
-    droppers: Array  # (droppers,): positions along the simulated line (m)
-    supports: Array  # (supports,): positions of those between two spans (m)
     first_span: int = 0  # spans of the line before the simulated ones
+
+    @property
+    def layout(self) -> Layout:
+        """Layout of the simulated spans."""
+        return self.catenary.layout(self.spans)
+
+    def place(self, dropper: int) -> tuple[int, int]:
+        """Span and number in it, from 1, of a dropper of the simulated spans, as the whole line counts."""
+        span, number = self.layout.droppers[dropper][:2]
+        return span + self.first_span, number
 
 
 class Values:
@@ -121,7 +130,7 @@ class Values:
     def variant(self, differences: Array, static_force: float) -> Variant:
         """The line and pantograph with these differences, (values,), from the design."""
         design = self.design
-        scatter, heights = np.zeros(len(design.droppers)), np.zeros(len(design.supports))
+        scatter, heights = np.zeros(len(design.layout.droppers)), np.zeros(design.spans - 1)
         tensions, waves = [1.0, 1.0], np.zeros((len(WAVES), 2))
         damping: dict[str, float] = {}
         chain = {name: list(getattr(design.pantograph, name)) for name in CHAIN}
@@ -154,22 +163,19 @@ class Values:
         return [self._value("tensions", name, "%", 100.0, None, k) for k, name in enumerate(names)]
 
     def _droppers(self, stretch: tuple[float, float]) -> list[Value]:
-        alignment = self.design.catenary.alignment(self.design.spans)
-        spans = alignment.span_of(self.design.droppers)
-        numbers = np.arange(len(spans)) - np.searchsorted(spans, spans) + 1  # in each one's span
-        rows = zip(numbers.tolist(), (spans + self.design.first_span).tolist(), strict=True)
-        names = [f"dropper {number} of span {alignment.span_name(span)}" for number, span in rows]
-        return [
-            self._value("droppers", names[k], "mm", 1e3, float(x), k)
-            for k, x in enumerate(self.design.droppers)
-            if stretch[0] < x < stretch[1]
-        ]
+        name, found = self.design.layout.alignment.span_name, []
+        for k, dropper in enumerate(self.design.layout.droppers):
+            if stretch[0] < dropper.position < stretch[1]:
+                span, number = self.design.place(k)
+                words = f"dropper {number} of span {name(span)}"
+                found.append(self._value("droppers", words, "mm", 1e3, dropper.position, k))
+        return found
 
     def _supports(self, stretch: tuple[float, float]) -> list[Value]:
         name = self.design.catenary.alignment().support_name
         return [
-            self._value("supports", f"support {name(k + 1 + self.design.first_span)}", "mm", 1e3, float(x), k)
-            for k, x in enumerate(self.design.supports)
+            self._value("supports", f"support {name(k + 1 + self.design.first_span)}", "mm", 1e3, x, k)
+            for k, x in enumerate(self.design.layout.supports[1:-1])
             if stretch[0] < x < stretch[1]
         ]
 

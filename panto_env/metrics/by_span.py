@@ -130,6 +130,7 @@ class MovingDropper(NamedTuple):
     smallest: float  # over the whole evaluated run; 0 where slack (N)
     slack: float  # share of the time while the train is in the dropper's span (%)
     span: int | None = None  # the dropper's, from 1, where spans differ
+    last: int = 0  # number along the line, from 0, of the last of them
 
 
 def evaluated(run: Trajectory, spans: SpanChoice = None) -> tuple[Array, NDArray[np.intp]]:
@@ -164,5 +165,6 @@ def moving_droppers(run: Trajectory, spans: SpanChoice = None) -> list[MovingDro
         if passing.any():
             slack = 100 * float((forces[passing] <= 0).mean())
             highest, lowest = float(forces.max()), float(forces.min())
-            found.append(MovingDropper(float(place), highest, lowest, slack, int(span) or None))
+            last = int(own[at][-1])
+            found.append(MovingDropper(float(place), highest, lowest, slack, int(span) or None, last))
     return found

@@ -99,11 +99,12 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
             resting = as_rows(droppers_at_rest(run.designed.line))
         except (KeyError, TypeError, ValueError):  # files of other versions may not hold it as this one does
             resting = []
-        at_rest = {(each.get("span"), round(each["position"], 5)): each for each in resting}
         for moving in moving_droppers(run, covered):
+            # The droppers at rest are those of the line, or of the one span that is repeated.
             unknown = dict.fromkeys(("number", *AT_REST))
-            known = at_rest.get((moving.span, round(moving.position, 5)), unknown)
+            known = resting[moving.last % len(resting)] if resting else unknown
             own = moving._asdict()
+            del own["last"]
             masts = _masts(run, moving.span or 0)
             if moving.span is None:
                 del own["span"]

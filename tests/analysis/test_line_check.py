@@ -29,7 +29,6 @@ from panto_env.catalog.family import gradient_limits, highest_speed
 from panto_env.catalog.loader import content_of
 from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import solve
 
 from ..command import panto
@@ -264,7 +263,7 @@ def test_values_are_those_of_the_line_that_an_environment_has(source):
     env = gymnasium.make("Pantograph-v0", catenary=source, speed_kmh=(0.0, family.fastest_kmh)).unwrapped
     env.reset(seed=3)
     line = env.task.plant.catenary
-    each, _, encumbrances = spans_of(line)
+    each, encumbrances = line.layout().spans, line.layout().encumbrances
     lengths = [span.span_length for span in each]
     assert found.span_length == pytest.approx(np.mean(lengths), rel=1e-12)
     assert found.length == pytest.approx(sum(lengths), rel=1e-12)

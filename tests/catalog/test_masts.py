@@ -12,8 +12,6 @@ from panto_env import InputError
 from panto_env.catalog import load_catenary
 from panto_env.catalog.loader import parse_catenary, text_of
 from panto_env.catalog.masts import line_from_masts
-from panto_env.plant.catenary.flexible.overlaps import stitches_of
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import droppers_at_rest, hang
 
 from ..command import panto
@@ -41,7 +39,8 @@ def made(text, tmp_path, base="re250"):
 @pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", ",")])
 def test_masts_give_lengths_and_heights(separator, decimal, tmp_path):
     line = made(table(separator, decimal), tmp_path)
-    spans, heights, encumbrances = spans_of(line)
+    layout = line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     assert line.alignment().supports == tuple(map(float, POSITIONS))
     assert heights == (0.0, 0.0, 0.0, 0.0, -0.05, -0.15, -0.05, 0.0)  # over that at the first mast
     assert encumbrances == (1.8, 1.8, 1.8, 1.8, 1.6, 1.3, 1.6, 1.8)
@@ -64,7 +63,8 @@ def test_masts_name_types_of_the_base_line(tmp_path):
     base = tmp_path / "base.toml"
     base.write_text(text_of("re250").replace("[support]", f"{LOW}[support]"))
     text = "span;type;encumbrance\n65;;1,8\n60;low;1,5\n45;v.1;1,4\n50;;1,6\n;;1,8\n"
-    spans, _, encumbrances = spans_of(made(text, tmp_path, base))
+    layout = made(text, tmp_path, base).layout()
+    spans, encumbrances = layout.spans, layout.encumbrances
     assert [span.support.stiffness for span in spans] == [500e3, 1e6, 1e6, 500e3]
     assert [span.span_length for span in spans] == [65.0, 60.0, 45.0, 50.0]
     assert encumbrances == (1.8, 1.5, 1.4, 1.6, 1.8)
@@ -146,7 +146,7 @@ def test_masts_say_which_supports_have_a_stitch_wire(tmp_path):
     """Empty cells are the line's own; 0 is none, at the last mast too."""
     text = "position (m),stitch wire (m)\n0,\n65,\n125,0\n180,16\n245,\n310,0\n"
     line = made(text, tmp_path, "re330-stitched")
-    found = stitches_of(line)
+    found = line.layout().stitches
     assert found.support.tolist() == [0, 1, 3, 4]
     assert (found.end - found.begin).tolist() == [18.0, 18.0, 16.0, 18.0]
     assert len(hang(line).ropes) == 4

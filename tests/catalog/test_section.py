@@ -13,8 +13,6 @@ from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
 from panto_env.catalog.section import Bridge, Masts, lowered
-from panto_env.plant.catenary.flexible.overlaps import tension_lengths
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 
 NAMES = ("main-line", "fast-line")
@@ -69,7 +67,8 @@ def test_drawn_lines_are_what_the_section_describes(name):
     masts, bridges = section.masts, section.bridges
     for seed in range(15):
         line = drawn(name, seed)
-        each, heights, encumbrances = spans_of(line)
+        layout = line.layout()
+        each, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
         lengths = np.array([span.span_length for span in each])
         assert section.spans[0] <= len(lengths) <= section.spans[1]
         longest = min(line.span_length, section.curves.straight) + 2 * masts.position_error
@@ -117,7 +116,7 @@ def test_gradients_are_legal_at_the_highest_speed(name):
 def test_seeds_give_lines_that_differ_widely(name):
     """Not one line with a little noise: in number of spans, in each span's length, in bridges."""
     lines = [drawn(name, seed) for seed in range(20)]
-    lengths = [np.array([span.span_length for span in spans_of(line).each]) for line in lines]
+    lengths = [np.array([span.span_length for span in line.layout().spans]) for line in lines]
     assert len({len(each) for each in lengths}) >= 6
     apart, alike = [], []
     for a, b in combinations(lengths, 2):
@@ -283,7 +282,7 @@ def test_a_section_of_the_catalogue_has_all_values_of_its_base_line(name):
     assert len(set(lengths)) >= 4
     assert 40.0 <= lengths.min() < lengths.max() <= 65.0
     assert f"{line.alignment().length / 1e3:.1f} km" in line.description
-    wires = [part.end - part.begin for part in tension_lengths(line)]
+    wires = [part.end - part.begin for part in line.layout().tension_lengths]
     assert 1000.0 < max(wires[:-1]) <= max(wires) <= 1400.0
 
 

@@ -10,7 +10,6 @@ from panto_env import InputError
 from panto_env.base.errors import UnusualWarning
 from panto_env.catalog.loader import parse_catenary
 from panto_env.catalog.masts import line_from_masts
-from panto_env.plant.catenary.flexible.spans import spans_of
 
 GERMAN = {
     "position": "Kilometrierung",
@@ -45,7 +44,8 @@ def line_of(tmp_path, content, headings=None, units=None):
 def test_a_german_spreadsheet_is_read_in_every_encoding(encoding, tmp_path):
     """Preamble, comma decimals, umlauts, an empty row, headings of its own, empty cells."""
     line = line_of(tmp_path, EXCEL.replace("\n", "\r\n").encode(encoding), GERMAN)
-    spans, heights, encumbrances = spans_of(line)
+    layout = line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     assert [span.span_length for span in spans] == pytest.approx([65, 60, 55, 65])
     assert heights == pytest.approx((0, 0, -0.02, -0.05, 0))
     assert encumbrances == pytest.approx((1.8, 1.8, 1.8, 1.6, 1.8))

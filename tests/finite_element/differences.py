@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from panto_env.plant.catenary.flexible.overlaps import tension_lengths
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.shape import StaticShape as ShapeOfSimulator
 from panto_env.plant.catenary.flexible.static import hang
@@ -28,7 +27,7 @@ class AtRest:
 
 def at_rest(line: FlexibleCatenaryData, element: float = 0.1) -> AtRest:
     """Differences of a line, of all its pairs of wires, in elements up to ``element`` (m)."""
-    parts = [each.line for each in tension_lengths(line)] if line.overlaps else [line]
+    parts = [each.layout.line for each in line.layout().tension_lengths] if line.overlaps else [line]
     found = [
         _compared(hang(part), theirs) for part, theirs in zip(parts, _shapes(line, element), strict=True)
     ]

@@ -13,7 +13,6 @@ from itertools import pairwise
 import numpy as np
 
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData, Overlap, Span
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.schema import Wire
 
 from .hermite import Array, Indices
@@ -37,7 +36,8 @@ class Pair:
 
 def pairs_of(line: FlexibleCatenaryData) -> list[Pair]:
     """The pairs of wires of a sequence in the order of travel."""
-    spans, heights, encumbrances = spans_of(line)
+    layout = line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     overlaps, count = line.overlaps, len(spans)
     for one, next_ in pairwise(overlaps):
         if one.first_span + one.spans > next_.first_span:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.plant.catenary.flexible.spans import spans_of
 
 from .contacts import Collector
 from .energy import balance
@@ -63,7 +62,8 @@ def test_every_support_arm_and_dropper_is_its_own_span_s():
 @pytest.mark.parametrize("name", ["mixed", "bridge", "both", "stitched-250"])
 def test_the_wire_is_at_its_wanted_height_at_droppers(name):
     line = SECTIONS[name].line
-    (rest,), (spans, heights, _) = at_rest(line, line.spans, 1.0), spans_of(line)
+    (rest,), layout = at_rest(line, line.spans, 1.0), line.layout()
+    spans, heights = layout.spans, layout.contact_heights
     supports = np.append(0.0, np.cumsum([span.span_length for span in spans]))
     x = rest.nodes[rest.droppers]
     wanted = np.interp(x, supports, heights) - np.concatenate([span.droppers.sag for span in spans])

@@ -27,7 +27,6 @@ from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.diagnosis import diagnose_records
 from panto_env.fitting.fit import INTERVAL, WHITE, Fit, fit
 from panto_env.fitting.stored import knowledge
-from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 from panto_env.records.measured import measured
@@ -147,7 +146,7 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
     first = found.problem.first_span
     spans = line.spans if line.ends else BEFORE.get(kind, 0) + SPANS + BEYOND
-    droppers = len(dropper_positions(line, spans))
+    droppers = len(line.layout(spans).positions)
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
     assert true.heights is not None

@@ -27,7 +27,8 @@ def passes(request):
 def test_they_give_what_whole_passes_give(passes):
     line, pantograph, own = passes
     random = np.random.default_rng(0)
-    scatter, heights = 2e-3 * random.standard_normal(len(own.droppers)), np.zeros(len(own.supports))
+    droppers_at, supports_at = own.layout.positions, np.array(own.layout.supports[1:-1])
+    scatter, heights = 2e-3 * random.standard_normal(len(droppers_at)), np.zeros(len(supports_at))
 
     def variant(dropper=None, support=None):
         droppers, supports = scatter.copy(), heights.copy()
@@ -39,12 +40,12 @@ def test_they_give_what_whole_passes_give(passes):
         return Variant(line, drawn, pantograph, pantograph.static_force)
 
     span = own.alignment.mean_length
-    which = np.flatnonzero(own.droppers > 4.5 * span)[[0, 5, 16, -25]]
-    support = int(np.flatnonzero(own.supports > 7 * span)[0])
+    which = np.flatnonzero(droppers_at > 4.5 * span)[[0, 5, 16, -25]]
+    support = int(np.flatnonzero(supports_at > 7 * span)[0])
     variants = [variant(), *(variant(dropper=k) for k in which), variant(support=support), variant()]
     places = [
-        *(own.droppers[which] - DROPPER_SPANS * span),
-        own.supports[support] - SUPPORT_SPANS * span,
+        *(droppers_at[which] - DROPPER_SPANS * span),
+        supports_at[support] - SUPPORT_SPANS * span,
         350.0,
     ]
     begins = np.array([0.0, *places])
@@ -60,7 +61,8 @@ def test_they_give_what_whole_passes_give(passes):
 def test_lines_of_other_damping_have_plants_of_their_own_on_the_same_grid(passes):
     """Also where one call has several of them."""
     line, pantograph, own = passes
-    drawn = DrawnLine(ROOM, np.zeros((0, 3)), np.zeros(len(own.droppers)), np.zeros(len(own.supports)))
+    droppers, supports = np.zeros(len(own.layout.droppers)), np.zeros(len(own.layout.spans) - 1)
+    drawn = DrawnLine(ROOM, np.zeros((0, 3)), droppers, supports)
 
     def variant(share):
         damping = line.damping.model_copy(update={"beta": share * line.damping.beta})

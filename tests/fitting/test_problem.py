@@ -55,8 +55,8 @@ def derivatives(exact):
 def test_where_things_are(ready, design):
     plan = ready.fitting.values.design
     begins = 60.0 * np.arange(plan.spans)
-    np.testing.assert_allclose(plan.droppers, (begins[:, None] + design.droppers.positions).ravel())
-    np.testing.assert_allclose(plan.supports, begins[1:])
+    np.testing.assert_allclose(plan.layout.positions, (begins[:, None] + design.droppers.positions).ravel())
+    np.testing.assert_allclose(plan.layout.supports[1:-1], begins[1:])
     assert ready.first_span == 0
     assert ready.stretch[0] == 60.0 * (FIRST_SETTLED - 1)
     assert 60.0 * SPANS - 25 < ready.stretch[1] < 60.0 * SPANS - 20

@@ -15,9 +15,7 @@ SPANS = 14
 @pytest.fixture
 def plan(design, pantograph):
     """14 spans of 60 m with 9 droppers each."""
-    begins = 60.0 * np.arange(SPANS)
-    droppers = (begins[:, None] + design.droppers.positions).ravel()
-    return Design(design, pantograph, LineCondition(), SPANS, droppers, begins[1:])
+    return Design(design, pantograph, LineCondition(), SPANS)
 
 
 def everything(plan, **more):
@@ -51,7 +49,7 @@ def test_only_those_within_the_stretch_are_freed(plan):
     values = Values(plan, ("supports", "droppers"), (100.0, 200.0))
     assert [value.name for value in values.all if value.kind == "supports"] == ["support 2", "support 3"]
     places = [value.place for value in values.all if value.kind == "droppers"]
-    assert places == [place for place in plan.droppers if 100 < place < 200]
+    assert places == [place for place in plan.layout.positions if 100 < place < 200]
     assert values.of_kind("supports") == [len(places), len(places) + 1]
 
 

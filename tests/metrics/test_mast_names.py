@@ -68,10 +68,7 @@ def test_a_record_judged_and_compared(line, run):
 
 
 def test_values_of_a_fit(line):
-    supports = line.alignment().supports[1:-1]
-    plan = Design(
-        line, load_pantograph("dsa380"), LINE_CONDITIONS["as-built"], len(LENGTHS), [620.0], supports
-    )
+    plan = Design(line, load_pantograph("dsa380"), LINE_CONDITIONS["as-built"], len(LENGTHS))
     names = [each.name for each in Values(plan, ("droppers", "supports"), (0.0, 2000.0)).all]
     assert f"dropper 1 of span {TWELFTH}" in names
     assert "support 11 (M011, 12+190.0)" in names

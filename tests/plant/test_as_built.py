@@ -68,8 +68,8 @@ def test_what_is_not_asked_for_draws_nothing_and_leaves_the_rest_as_it_was():
 def test_a_drawn_support_height_is_that_of_a_raised_support():
     data, heights = load_catenary(EN50318), [0.01, -0.004, 0.0, 0.02]
     raised = LineCondition(raised_supports=[(k + 1, h) for k, h in enumerate(heights)])
-    named = DefectiveLine(data, 5, raised).solve()
-    drawn = DefectiveLine(data, 5, LineCondition()).solve(heights=np.array(heights))
+    named = DefectiveLine(data.layout(5), raised).solve()
+    drawn = DefectiveLine(data.layout(5), LineCondition()).solve(heights=np.array(heights))
     np.testing.assert_array_equal(named.tension, drawn.tension)
     np.testing.assert_array_equal(named.rise, drawn.rise)
 

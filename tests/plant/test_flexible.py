@@ -9,7 +9,6 @@ from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD, STENCIL
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
-from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.catenary.flexible.static import solve
@@ -169,7 +168,7 @@ def energy(line, wire, data, step):
         total += line_energy.of_wire(old[w], now[w], line.stencil[0, w], mass, bare, step)
     masts = PAD + line.rows * WIDTH // line.window * np.arange(1, line.window)
     total += (STIFFNESS * middle[MESSENGER, masts] ** 2).sum() / 2  # the arms are without stiffness
-    droppers = dropper_positions(data, line.alignment.supports.size - 1)
+    droppers = data.layout(line.alignment.supports.size - 1).positions
     first, weights = interpolation.stencil(droppers, line.spacing)
     nodes = PAD + first[:, None] + np.arange(4)
     extensions = [(weights * (u[MESSENGER, nodes] - u[CONTACT, nodes])).sum(axis=1) for u in (old, now)]

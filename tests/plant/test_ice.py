@@ -54,7 +54,7 @@ def test_static_state_agrees_with_finite_elements(name, ice):
     data, spans = load_catenary(name), 10
     condition = LineCondition(ice=ice)
     whole, other = build(data, spans, 0.1), iced(data, spans, 0.1, ice)
-    line = DefectiveLine(data, spans, condition)
+    line = DefectiveLine(data.layout(spans), condition)
     state = line.solve()
     inner = (whole.nodes > 3 * data.span_length) & (whole.nodes < 7 * data.span_length)
     own = slice(3 * len(data.droppers.positions), 7 * len(data.droppers.positions))
@@ -69,7 +69,7 @@ def test_static_state_agrees_with_finite_elements(name, ice):
 def test_droppers_and_supports_carry_the_wires_and_the_ice(name):
     """Forces balance: a span's droppers and its steady arm hold the contact wire's weight and its ice's."""
     data, spans, ice = load_catenary(name), 12, 0.8
-    line = DefectiveLine(data, spans, LineCondition(ice=ice))
+    line = DefectiveLine(data.layout(spans), LineCondition(ice=ice))
     state, designed, droppers = line.solve(), solve(data), data.droppers
     own = slice(5 * len(droppers.positions), 6 * len(droppers.positions))
     at_mast = 5 * data.span_length
@@ -93,7 +93,7 @@ def test_both_wires_together_carry_the_ice_between_droppers():
     many = tuple(np.arange(1.0, 60.0, 2.0).tolist())
     hung = base.droppers.model_copy(update={"positions": many, "sag": (0.0,) * len(many), "stiffness": 1e8})
     data = base.model_copy(update={"droppers": hung, "steady_arm": arm, **wires})
-    line = DefectiveLine(data, 20, LineCondition(ice=0.5))
+    line = DefectiveLine(data.layout(20), LineCondition(ice=0.5))
     left = solve(with_tension_left(data, LineCondition(ice=0.5))).contact
     x = 60 * 10 + np.array([1.0, 29.0])  # droppers, 29 and 1 m from mid-span
     now = left.height(x) + line.rise(line.solve()).height(x)
@@ -131,14 +131,12 @@ def test_what_cannot_hang_or_has_no_wires_is_refused():
 def test_spans_that_differ_bear_ice_as_finite_elements_say():
     data, ice = line_of(MIXED), 0.6
     condition, spans = LineCondition(ice=ice), len(MIXED)
-    other, line = iced(data, spans, 0.1, ice), DefectiveLine(data, spans, condition)
+    other, line = iced(data, spans, 0.1, ice), DefectiveLine(data.layout(spans), condition)
     state, begins = line.solve(), data.alignment().supports
     ours = solve(with_tension_left(data, condition)).contact.height(other.nodes)
     ours = ours + line.rise(state).height(other.nodes)
     inner = (other.nodes > begins[3]) & (other.nodes < begins[-4])
     np.testing.assert_allclose(ours[inner], other.static[inner, 0], atol=5e-4)
-    droppers = np.concatenate(
-        [begin + np.array(own.positions) for begin, own in zip(begins, data.dropper_tables, strict=False)]
-    )
+    droppers = data.layout().positions
     own = (droppers > begins[3]) & (droppers < begins[-4])
     np.testing.assert_allclose(state.tension[own], other.dropper_tension[own], atol=0.5)

@@ -70,7 +70,7 @@ def test_static_state_agrees_with_finite_elements(name):
     system = build(data, 6, 0.1)
     for keywords in CONDITIONS:
         condition = LineCondition(**keywords)
-        line = DefectiveLine(data, 6, condition)
+        line = DefectiveLine(data.layout(6), condition)
         state = line.solve()
         change, tension = static_by_finite_elements(system, data, condition)
         contact = change.reshape(-1, 4)[:, 2]
@@ -82,7 +82,7 @@ def test_static_state_agrees_with_finite_elements(name):
 @pytest.mark.parametrize("name", [EN50318, BENCHMARK])
 def test_many_slack_droppers_agree_with_finite_elements(name):
     data, condition = load_catenary(name), LineCondition(dropper_scatter=0.02)
-    system, line = build(data, 6, 0.1), DefectiveLine(data, 6, condition)
+    system, line = build(data, 6, 0.1), DefectiveLine(data.layout(6), condition)
     for seed in range(5):
         scatter = draw([condition], np.random.default_rng(seed), 54).scatter
         state = line.solve(scatter)
@@ -94,8 +94,8 @@ def test_many_slack_droppers_agree_with_finite_elements(name):
 
 def test_neighbours_carry_the_load_of_a_broken_dropper():
     data = load_catenary(EN50318)
-    line = DefectiveLine(data, 20, LineCondition(broken_droppers=[(12, 5)]))
-    intact = DefectiveLine(data, 20, LineCondition()).solve().tension
+    line = DefectiveLine(data.layout(20), LineCondition(broken_droppers=[(12, 5)]))
+    intact = DefectiveLine(data.layout(20), LineCondition()).solve().tension
     state = line.solve()
     change = (state.tension - intact).reshape(20, 9)[11]
     assert state.tension.reshape(20, 9)[11, 4] == 0
@@ -109,8 +109,10 @@ def test_neighbours_carry_the_load_of_a_broken_dropper():
 def test_balance_of_forces_between_two_points_of_the_wire():
     """Tension times the change of slope is what the droppers between pull less, up to a millinewton."""
     data = load_catenary(BENCHMARK)
-    line = DefectiveLine(data, 8, LineCondition(miscut_droppers=[(4, 3, 0.01)], raised_supports=[(4, 0.02)]))
-    intact, state = DefectiveLine(data, 8, LineCondition()).solve(), line.solve()
+    line = DefectiveLine(
+        data.layout(8), LineCondition(miscut_droppers=[(4, 3, 0.01)], raised_supports=[(4, 0.02)])
+    )
+    intact, state = DefectiveLine(data.layout(8), LineCondition()).solve(), line.solve()
     x = np.array([172.0, 172.5, 183.5, 184.0])  # either side of droppers (4, 2) and (4, 3), not near
     height = rise(line, state, x)
     bent = data.contact_wire.tension * ((height[3] - height[2]) - (height[1] - height[0])) / 0.5
@@ -122,7 +124,7 @@ def test_long_dropper_lowers_and_short_one_raises_the_wire():
     data = load_catenary(EN50318)
     heights = []
     for error in (0.02, -0.02):
-        line = DefectiveLine(data, 5, LineCondition(miscut_droppers=[(3, 4, error)]))
+        line = DefectiveLine(data.layout(5), LineCondition(miscut_droppers=[(3, 4, error)]))
         heights.append(rise(line, line.solve(), [2 * 60 + 23.5])[0])
     assert heights[0] == pytest.approx(-heights[1]) == pytest.approx(-8.6e-3, abs=0.2e-3)
 

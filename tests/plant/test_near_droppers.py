@@ -8,7 +8,6 @@ from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible import near as near_build
 from panto_env.plant.catenary.flexible.arrays import NONE, REACH
 from panto_env.plant.catenary.flexible.build import constants
-from panto_env.plant.catenary.flexible.on_grid import dropper_positions
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.numerics import Numerics, Runs
@@ -39,7 +38,7 @@ def test_each_cell_finds_the_nearest_dropper(line):
     line = line.model_copy(update={"spans": 12})
     whole = built(line)
     near, dx = whole.near, whole.spacing
-    places = np.sort(dropper_positions(line, 12)) / dx
+    places = np.sort(line.layout(12).positions) / dx
     cells = near.number.shape[1]
     repeats = whole.scattered.mobility.shape[1] == 0
     first = 5 * cells if repeats else 0

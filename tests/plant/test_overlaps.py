@@ -13,7 +13,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.arrays import PAD
 from panto_env.plant.catenary.flexible.as_run import elasticity
-from panto_env.plant.catenary.flexible.overlaps import heights_of_pair, tension_lengths
+from panto_env.plant.catenary.flexible.shape import heights_of_pair
 from panto_env.plant.catenary.flexible.static import droppers_at_rest, hang
 from panto_env.plant.catenary.flexible.wires import along
 from panto_env.plant.numerics import Runs
@@ -53,8 +53,8 @@ def run(line, distance=17 * LENGTH, pantograph="dsa380", speed=300.0, **settings
 
 def test_tension_lengths_of_a_line():
     overlaps = [{"first_span": FIRST, "rises": RISES}, {"first_span": 18, "rises": [0.3]}]
-    first, second, third = tension_lengths(line_of(overlaps))
-    assert [(part.first_span, part.spans, part.pair) for part in (first, second, third)] == [
+    first, second, third = line_of(overlaps).layout().tension_lengths
+    assert [(part.first_span, len(part.layout.spans), part.pair) for part in (first, second, third)] == [
         (0, 13, 0),
         (10, 8, 1),
         (17, 7, 0),
@@ -62,8 +62,8 @@ def test_tension_lengths_of_a_line():
     assert (first.end, second.begin) == (13 * LENGTH, 10 * LENGTH)
     assert first.in_use == (0.0, MIDDLE)
     assert second.in_use == (MIDDLE, 17.5 * LENGTH)
-    assert first.line.contact_heights == (*[0.0] * 12, 0.1, 0.5)
-    assert second.line.contact_heights == (0.5, 0.1, *[0.0] * 6, 0.3)
+    assert first.layout.contact_heights == (*[0.0] * 12, 0.1, 0.5)
+    assert second.layout.contact_heights == (0.5, 0.1, *[0.0] * 6, 0.3)
     # Droppers count span by span, those of the ending wires first.
     per_span = 7
     assert first.droppers[10 * per_span :].tolist() == [70 + k + 14 * n for n in range(3) for k in range(7)]
@@ -75,18 +75,20 @@ def test_tension_lengths_of_a_line():
 def test_wires_in_the_middle_span_are_level_and_rise_in_a_parabola():
     line, x = line_of(), np.linspace(0, LENGTH, 131)
     shape = hang(line)
-    ending, beginning = (heights_of_pair(line, shape, k, FIRST * LENGTH + x) for k in (0, 1))
+    ending, beginning = (heights_of_pair(line.layout(), shape, k, FIRST * LENGTH + x) for k in (0, 1))
     np.testing.assert_allclose(ending, beginning[::-1], atol=1e-9)
     level = (LENGTH + 4.0) / 2
     wanted = 0.1 * (np.maximum(x - level, 0) / (LENGTH - level)) ** 2
     at = np.array(line.droppers.positions)
-    places = heights_of_pair(line, shape, 0, FIRST * LENGTH + at)
+    places = heights_of_pair(line.layout(), shape, 0, FIRST * LENGTH + at)
     exact = 0.1 * (np.maximum(at - level, 0) / (LENGTH - level)) ** 2
     np.testing.assert_allclose(places, exact, atol=1e-9)
     assert np.abs(ending - wanted).max() < 0.01  # between droppers the wire sags
     assert abs(ending[65] - beginning[65]) < 1e-9
-    assert heights_of_pair(line, shape, 0, np.array([13 * LENGTH]))[0] == pytest.approx(0.5, abs=0.01)
-    assert heights_of_pair(line, shape, 0, np.array([13 * LENGTH + 1.0]))[0] > 50
+    assert heights_of_pair(line.layout(), shape, 0, np.array([13 * LENGTH]))[0] == pytest.approx(
+        0.5, abs=0.01
+    )
+    assert heights_of_pair(line.layout(), shape, 0, np.array([13 * LENGTH + 1.0]))[0] > 50
     in_use = shape.contact.height(np.array([0.0, MIDDLE - 1e-9, MIDDLE + 1e-9, 15 * LENGTH]))
     assert np.abs(in_use).max() < 0.02
 
@@ -98,9 +100,9 @@ def test_droppers_of_both_pairs_carry_both_wires():
     assert [each.number for each in table if each.span == FIRST] == list(range(1, 15))
     assert len(table) == 27 * 7
     force = np.array([each.static_force for each in table])
-    for part in tension_lengths(line):
-        wire, count = line.contact_wire, part.spans
-        slopes = np.array(part.line.contact_heights)
+    for part in line.layout().tension_lengths:
+        wire, count = line.contact_wire, len(part.layout.spans)
+        slopes = np.array(part.layout.contact_heights)
         lifted = wire.tension * (slopes[-1] - slopes[-2] - slopes[1] + slopes[0]) / LENGTH
         assert force[part.droppers].sum() == pytest.approx(
             9.81 * wire.mass * count * LENGTH - lifted, rel=1e-3
@@ -265,7 +267,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
 )
 def test_overlaps_that_the_line_has_no_room_for_are_refused(overlaps, message):
     if message is None:
-        assert len(tension_lengths(line_of(overlaps))) == 3
+        assert len(line_of(overlaps).layout().tension_lengths) == 3
         return
     with pytest.raises(InputError, match=message):
         hang(line_of(overlaps))

@@ -6,7 +6,7 @@ import pytest
 from panto_env import simulate
 from panto_env.backend import JIT, WIDTH, kernel, load_row
 from panto_env.plant.catenary.flexible.arrays import PAD
-from panto_env.plant.catenary.flexible.on_grid import Sets
+from panto_env.plant.catenary.flexible.build import Sets
 from panto_env.plant.catenary.flexible.wires import (
     along,
     lay_out,

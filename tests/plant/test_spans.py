@@ -12,10 +12,8 @@ from panto_env import InputError
 from panto_env.analysis.parameters import change, change_together
 from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
-from panto_env.plant.catenary.flexible.overlaps import stitches_of, tension_lengths
 from panto_env.plant.catenary.flexible.parts import Span
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang, solve
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
@@ -99,7 +97,8 @@ def test_values_of_a_sequence_have_the_source_of_their_table(tmp_path):
 
 def test_what_a_type_leaves_out_is_the_line_s_own(tmp_path):
     line = read(FILE + DROPPERS + SPANS, tmp_path)
-    spans, heights, encumbrances = spans_of(line)
+    layout = line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     assert line.spans == 5
     assert line.alignment().supports == (0.0, 65.0, 110.0, 155.0, 220.0, 285.0)
     assert heights == (0.0, 0.0, 0.0, -0.05, 0.0, 0.0)
@@ -119,7 +118,7 @@ def test_droppers_at_a_spacing_stand_evenly_and_the_wire_hangs_in_a_parabola(tmp
     assert len(positions) == 9  # 55 m in gaps near 7 m: eight
     np.testing.assert_allclose(positions, 5 + 55 / 8 * np.arange(9))
     np.testing.assert_allclose(sag, 0.06 * (1 - ((positions - 32.5) / 27.5) ** 2), atol=1e-15)
-    long, short, _, bridge, _ = spans_of(line).each
+    long, short, _, bridge, _ = line.layout().spans
     assert long.droppers == line.droppers
     # Left out in a shorter span: the same distances, and as much pre-sag per metre of span.
     np.testing.assert_allclose(short.droppers.positions, 5 + 35 / 5 * np.arange(6))
@@ -132,14 +131,14 @@ def test_a_line_of_unlike_spans_is_the_same_after_a_round_trip(tmp_path):
     line = read(FILE + DROPPERS + SPANS, tmp_path)
     again = FlexibleCatenaryData.model_validate_json(line.model_dump_json())
     assert again == line
-    assert spans_of(again) == spans_of(line)
+    assert again.layout() == line.layout()
     rig = RigData.model_validate({"name": "rig", "description": "of it", "line": line})
     assert rig.alignment() == line.alignment()
 
 
 def test_a_parameter_changes_every_span_that_leaves_it_out(tmp_path):
     line = change(read(FILE + DROPPERS + SPANS, tmp_path), "catenary.encumbrance", 1.6)
-    assert spans_of(line).encumbrances == (1.6, 1.6, 1.6, 1.2, 1.6, 1.6)
+    assert line.layout().encumbrances == (1.6, 1.6, 1.6, 1.2, 1.6, 1.6)
     stiffer = change(line, "catenary.contact_wire.tension", 18e3)
     assert solve(stiffer).dropper_tension.max() != solve(line).dropper_tension.max()
 
@@ -152,7 +151,7 @@ def test_a_parameter_that_every_span_replaces_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"do not go together.* place of encumbrance, so nothing"):
         change_together(line, {"catenary.encumbrance": 1.5})
     stiffer = change(line, "catenary.support.stiffness", 1e6)
-    assert {span.support.stiffness for span in spans_of(stiffer).each} == {1e6}
+    assert {span.support.stiffness for span in stiffer.layout().spans} == {1e6}
 
 
 @pytest.mark.parametrize(
@@ -221,8 +220,8 @@ def test_the_example_of_the_document_hangs(tmp_path):
     spans, droppers, *_ = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     own = FILE.replace("span_length = 65.0\n", "") + droppers + spans
     line = read(own, tmp_path)
-    assert [span.span_length for span in spans_of(line).each] == [65.0, 65.0, 45.0, 40.0, 45.0, 65.0]
-    assert spans_of(line).contact_heights == (0.0, 0.0, 0.0, -0.05, -0.05, 0.0, 0.0)
+    assert [span.span_length for span in line.layout().spans] == [65.0, 65.0, 45.0, 40.0, 45.0, 65.0]
+    assert line.layout().contact_heights == (0.0, 0.0, 0.0, -0.05, -0.05, 0.0, 0.0)
     assert len(line.droppers.positions) == 9
     assert max(line.droppers.sag) == pytest.approx(0.05)
 
@@ -233,5 +232,5 @@ def test_the_examples_of_stitch_wires_and_overlaps_hang():
     own = {"sequence": ["without", *[{}] * 19]} | tomllib.loads(stitch) | tomllib.loads(overlap)
     line = line_of("re330-stitched", own)
     hang(line)
-    assert [round(part.end) for part in tension_lengths(line)] == [17 * 65, 20 * 65]
-    assert stitches_of(line).support.tolist() == list(range(1, 21))
+    assert [round(part.end) for part in line.layout().tension_lengths] == [17 * 65, 20 * 65]
+    assert line.layout().stitches.support.tolist() == list(range(1, 21))

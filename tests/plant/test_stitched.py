@@ -13,8 +13,6 @@ from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.arrays import CONTACT, HUNG, LINK, MESSENGER, PAD, STITCH
 from panto_env.plant.catenary.flexible.as_run import elasticity, non_uniformity
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
-from panto_env.plant.catenary.flexible.overlaps import moving, stitches_of
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.catenary.flexible.wires import along, window_nodes
 from panto_env.plant.line_condition import NEW, LineCondition
@@ -64,7 +62,7 @@ def test_forces_are_in_balance_at_clamps_and_along_the_stitch_wire(line):
     slopes = np.diff(rope.heights) / np.diff(rope.places)  # each piece hangs in a parabola about that slope
     weight = 9.81 * stitch.mass * np.diff(rope.places)
     pulled = stitch.tension * np.diff(slopes) - (weight[1:] + weight[:-1]) / 2
-    number = np.flatnonzero(stitches_of(line).carrying == k) if k else np.array([8, 9, 0, 1])
+    number = np.flatnonzero(line.layout().stitches.carrying == k) if k else np.array([8, 9, 0, 1])
     mass = shape.dropper_mass[number] / 2 + line.droppers.messenger_clamp_mass
     np.testing.assert_allclose(pulled, shape.dropper_tension[number] + 9.81 * mass, rtol=1e-6)
 
@@ -90,14 +88,16 @@ def test_stitch_wire_makes_the_elasticity_even():
 def test_defects_at_rest_where_droppers_hang_from_stitch_wires():
     """A dropper that is too long carries less; a broken one nothing, and its neighbours carry its load."""
     line, dropper = line_of(), 11  # the second one of the second span, on the stitch wire
-    new = DefectiveLine(line, 6, NEW).solve()
+    new = DefectiveLine(line.layout(6), NEW).solve()
     assert abs(new.rise).max() < 1e-12
-    broken = DefectiveLine(line, 6, LineCondition(broken_droppers=((2, 2),))).solve()
+    broken = DefectiveLine(line.layout(6), LineCondition(broken_droppers=((2, 2),))).solve()
     assert broken.tension[dropper] == 0
     assert broken.tension.sum() == pytest.approx(new.tension.sum(), rel=0.02)
     assert (broken.tension[[dropper - 1, dropper + 1]] > new.tension[[dropper - 1, dropper + 1]] + 5).all()
-    written = DefectiveLine(written_out(spans=9), 9, LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
-    again = DefectiveLine(line, 9, LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
+    written = DefectiveLine(
+        written_out(spans=9).layout(9), LineCondition(miscut_droppers=((5, 9, 0.02),))
+    ).solve()
+    again = DefectiveLine(line.layout(9), LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
     np.testing.assert_allclose(written.tension[20:-20], again.tension[20:-20], atol=1e-4)
     assert again.tension[48] < hang(line).dropper_tension[8] - 3
 
@@ -109,7 +109,7 @@ def energy(line, wire, data, step):
     both = along(wire.displacement[0]), along(wire.displacement[0] + wire.increment[0])
     old, now = (u[MESSENGER] for u in both)
     steps = np.diff(now)
-    missing = moving(stitches_of(data, data.spans), data.spans)
+    missing = data.layout().moving
     x = line.spacing * window_nodes(line.rows)
     total -= (missing.deficit(x[:-1], x[1:]) * steps * np.diff(old)).sum() / (2 * line.spacing)
     nodes = held.displacement.shape[1] // held.stitches.node.shape[1]
@@ -225,7 +225,7 @@ def test_droppers_almost_at_places_of_a_stitched_line_hang_as_droppers_there():
         line = line_of(
             span_length=span, droppers={"positions": moved.tolist(), "sag": sag}, stitch_wire=stitch, spans=5
         )
-        assert abs(DefectiveLine(line, 5, NEW).solve().rise).max() < 1e-9
+        assert abs(DefectiveLine(line.layout(5), NEW).solve().rise).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["re250-stitched", "re330-stitched"])
@@ -236,7 +236,7 @@ def test_spans_of_another_length_keep_their_droppers_on_the_stitch_wire(name):
         line = changed(name, {"sequence": [{}, {}, *[{"span_length": length}] * 2, {}, {}]})
         hang(line)
         for droppers in (
-            spans_of(line).each[2].droppers,
+            line.layout().spans[2].droppers,
             change(base, "catenary.span_length", length).droppers,
         ):
             x = np.array(droppers.positions)
@@ -251,7 +251,7 @@ def test_spans_of_another_length_keep_their_droppers_on_the_stitch_wire(name):
 def test_the_last_support_may_have_no_stitch_wire():
     bare = line_of(sequence=[{}] * 8, end_support={"stitch_wire": {"length": 0.0}})
     assert bare.sequence
-    assert stitches_of(bare).support.tolist() == list(range(8))
+    assert bare.layout().stitches.support.tolist() == list(range(8))
     assert len(hang(bare).ropes) == 8
     same = line_of(sequence=[{}] * 8, end_support={"stitch_wire": {"length": 18.0}})
     assert same == line_of(spans=8).model_copy(update={"sources": same.sources})

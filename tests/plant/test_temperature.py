@@ -98,7 +98,7 @@ def test_fixed_wires_are_as_long_as_finite_elements_say(line, wires, weather):
             assert shares[k] - 1 == pytest.approx(longer * wire.axial_stiffness / designed[k], abs=2e-3)
     assert np.abs(shares - 1).max() > 3e-3
     # So is its shape.
-    line = DefectiveLine(data, SPANS, condition, tuple(shares))
+    line = DefectiveLine(data.layout(SPANS), condition, tuple(shares))
     state = line.solve()
     left = with_tension_left(data, condition, tuple(shares))
     ours = build(left, SPANS, ELEMENT).static[:, 0]

@@ -11,7 +11,6 @@ from panto_env.base.settings import explain
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.spans import spans_of
 from panto_env.plant.catenary.flexible.static import GRAVITY, dropper_table, droppers_at_rest, hang, solve
 from panto_env.plant.catenary.flexible.whole_line import settle_line
 
@@ -51,7 +50,8 @@ BRIDGE = {
 
 
 def judged(line, element=0.1):
-    spans, heights, encumbrances = spans_of(line)
+    layout = line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     wires = line.contact_wire, line.messenger_wire
     return judge.ClosedLine(spans, (heights[-1], encumbrances[-1]), wires, element)
 
@@ -76,7 +76,8 @@ def test_agrees_with_finite_elements_of_the_whole_line(name, changes):
 def test_supports_carry_the_weight_of_everything(name, changes):
     """Messenger's supports, and steady arms that hold the contact wire, with half of it at the ends."""
     line = line_of(name, changes)
-    shape, (spans, heights, encumbrances) = solve(line), spans_of(line)
+    shape, layout = solve(line), line.layout()
+    spans, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
     supports = np.array(line.alignment().supports)
     wires = (line.contact_wire.mass + line.messenger_wire.mass) * supports[-1]
     clamps = sum(
@@ -183,7 +184,7 @@ def test_elasticity_along_the_line_is_that_of_finite_elements(changes):
 def test_the_dropper_table_names_every_dropper_of_every_span():
     line = line_of("re250", MIXED)
     table, shape = droppers_at_rest(line), solve(line)
-    spans = spans_of(line).each
+    spans = line.layout().spans
     assert [(each.span, each.number) for each in table] == [
         (k, n) for k, span in enumerate(spans, 1) for n in range(1, len(span.droppers.sag) + 1)
     ]

@@ -106,7 +106,7 @@ def test_static_state_agrees_with_finite_elements(name, defects):
     data, spans = load_catenary(name), 8
     condition = LineCondition(**defects)
     whole, other = build(data, spans, 0.25), defective(data, spans, 0.25, condition)
-    line = DefectiveLine(data, spans, condition)
+    line = DefectiveLine(data.layout(spans), condition)
     state = line.solve()
     # Where tension is lost, the anchors of ours stand where the tension left would have them.
     inner = (whole.nodes > data.span_length) & (whole.nodes < (spans - 1) * data.span_length)

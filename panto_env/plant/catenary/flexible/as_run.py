@@ -19,11 +19,8 @@ from ....base.table import Table
 from ...line_condition import NEW, LineCondition
 from .defects import DefectiveLine, shape_left, with_tension_left
 from .fixed_wires import SPANS, tensions_of_fixed
-from .on_grid import dropper_positions
-from .overlaps import tension_lengths
 from .parts import Conductor, Span, places_of
 from .schema import FlexibleCatenaryData
-from .spans import spans_of
 from .static import RestingDropper, dropper_table, droppers_at_rest, solve
 
 SPANS_OF_ELASTICITY = 5
@@ -48,20 +45,20 @@ def elasticity(
     overlap the uplift is that of the wire in use alone. condition, tensions: as ``DefectiveLine`` takes them.
     """
     if not line.sequence:
-        places = _places(spans_of(line).each[0], 0.0, line.span_length)
-        whole = DefectiveLine(line, SPANS_OF_ELASTICITY, condition, tensions, places.tolist())
+        layout = line.layout(SPANS_OF_ELASTICITY)
+        places = _places(layout.spans[0], 0.0, line.span_length)
+        whole = DefectiveLine(layout, condition, tensions, places.tolist())
         return places, _lifts(whole, places + SPANS_OF_ELASTICITY // 2 * line.span_length, force)
     found: list[tuple[Array, Array]] = []
-    for span, (begin, end) in zip(
-        spans_of(line).each[1:-1], pairwise(line.alignment().supports[1:-1]), strict=True
-    ):
+    layout = line.layout()
+    for span, (begin, end) in zip(layout.spans[1:-1], pairwise(layout.supports[1:-1]), strict=True):
         places = _places(span, begin, end)
         lifts = np.zeros(len(places))
-        for part in tension_lengths(line):
+        for part in layout.tension_lengths:
             used = (places >= part.in_use[0]) & (places <= part.in_use[1])
             if used.any():
                 own = places[used] - part.begin
-                whole = DefectiveLine(part.line, part.spans, condition, tensions, own.tolist())
+                whole = DefectiveLine(part.layout, condition, tensions, own.tolist())
                 lifts[used] = _lifts(whole, own, force)
         found.append((places, lifts))
     return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
@@ -130,12 +127,12 @@ def as_run(line: FlexibleCatenaryData, condition: LineCondition, force: float) -
     factors = tensions_of_fixed(line, along)
     places, lifts = elasticity(line, force, along, factors)
     found = droppers_at_rest(line)
-    for part in tension_lengths(line, None if line.sequence else SPANS):
-        whole = DefectiveLine(part.line, part.spans, along, factors)
+    for part in line.layout(SPANS).tension_lengths:
+        own_line, x = part.layout.line, part.layout.positions
+        whole = DefectiveLine(part.layout, along, factors)
         state = whole.solve()
-        x = dropper_positions(part.line, part.spans)
-        shape = shape_left(part.line, with_tension_left(part.line, along, factors))
-        risen = shape.contact.height(x) + whole.rise(state).height(x) - solve(part.line).contact.height(x)
+        shape = shape_left(own_line, with_tension_left(own_line, along, factors))
+        risen = shape.contact.height(x) + whole.rise(state).height(x) - solve(own_line).contact.height(x)
         # Where spans are alike, the middle one of several: anchors are not felt there.
         first = 0 if line.sequence else SPANS // 2 * len(found)
         for k, number in enumerate(part.droppers[: len(found)].tolist(), start=first):

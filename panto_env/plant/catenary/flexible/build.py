@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections import Counter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import CACHE_LINE, WIDTH, aligned_zeros
-from ....base.arrays import Array
+from ....base.arrays import Array, Index
 from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...numerics import Numerics
@@ -16,12 +17,11 @@ from .arrays import PAD, Beside, FlexibleLine, FlexibleWire
 from .blown import NO_AIR, still
 from .grid import nodes_per_span, second_differences, stencil_weights
 from .near import near_droppers
-from .on_grid import in_equal_rows, joined_springs, links_of, on_grid, springs_of
-from .overlaps import heights_of_pair, moving_stitches, pairs_of, tension_lengths
+from .on_grid import OnGrid, on_grid
 from .resolution import Resolution
 from .scattered_build import begin_window, room_for, scattered
 from .schema import FlexibleCatenaryData
-from .shape import Located, Profile, located
+from .shape import Located, Profile, heights_of_pair, located
 from .static import StaticShape
 from .wire_defects import NO_DEFECTS, WireDefects
 from .wires import lay_out, places
@@ -62,22 +62,8 @@ def constants(
             f"the maximum is {MOST_NODES:,}, so take a coarser spacing or a smaller window."
         )
     x = dx * (np.arange(count) - PAD)
-    parts = tension_lengths(data, covered)
-    defects = [own.within(*part.in_use) for part in parts] if len(parts) > 1 else [own]
-    held = []
-    for part, wrong in zip(parts, defects, strict=True):
-        masts = (
-            part.begin / dx + np.array(part.line.alignment(part.spans).supports[1:-1]) / dx
-            if differ
-            else 1.0 * per_stride * np.arange(1, covered)
-        )
-        springs = springs_of(part, masts, resolution.time_step, wrong.springs_of_nodes(x, dx))
-        begin, end = part.in_use
-        used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
-        held.append(springs._replace(number=np.where(used, springs.number, -1)))
-    ropes = moving_stitches(data, covered)
-    links = links_of(data, covered, shape, ropes)
-    grid = on_grid(data, shape, joined_springs(held), links, ropes, covered, x, resolution.time_step, defects)
+    layout = data.layout(covered)
+    grid = on_grid(layout, shape, per_stride, x, resolution.time_step, own)
     real = np.float32 if numerics.precision == "single" else np.float64
     rows = per_stride * window // WIDTH
     masts_of_window = per_stride * np.arange(1, window) if not differ else np.zeros(0, dtype=np.int64)
@@ -109,15 +95,67 @@ def constants(
         mast_segment=mast_segment,
         free_uplift=data.free_uplift,
         largest_move=LARGEST_SPEED * resolution.time_step,
-        link_static=np.tile(shape.dropper_tension, (1, covered // shape.spans)).astype(real),
+        link_static=shape.over(covered).dropper_tension[None].astype(real),
         link_gap=np.zeros((1, len(grid.links.position)), dtype=real),
         scattered=scattered(grid if differ else None, real),
-        pairs=pairs_of(data),
+        pairs=layout.pairs,
         beside=Beside(tensioned.beside[None], np.zeros((1, 0, 5)), np.zeros(0)),
         near=near_droppers(data, grid, dx, resolution.time_step, per_stride, strides if differ else 0),
         air=NO_AIR,
-        **in_equal_rows(grid, differ, rows, real),
+        **_in_equal_rows(grid, differ, rows, real),
     )
+
+
+class Sets:
+    """Things attached to the wires, in sets: at most one per segment, all on the same wires and rows."""
+
+    def __init__(self, wires: Index, node: Index, rows: int) -> None:
+        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
+        row, self.segment = places(node, rows)
+        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
+        self.number = np.zeros(len(node), dtype=np.int64)
+        there: Counter[tuple[int, ...]] = Counter()
+        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
+            own = (*place, int(self.segment[k]))
+            self.number[k] = found.setdefault((*place, there[own]), len(found))
+            there[own] += 1
+        keys = np.array(list(found), dtype=np.int64).reshape(len(found), 2 + wires.shape[1])
+        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
+
+    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
+        """Values, (things, ...), as (sets, ..., WIDTH), ``empty`` where a segment has none of a set."""
+        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
+        array[self.number, self.segment] = values
+        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
+
+
+def _in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str, Any]:
+    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows.
+
+    differ: whether spans do. All is scattered then.
+    """
+    its = those = slice(0, 0) if differ else slice(None)
+    springs, links, yielding = grid.springs, grid.links, grid.spring_yield
+    held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
+    joined = Sets(links.wires[those], grid.at_links.first[those], rows)
+    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
+
+    def of_links(values: Array, empty: float = 0.0) -> Array:
+        return joined.of(values[those], real, empty)
+
+    return {
+        "spring_wire": held.wires[:, 0],
+        "spring_row": held.row,
+        "spring_pull": held.of(pull[its], real),
+        "link_wire": joined.wires,
+        "link_row": joined.row,
+        "link_weight": of_links(grid.at_links.weights),
+        "link_move": of_links(grid.move.reshape(len(grid.move), -1)),
+        "link_pull": of_links(grid.pull),
+        "link_room": of_links(grid.room, 1.0),
+        "link_set": joined.number,
+        "link_segment": joined.segment,
+    }
 
 
 class Tensioned(NamedTuple):
@@ -131,7 +169,7 @@ class Tensioned(NamedTuple):
 
 def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: float) -> Tensioned:
     """Constants that depend on tension, for a grid of spacing ``dx`` (m) and a time step (s)."""
-    damping, wires = data.damping, data.wires * pairs_of(data)
+    damping, wires = data.damping, data.wires * data.layout().pairs
     settle = 1.0 + damping.alpha * step / 2
     keep = (1.0 - damping.alpha * step / 2) / settle
     stencil = [
@@ -158,8 +196,8 @@ def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Arr
     if isinstance(shape.contact, Profile):
         breaks, _, _, repeats = own = shape.contact
         return own.height_at(_table(data.period, tuple(breaks.tolist()), repeats)), np.zeros(0)
-    table = _table_places(data.period)
-    return heights_of_pair(data, shape, 0, table), heights_of_pair(data, shape, 1, table)
+    layout, table = data.layout(), _table_places(data.period)
+    return heights_of_pair(layout, shape, 0, table), heights_of_pair(layout, shape, 1, table)
 
 
 @remembered

@@ -12,7 +12,7 @@ the contact wire itself. The matrix is banded, and a line of any length costs a 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -25,11 +25,10 @@ from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
 from .arrays import CONTACT, MESSENGER
-from .overlaps import as_wire, joined, moving, stitches_of, tension_lengths
-from .parts import index_at
-from .schema import FlexibleCatenaryData, Span
-from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, places_in_band, solve_band
-from .spans import spans_of
+from .layout import Layout
+from .parts import Span, index_at
+from .schema import FlexibleCatenaryData
+from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, joined, places_in_band, solve_band
 from .static import StaticShape, solve
 from .wire_defects import WireDefects, locate
 
@@ -75,8 +74,9 @@ def with_tension_left(
 def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> StaticShape:
     """Static shape of a line for its wires as they are, with the mass and stiffness of the real droppers."""
     if designed.overlaps:
-        both = zip(tension_lengths(designed), tension_lengths(left), strict=True)
-        return joined(left, [shape_left(own.line, now.line) for own, now in both])
+        layout = left.layout()
+        both = zip(designed.layout().tension_lengths, layout.tension_lengths, strict=True)
+        return joined(layout, [shape_left(own.layout.line, now.layout.line) for own, now in both])
     was = solve(designed)
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 
@@ -97,10 +97,11 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
 
 @remembered
 def _arms(designed: FlexibleCatenaryData) -> _Arms:
-    arms = [span.steady_arm for span in spans_of(designed, 1).each]
+    layout = designed.layout(1)
+    arms = [span.steady_arm for span in layout.spans]
     if designed.sequence:
         arms.append(arms[-1])
-    x = np.array(designed.alignment().supports[: len(arms)])
+    x = np.array(layout.supports[: len(arms)])
     return _Arms(
         x,
         np.array([arm.stiffness for arm in arms]),
@@ -133,34 +134,32 @@ class DefectiveLine:
 
     def __init__(
         self,
-        data: FlexibleCatenaryData,
-        spans: int,
+        layout: Layout,
         condition: LineCondition,
         tensions: tuple[float, float] = (1.0, 1.0),
         nodes: Sequence[float] = (),
+        located: tuple[Any, Array, Array] | None = None,
     ) -> None:
-        """data: the line as designed. tensions: as ``DrawnLine`` has them. nodes: further positions at which
-        a force may act (m); where spans are alike, in each of them.
+        """layout: of the line as designed. tensions: as ``DrawnLine`` has them. nodes: further positions at
+        which a force may act (m); where spans are alike, in each of them. located: defects of droppers and
+        supports, as ``located_defects`` gives them, instead of those of the condition.
 
         Raises InputError for what a line of so many spans has not.
         """
-        each = spans_of(data, spans).each
-        self._data, self._spans, self._condition = data, spans, condition
-        alignment = data.alignment(spans)
-        self._broken, self._miscut, height = located_defects(
-            data, [len(span.droppers.sag) for span in each], condition
-        )
-        self._own = own = locate(data, spans, condition)
-        self._stitches = stitches = moving(stitches_of(data, spans), spans)
+        data, each, alignment = layout.line, layout.spans, layout.alignment
+        self._data, self._spans, self._condition = data, len(each), condition
+        self._broken, self._miscut, height = located or located_defects(layout, condition)
+        self._own = own = locate(layout, condition)
+        self._stitches = stitches = layout.moving
         stitched = len(stitches.support) > 0
         self._per_node = per_node = STITCHED if stitched else UNKNOWNS
 
         if data.sequence:
-            begins = zip(each, alignment.supports, strict=False)
+            begins = zip(each, layout.supports, strict=False)
             nodes = [*nodes, *stitches.clamps]
             divided = [_divided(span, own, nodes, begin) for span, begin in begins]
         else:
-            divided = [_divided(each[0], own, [*nodes, *(stitches.clamps % data.span_length)])] * spans
+            divided = [_divided(each[0], own, [*nodes, *(stitches.clamps % data.span_length)])] * len(each)
         firsts = np.cumsum(
             [0, *(len(lengths) for _, lengths, _ in divided)]
         )  # numbers of the supports' nodes
@@ -172,7 +171,7 @@ class DefectiveLine:
         self._masts = per_node * firsts[1:-1]
         self._lengths = np.concatenate([lengths for _, lengths, _ in divided])
         alike = not data.sequence
-        self._divided = tuple((divided[0][1] if alike else self._lengths).tolist()), spans if alike else 1
+        self._divided = tuple((divided[0][1] if alike else self._lengths).tolist()), len(each) if alike else 1
         self._places = np.concatenate([alignment.support(k) + x[:-1] for k, (x, *_) in enumerate(divided)])
         self.breaks = np.append(self._places, alignment.length) if data.sequence else divided[0][0]
         """Limits of the pieces of a span, or of the whole line where spans differ (m)."""
@@ -199,9 +198,8 @@ class DefectiveLine:
         data, per_node, masts = self._data, self._per_node, self._masts
         left = with_tension_left(data, self._condition, tensions)
         shape = solve(data) if left is data else shape_left(data, left)
-        self._times = repeats = self._spans // shape.spans
-        self._static = np.tile(shape.dropper_tension, repeats)
-        self._stiffness = np.tile(shape.dropper_stiffness, repeats)
+        self._times, over = self._spans // shape.spans, shape.over(self._spans)
+        self._static, self._stiffness = over.dropper_tension, over.dropper_stiffness
         self._band = np.zeros((STITCHED_BAND if per_node == STITCHED else BAND, self._size))
         self._load = np.zeros(self._size)
         lengths, times = self._divided
@@ -237,7 +235,7 @@ class DefectiveLine:
             unused[np.unique(rope)] = False
             unused[[rope[0, 0], rope[-1, 2]]] = True
             rope[0, 0], rope[-1, 2] = above[first, 0], above[last - 1, 2]
-            stiffness = Beams(as_wire(stitches, k), lengths[first:last]).stiffness
+            stiffness = Beams(stitches.as_wire(k), lengths[first:last]).stiffness
             add_to_band(self._band, places_in_band(rope, size), stiffness)
         self._band[0, unused] = 1.0
 
@@ -330,34 +328,21 @@ def _divided(
     return breaks, np.diff(breaks), index_at(breaks, span.droppers.positions)
 
 
-def located_defects(
-    data: FlexibleCatenaryData, counts: Sequence[int], condition: LineCondition
-) -> tuple[Any, Array, Array]:
+def located_defects(layout: Layout, condition: LineCondition) -> tuple[Any, Array, Array]:
     """Which droppers are broken, length errors of all (m), (droppers,), and height errors of supports (m).
 
-    counts: of the droppers of each span. Raises InputError for a dropper or support that the line has not.
+    Raises InputError for a dropper or support that the line has not.
     """
-    spans, firsts = len(counts), np.cumsum([0, *counts])
-
-    def droppers(places: Iterable[tuple[int, int]]) -> list[int]:
-        for span, number in places:
-            if span > spans or number > counts[span - 1]:
-                last = min(span, spans)
-                each = f", and span {last} has {counts[last - 1]} droppers."
-                raise InputError(
-                    f"Line '{data.name}' has no dropper {number} in span {span}: it has {spans} spans"
-                    + (f" of {counts[0]} droppers." if len(set(counts)) == 1 else each)
-                )
-        return [int(firsts[span - 1]) + number - 1 for span, number in places]
-
-    broken, error, height = np.zeros(firsts[-1], dtype=bool), np.zeros(firsts[-1]), np.zeros(spans - 1)
-    broken[droppers(condition.broken_droppers)] = True
-    cut = condition.miscut_droppers
-    error[droppers([(span, number) for span, number, _ in cut])] = [wrong for _, _, wrong in cut]
+    spans, droppers = len(layout.spans), len(layout.droppers)
+    broken, error, height = np.zeros(droppers, dtype=bool), np.zeros(droppers), np.zeros(spans - 1)
+    for place in condition.broken_droppers:
+        broken[layout.index(*place)] = True
+    for span, number, wrong in condition.miscut_droppers:
+        error[layout.index(span, number)] = wrong
     for support, wrong in condition.raised_supports:
         if support >= spans:
             raise InputError(
-                f"Line '{data.name}' has no support {support}: its {spans} spans have {spans - 1} "
+                f"Line '{layout.line.name}' has no support {support}: its {spans} spans have {spans - 1} "
                 "supports between them."
             )
         height[support - 1] = wrong

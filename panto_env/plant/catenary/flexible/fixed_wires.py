@@ -19,10 +19,9 @@ from ....base.errors import InputError, beside
 from ...line_condition import LineCondition
 from ..schema import LOWEST_TENSION
 from .defects import DefectiveLine, shape_left, with_tension_left
-from .overlaps import stitched
+from .layout import Layout
 from .schema import FlexibleCatenaryData
 from .shape import Profile
-from .spans import spans_of
 from .static import HEIGHT_RANGE, MOST_YIELD, POINTS, StaticShape, check_level
 
 UNCHANGED = (1.0, 1.0)
@@ -42,14 +41,14 @@ def tensions_of_fixed(data: FlexibleCatenaryData, condition: LineCondition) -> t
             f"Temperature changes nothing on line '{data.name}', as weights keep the tension of both wires; "
             "leave it out, or give a wire that is fixed at both ends its axial_stiffness."
         )
-    if condition.ice and stitched(data):
+    if condition.ice and data.layout().stitched:
         raise InputError(
             f"Line '{data.name}' has stitch wires, on which ice is not computed; leave it out, or take "
             "stitch wires of length 0."
         )
     if not (any(fixed) and (condition.temperature or condition.ice)):
         return UNCHANGED
-    if stitched(data) or data.overlaps:
+    if data.layout().stitched or data.overlaps:
         raise InputError(
             f"Line '{data.name}' has stitch wires or overlaps, with which wires that are fixed at both ends "
             "are not computed; leave out axial_stiffness, or ice and temperature."
@@ -96,12 +95,12 @@ def _slack(data: FlexibleCatenaryData, condition: LineCondition, tensions: tuple
     """Slack of contact and messenger wire with these tensions, (2,): by how much they are longer than the
     line.
     """
-    spans = data.spans if data.sequence else SPANS
+    layout = data.layout(SPANS)
     left = with_tension_left(data, condition, tensions)
     shape = shape_left(data, left)
-    line = DefectiveLine(data, spans, condition, tensions)
+    line = DefectiveLine(layout, condition, tensions)
     rises = line.rises(line.solve())
-    begin, end = (0.0, data.period) if data.sequence else data.alignment(spans).limits((SPANS // 2 + 1,) * 2)
+    begin, end = (0.0, data.period) if data.sequence else layout.alignment.limits((SPANS // 2 + 1,) * 2)
     x = np.linspace(begin, end, int((end - begin) / POINT_DISTANCE) + 1)[:-1]
     step = x[1] - x[0]
     wires = (shape.contact, shape.messenger)
@@ -114,20 +113,18 @@ ADVICE = (
 )
 
 
-def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, rise: Profile) -> None:
+def check_loaded(left: Layout, shape: StaticShape, rise: Profile) -> None:
     """Raise InputError where wires are too steep or too uneven for the model, or a support gives way.
 
     left, shape: the line for its wires as they are, and its static shape. rise: change of the contact wire's
     height, as the real droppers have another length.
     """
-    _, heights, encumbrances = spans_of(left, spans)
-    supports = np.array(left.alignment(spans).supports)
-    given_way = float((np.add(heights, encumbrances) - shape.messenger.height(supports)).max())
+    name, heights, supports = left.line.name, left.contact_heights, np.array(left.supports)
+    given_way = float((np.add(heights, left.encumbrances) - shape.messenger.height(supports)).max())
     if given_way > MOST_YIELD:
         most = beside(given_way, MOST_YIELD, ".2g")
         raise InputError(
-            f"At rest a support of line '{left.name}' would yield by {most} m, more than {MOST_YIELD} m, "
-            + ADVICE
+            f"At rest a support of line '{name}' would yield by {most} m, more than {MOST_YIELD} m, " + ADVICE
         )
     share = np.linspace(0.0, 1.0, POINTS, endpoint=False)
     for k, (begin, length) in enumerate(zip(supports, np.diff(supports), strict=False)):
@@ -135,4 +132,4 @@ def check_loaded(left: FlexibleCatenaryData, shape: StaticShape, spans: int, ris
         both = shape.contact.height(x) + rise.height(x), shape.messenger.height(x)
         straight = (heights[k + 1] - heights[k]) * share
         too_high = f", more than {HEIGHT_RANGE} m, {ADVICE}"
-        check_level(f"span {k + 1} of line '{left.name}'", x, both, straight, too_high, f", {ADVICE}")
+        check_level(f"span {k + 1} of line '{name}'", x, both, straight, too_high, f", {ADVICE}")

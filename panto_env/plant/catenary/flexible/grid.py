@@ -248,7 +248,7 @@ def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:
 
 
 def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
-    wire, mass = data.contact_wire, max(own.contact_clamp_mass for own in data.dropper_tables)
+    wire, mass = data.contact_wire, max(data.layout(1).of_droppers("contact_clamp_mass"))
     number = wave_ahead(wire, speed, CLAMP_HZ)
     share = (2 * math.pi * CLAMP_HZ + speed * number) * mass / (2 * wire.impedance)
     return math.sqrt(CLAMP_ERROR / share) / number if share > 0 else math.inf

@@ -20,8 +20,7 @@ from .build import Tensioned, at_rest, constants, of_tension, settle
 from .defects import DefectiveLine, located_defects, shape_left, with_tension_left
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
-from .on_grid import dropper_positions
-from .overlaps import TensionLength, tension_lengths
+from .layout import Layout, TensionLength
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
@@ -33,11 +32,7 @@ class DefectiveParts:
     """All tension lengths of a line with the defects of a condition; most lines have only one."""
 
     def __init__(
-        self,
-        data: FlexibleCatenaryData,
-        spans: int,
-        condition: LineCondition,
-        tensions: tuple[float, float] = (1.0, 1.0),
+        self, layout: Layout, condition: LineCondition, tensions: tuple[float, float] = (1.0, 1.0)
     ) -> None:
         """Raises InputError for what the line has not.
 
@@ -45,18 +40,20 @@ class DefectiveParts:
         the beginning wires. Both messengers' supports at a mast are raised alike. Defects of the contact wire
         itself are on the wire in use there.
         """
-        self._parts = parts = tension_lengths(data, spans)
-        conditions = [condition]
-        if len(parts) > 1:
-            located_defects(data, _counts(parts, spans), condition)
-            locate(data, spans, condition)
-            conditions = [_of_part(part, data, condition) for part in parts]
+        self._parts = parts = layout.tension_lengths
+        broken, error, height = located_defects(layout, condition)
         self.lines = [
-            DefectiveLine(part.line, part.spans, own, tensions)
-            for part, own in zip(parts, conditions, strict=True)
+            DefectiveLine(
+                part.layout,
+                condition if len(parts) == 1 else _on_wire(part, layout, condition),
+                tensions,
+                located=(broken[part.droppers], error[part.droppers], height[part.inner]),
+            )
+            for part in parts
         ]
         """The static state of each tension length."""
-        self._droppers = sum(len(part.droppers) for part in parts)
+        self._droppers = len(layout.droppers)
+        self._rises = [slice(None)] * len(parts)  # which pieces of its pair each tension length has
         self._pieces = self._pieces_of(0), self._pieces_of(1)
 
     def with_tensions(self, tensions: tuple[float, float]) -> DefectiveParts:
@@ -65,26 +62,26 @@ class DefectiveParts:
         other.lines = [each.with_tensions(tensions) for each in self.lines]
         return other
 
-    def _pieces_of(self, pair: int) -> tuple[Array, int, list[slice]]:
-        """Limits of a pair's contact wire's pieces (m), their number, and which are those of each part."""
+    def _pieces_of(self, pair: int) -> tuple[Array, int]:
+        """Limits of a pair's contact wire's pieces (m), and their number."""
         if len(self._parts) == 1:
             own = self.lines[0]
-            return (np.zeros(0), 0, []) if pair else (own.breaks, own.pieces, [slice(None)])
-        breaks, pieces = [0.0], []
-        for part, own in zip(self._parts, self.lines, strict=True):
+            return (np.zeros(0), 0) if pair else (own.breaks, own.pieces)
+        breaks = [0.0]
+        for k, (part, own) in enumerate(zip(self._parts, self.lines, strict=True)):
             if part.pair == pair:
                 if part.begin > breaks[-1]:
                     breaks.append(part.begin)
-                pieces.append(slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2))
+                self._rises[k] = slice(len(breaks) - 1, len(breaks) + len(own.breaks) - 2)
                 breaks += (part.begin + own.breaks[1:]).tolist()
         end = self._parts[-1].end
         breaks += [end] if breaks[-1] < end else []
-        return np.array(breaks), len(breaks) - 1, pieces
+        return np.array(breaks), len(breaks) - 1
 
     def with_tables(self, line: FlexibleLine, rows: int) -> FlexibleLine:
         """The line with tables for ``rows`` defective ones, which ``write`` fills."""
         real = line.link_static.dtype
-        (first, count, _), (second, others, _) = self._pieces
+        (first, count), (second, others) = self._pieces
         beside = Beside(line.beside.shape, np.zeros((rows, others, 5)), second)
         return line._replace(
             link_static=np.zeros((rows, self._droppers), dtype=real),
@@ -104,61 +101,29 @@ class DefectiveParts:
         """
         tension, gap = np.zeros(self._droppers), np.zeros(self._droppers)
         rises = line.rise[row], line.beside.rise[min(row, len(line.beside.rise) - 1)]
-        places = [iter(slices) for _, _, slices in self._pieces]
-        for part, own in zip(self._parts, self.lines, strict=True):
-            inner = slice(part.first_span, part.first_span + part.spans - 1)
+        for part, own, its_rise in zip(self._parts, self.lines, self._rises, strict=True):
             state = own.solve(
                 None if scatter is None else scatter[part.droppers],
-                None if heights is None else heights[inner],
+                None if heights is None else heights[part.inner],
             )
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
-            rises[part.pair][next(places[part.pair])] = state.rise
+            rises[part.pair][its_rise] = state.rise
         line.link_static[row], line.link_gap[row] = tension, gap
         line.rise_decay[row] = self.lines[0].decay
         return tension
 
 
-def _counts(parts: tuple[TensionLength, ...], spans: int) -> list[int]:
-    counts = [0] * spans
-    for part in parts:
-        for k, table in enumerate(part.line.dropper_tables):
-            counts[part.first_span + k] += len(table.positions)
-    return counts
-
-
-def _of_part(part: TensionLength, data: FlexibleCatenaryData, condition: LineCondition) -> LineCondition:
-    """The condition of one tension length, with its own numbers of spans, droppers and supports."""
-
-    def numbered(counts: list[int]) -> list[tuple[int, int]]:
-        """Span and number in it of all droppers, both from 1."""
-        return [(span, n) for span, count in enumerate(counts, 1) for n in range(1, count + 1)]
-
-    along = numbered(_counts(tension_lengths(data), data.spans))
-    its = numbered([len(table.positions) for table in part.line.dropper_tables])
-    own = dict(zip([along[k] for k in part.droppers.tolist()], its, strict=True))
-    supports, (begin, end) = data.alignment().supports, part.in_use
+def _on_wire(part: TensionLength, layout: Layout, condition: LineCondition) -> LineCondition:
+    """A condition with the defects of the contact wire of one tension length, by its own numbers of spans."""
+    supports, (begin, end), first = layout.supports, part.in_use, part.first_span
+    spots = [row for row in condition.hard_spots if begin <= supports[row[0] - 1] + row[1] < end]
+    worn = [row for row in condition.worn_stretches if begin <= supports[row[0] - 1] + row[1] < end]
     return condition.model_copy(
         update={
-            "broken_droppers": tuple(own[place] for place in condition.broken_droppers if place in own),
-            "miscut_droppers": tuple(
-                (*own[span, number], wrong)
-                for span, number, wrong in condition.miscut_droppers
-                if (span, number) in own
-            ),
-            "raised_supports": tuple(
-                (support - part.first_span, wrong)
-                for support, wrong in condition.raised_supports
-                if 0 < support - part.first_span < part.spans
-            ),
-            "hard_spots": tuple(
-                (span - part.first_span, offset, *rest)
-                for span, offset, *rest in condition.hard_spots
-                if begin <= supports[span - 1] + offset < end
-            ),
+            "hard_spots": tuple((span - first, *rest) for span, *rest in spots),
             "worn_stretches": tuple(
-                (span - part.first_span, offset, min(length, end - supports[span - 1] - offset), share)
-                for span, offset, length, share in condition.worn_stretches
-                if begin <= supports[span - 1] + offset < end
+                (span - first, offset, min(length, end - supports[span - 1] - offset), share)
+                for span, offset, length, share in worn
             ),
         }
     )
@@ -205,7 +170,8 @@ class FlexibleCatenary:
         shape = hang(designed)
         if data is not designed:
             shape = shape_left(designed, data)
-        own = locate(designed, spans, condition)
+        self.layout = layout = data.layout(spans)
+        own = locate(designed.layout(spans), condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
@@ -221,12 +187,12 @@ class FlexibleCatenary:
         about_one = self.line.window - spans_of_train(data, runs)
         window = about_one if about_one >= FEWEST_SPANS else 0
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": window}
-        self.alignment = alignment = data.alignment(spans)
+        self.alignment = alignment = layout.alignment
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
         self.supports = alignment.support(np.arange(1, spans))
-        self.droppers = dropper_positions(data, spans)
-        self._tension = np.tile(shape.dropper_tension, (1, spans // shape.spans))
+        self.droppers = layout.positions
+        self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
@@ -237,7 +203,10 @@ class FlexibleCatenary:
         if any(condition.defective for condition in runs.conditions):
             self._make_defective(designed, spans, runs.conditions, lanes)
         if data is not designed:
-            self._check_loaded(designed, data, condition, spans)
+            both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
+            for (was, now), line in zip(both, self._defective[condition].lines, strict=True):
+                shape = shape_left(was.layout.line, now.layout.line)
+                check_loaded(now.layout, shape, line.rise(line.solve()))
         if any(each.side_wind for each in runs.conditions):
             air = air_about(self.line, data.wires, condition.ice, self.time_step)
             self.line = self.line._replace(air=air)
@@ -246,7 +215,7 @@ class FlexibleCatenary:
     def _make_defective(
         self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
     ) -> None:
-        self._defective = {each: DefectiveParts(data, spans, each, self._fixed) for each in conditions}
+        self._defective = {each: DefectiveParts(data.layout(spans), each, self._fixed) for each in conditions}
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -272,15 +241,6 @@ class FlexibleCatenary:
             shape, tensioned, defective = self._latest[1]
             self._write_tension(row, shape, tensioned)
         self._tension[row] = defective.write(self.line, row, drawn.scatter, drawn.heights)
-
-    def _check_loaded(
-        self, designed: FlexibleCatenaryData, left: FlexibleCatenaryData, condition: LineCondition, spans: int
-    ) -> None:
-        """Raise InputError where a tension length does not hang with its wires as they are."""
-        lines = self._defective[condition].lines
-        parts = zip(tension_lengths(designed, spans), tension_lengths(left, spans), lines, strict=True)
-        for own, now, line in parts:
-            check_loaded(now.line, shape_left(own.line, now.line), now.spans, line.rise(line.solve()))
 
     def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
         tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....backend import WIDTH
 from ....base.arrays import Array, Index
 from ....base.errors import InputError
 from ...functions import stencil
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .grid import implicit_share, missing_yield, point_gain, spring_levels
-from .overlaps import Stitches, TensionLength, pairs_of, tension_lengths
-from .schema import FlexibleCatenaryData
-from .spans import hung_at, spans_of
+from .layout import Layout, Stitches, TensionLength
 from .static import StaticShape
 from .wire_defects import WireDefects
-from .wires import places
 
 
 class Springs(NamedTuple):
@@ -67,22 +62,17 @@ class Nodes(NamedTuple):
         return np.asarray((self.first + PAD)[:, None] + np.arange(4))
 
 
-def dropper_positions(data: FlexibleCatenaryData, spans: int) -> Array:
-    """Positions (m), (droppers,), of the droppers of a line with this number of spans."""
-    parts = tension_lengths(data, spans)
-    found = np.zeros(sum(len(part.droppers) for part in parts))
-    for part in parts:
-        found[part.droppers] = part.begin + hung_at(part.line, part.spans)
-    return found
+def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, defects: WireDefects) -> Springs:
+    """Springs of a tension length, to which uplift is recorded only at masts between which trains run on it.
 
-
-def springs_of(part: TensionLength, places: Array, step: float, spots: Array) -> Springs:
-    """At each mast the contact wire's steady arm, then the messenger's support; after all masts, hard spots.
-
-    places: of the masts of a tension length, in nodes. step: s. spots: stiffness of hard spots at each node
-    of its contact wire from node -PAD on (N/m), (nodes,).
+    per_stride: nodes of a span. x: positions of the nodes from node -PAD on (m). step: s.
     """
-    each = spans_of(part.line, part.spans).each[1:]
+    each, line, dx = part.layout.spans[1:], part.layout.line, float(x[PAD + 1])
+    masts: Array
+    if line.one_by_one:
+        masts = part.begin / dx + np.array(part.layout.supports[1:-1]) / dx
+    else:
+        masts = 1.0 * per_stride * np.arange(1, len(each) + 1)
     levels = [
         level
         for span in each
@@ -91,42 +81,23 @@ def springs_of(part: TensionLength, places: Array, step: float, spots: Array) ->
             spring_levels(span.support.stiffness, span.support.damping, step),
         )
     ]
+    spots = defects.springs_of_nodes(x, dx)
     hard = np.flatnonzero(spots)
     held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
     arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
+    begin, end = part.in_use
+    used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
     return Springs(
         masts=len(each),
-        number=part.first_span + np.arange(len(each)),
+        number=np.where(used, part.first_span + np.arange(len(each)), -1),
         wire=part.wire + np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
-        place=np.append(np.repeat(places, 2), hard - PAD),
+        place=np.append(np.repeat(masts, 2), hard - PAD),
         levels=np.array([*levels, *held]).reshape(-1, 3),
         mass=np.append(arms, np.zeros(len(hard))),
     )
 
 
-def links_of(data: FlexibleCatenaryData, spans: int, shape: StaticShape, stitches: Stitches) -> Links:
-    """The droppers of so many spans, whose static shape is ``shape``, or repeats it.
-
-    stitches: those that move.
-    """
-    half = np.tile(shape.dropper_mass / 2, spans // shape.spans)
-    wires, clamps = np.zeros((len(half), 2), dtype=np.int64), np.zeros((len(half), 2))
-    for part in tension_lengths(data, spans):
-        droppers = [span.droppers for span in spans_of(part.line, part.spans).each]
-        counts = [len(own.positions) for own in droppers]
-        both = [(own.contact_clamp_mass, own.messenger_clamp_mass) for own in droppers]
-        wires[part.droppers] = part.wire + np.array([CONTACT, MESSENGER])
-        clamps[part.droppers] = np.repeat(np.array(both), counts, axis=0)
-    return Links(
-        wires=wires,
-        stitch=stitches.carrying,
-        position=dropper_positions(data, spans),
-        stiffness=np.tile(shape.dropper_stiffness, spans // shape.spans),
-        mass=half[:, None] + clamps,
-    )
-
-
-def joined_springs(each: Sequence[Springs]) -> Springs:
+def _joined_springs(each: Sequence[Springs]) -> Springs:
     """Those of several tension lengths: masts in their order along the line, then all hard spots."""
     masts = sorted(
         (float(own.place[2 * n]), int(own.number[n]), k, n)
@@ -139,6 +110,19 @@ def joined_springs(each: Sequence[Springs]) -> Springs:
         np.concatenate([np.asarray(own[k])[which] for own, which in some]) for k in range(2, 6)
     )
     return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)
+
+
+def _links_of(layout: Layout, shape: StaticShape) -> Links:
+    """The droppers of a line, whose static shape is ``shape`` over all its spans."""
+    pairs = np.array([dropper.pair for dropper in layout.droppers], dtype=np.int64)
+    clamps = [layout.of_droppers(f"{wire}_clamp_mass") for wire in ("contact", "messenger")]
+    return Links(
+        wires=2 * pairs[:, None] + np.array([CONTACT, MESSENGER]),
+        stitch=layout.moving.carrying,
+        position=layout.positions,
+        stiffness=shape.dropper_stiffness,
+        mass=(shape.dropper_mass / 2)[:, None] + np.stack(clamps, axis=1),
+    )
 
 
 MOST_COURANT = 0.9  # maximum of omega dt / 2 of a stitch wire's grid, of 1 at which the leapfrog is unstable
@@ -188,18 +172,17 @@ class StitchGrid(NamedTuple):
         return found
 
 
-def stitch_grid(
-    data: FlexibleCatenaryData, stitches: Stitches, links: Links, x: Array, step: float
-) -> StitchGrid:
+def stitch_grid(layout: Layout, links: Links, x: Array, step: float) -> StitchGrid:
     """Grids of a line's stitch wires; x: positions of the line's nodes (m); step: s.
 
     Raises InputError where the grid is too coarse, or a stitch wire too light for the step.
     """
+    data, stitches = layout.line, layout.moving
     count, dx = len(stitches.support), float(x[1] - x[0])
     none, settle = np.zeros((0, 1)), 1.0 + data.damping.alpha * step / 2
     hung = np.full(len(links.position), -1)
     if not count:
-        nothing, nodes = np.zeros(0), np.zeros((pairs_of(data), len(x)))
+        nothing, nodes = np.zeros(0), np.zeros((layout.pairs, len(x)))
         nowhere = Nodes.about(nothing)
         return StitchGrid(stitches, 0, nothing, nowhere, none, none, nothing, hung, 0.0 * hung, nodes)
     length = stitches.end - stitches.begin
@@ -241,7 +224,7 @@ def stitch_grid(
         bare_mobility=step**2 / bare[:, 0] / settle,
         node=node,
         share=share,
-        deficit=np.stack([over(2 * k).deficit(x - dx, x) for k in range(pairs_of(data))]),
+        deficit=np.stack([over(2 * k).deficit(x - dx, x) for k in range(layout.pairs)]),
     )
 
 
@@ -273,28 +256,30 @@ class OnGrid(NamedTuple):
 
 
 def on_grid(
-    data: FlexibleCatenaryData,
-    shape: StaticShape,
-    springs: Springs,
-    links: Links,
-    stitches: Stitches,
-    spans: int,
-    x: Array,
-    step: float,
-    own: Sequence[WireDefects],
+    layout: Layout, shape: StaticShape, per_stride: int, x: Array, step: float, own: WireDefects
 ) -> OnGrid:
-    """stitches: those that move. x: positions of the nodes from node -PAD on (m). step: s. own: defects of
-    the contact wire of each tension length.
+    """Everything that is attached to the wires of a line, with its static shape.
+
+    per_stride: nodes of a span. x: positions of the nodes from node -PAD on (m). step: s. own: defects of the
+    contact wire. Raises InputError as ``stitch_grid`` does.
     """
-    parts = tension_lengths(data, spans)
-    damping, wires, dx = data.damping, data.wires * pairs_of(data), float(x[PAD + 1])
+    data, parts, stitches = layout.line, layout.tension_lengths, layout.moving
+    damping, wires, dx = data.damping, data.wires * layout.pairs, float(x[PAD + 1])
+    defects = [own.within(*part.in_use) for part in parts] if len(parts) > 1 else [own]
+    springs = _joined_springs(
+        [
+            _springs_of(part, per_stride, x, step, its_own)
+            for part, its_own in zip(parts, defects, strict=True)
+        ]
+    )
+    over = shape.over(len(layout.spans))
+    links = _links_of(layout, over)
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
-    stretched = shape.dropper_length + shape.dropper_tension / shape.dropper_stiffness
     usual = (links.stitch < 0) & (len(parts) == 1)
-    room = np.where(usual, room, np.tile(stretched, len(room) // len(stretched)))
+    room = np.where(usual, room, over.dropper_length + over.dropper_tension / over.dropper_stiffness)
     at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
     bare = np.array([[wire.mass * dx] for wire in wires])
-    added, ropes = np.zeros((len(wires), len(x))), stitch_grid(data, stitches, links, x, step)
+    added, ropes = np.zeros((len(wires), len(x))), stitch_grid(layout, links, x, step)
     on = links.stitch >= 0  # a stitch wire
     for end, ours in ((LOWER, slice(None)), (UPPER, ~on)):
         nodes = links.wires[ours, end, None], at_links.four[ours]
@@ -303,8 +288,8 @@ def on_grid(
     above = np.repeat(stitches.wire, 2)[:, None] + MESSENGER
     np.add.at(added, (above, ropes.clamps.four), ropes.clamps.shares * clamped)
     np.add.at(added, (springs.wire[:, None], at_springs.four), at_springs.shares * springs.mass[:, None])
-    for part, defects in zip(parts, own, strict=True):
-        added[part.wire + CONTACT] += defects.mass_of_nodes(x, dx, data.contact_wire)
+    for part, its_own in zip(parts, defects, strict=True):
+        added[part.wire + CONTACT] += its_own.mass_of_nodes(x, dx, data.contact_wire)
     mass = bare + added
     held = _held(parts, len(wires), x)
     mobility = np.where(held, 0.0, step**2 / mass / (1.0 + damping.alpha * step / 2))
@@ -328,7 +313,7 @@ def on_grid(
     move[on, UPPER, :2] = two * ropes.shares[on]
     apart[on] = (weights * move[:, LOWER])[on].sum(axis=1)
     apart[on] += (move[on, UPPER, :2] * ropes.shares[on]).sum(axis=1)
-    lightest = [min(defects.lightest for defects in own), 1.0] * pairs_of(data)
+    lightest = [min(each.lightest for each in defects), 1.0] * layout.pairs
     gains = [
         point_gain(wire, dx, step, damping.beta, light) for wire, light in zip(wires, lightest, strict=True)
     ]
@@ -364,55 +349,3 @@ def _held(parts: Sequence[TensionLength], wires: int, x: Array) -> Any:
             inside &= x < part.end - (x[1] - x[0]) / 2
         held[part.wire : part.wire + 2, inside] = False
     return held
-
-
-class Sets:
-    """Things attached to the wires, in sets: at most one per segment, all on the same wires and rows."""
-
-    def __init__(self, wires: Index, node: Index, rows: int) -> None:
-        """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
-        row, self.segment = places(node, rows)
-        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
-        self.number = np.zeros(len(node), dtype=np.int64)
-        there: Counter[tuple[int, ...]] = Counter()
-        for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
-            own = (*place, int(self.segment[k]))
-            self.number[k] = found.setdefault((*place, there[own]), len(found))
-            there[own] += 1
-        keys = np.array(list(found), dtype=np.int64).reshape(len(found), 2 + wires.shape[1])
-        self.row, self.wires = keys[:, 0].copy(), keys[:, 1:-1].copy()
-
-    def of(self, values: Array, kind: Any, empty: float = 0.0) -> Array:
-        """Values, (things, ...), as (sets, ..., WIDTH), ``empty`` where a segment has none of a set."""
-        array = np.full((len(self.row), WIDTH, *values.shape[1:]), empty, dtype=kind)
-        array[self.number, self.segment] = values
-        return np.ascontiguousarray(np.moveaxis(array, 1, -1))
-
-
-def in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str, Any]:
-    """Fields of ``FlexibleLine`` for springs and links in sets of equal rows.
-
-    differ: whether spans do. All is scattered then.
-    """
-    its = those = slice(0, 0) if differ else slice(None)
-    springs, links, yielding = grid.springs, grid.links, grid.spring_yield
-    held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
-    joined = Sets(links.wires[those], grid.at_links.first[those], rows)
-    pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
-
-    def of_links(values: Array, empty: float = 0.0) -> Array:
-        return joined.of(values[those], real, empty)
-
-    return {
-        "spring_wire": held.wires[:, 0],
-        "spring_row": held.row,
-        "spring_pull": held.of(pull[its], real),
-        "link_wire": joined.wires,
-        "link_row": joined.row,
-        "link_weight": of_links(grid.at_links.weights),
-        "link_move": of_links(grid.move.reshape(len(grid.move), -1)),
-        "link_pull": of_links(grid.pull),
-        "link_room": of_links(grid.room, 1.0),
-        "link_set": joined.number,
-        "link_segment": joined.segment,
-    }

@@ -29,7 +29,6 @@ from ..schema import CLEAR, MOST_SPANS, Wire
 from .defects import with_tension_left
 from .fixed_wires import tensions_of_fixed
 from .grid import carrying_grid, finest_stable, nodes_per_span, stable
-from .overlaps import stitched
 from .schema import FlexibleCatenaryData
 
 STEPS = (
@@ -193,7 +192,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     if kink / LIMP_NODES < FINEST_GRID:
         longest = min(longest, LIMP_STEP)
     spacing = min(spacing, max(carrying_grid(data, quick), FINEST_GRID))
-    if stitched(data):
+    if data.layout().stitched:
         spacing = min(spacing, next(grid for share, grid in STITCHED_GRIDS if quick <= share * wave_speed))
     needed = [_by_clamps(data)]
     if runs.train_length and data.sequence and np.ptp(data.alignment().lengths) > 0:
@@ -225,13 +224,14 @@ def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
 
 def _heavy(data: FlexibleCatenaryData) -> bool:
     """Whether a clamp on the contact wire is a heavy one."""
-    return any(own.contact_clamp_mass > HEAVY_CLAMP for own in data.dropper_tables)
+    return any(span.droppers.contact_clamp_mass > HEAVY_CLAMP for span in data.layout(1).spans)
 
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
     """Grid (m) and time step (s) that the heaviest of the droppers' clamps requires."""
     heaviest = max(
-        mass for own in data.dropper_tables for mass in (own.contact_clamp_mass, own.messenger_clamp_mass)
+        max(span.droppers.contact_clamp_mass, span.droppers.messenger_clamp_mass)
+        for span in data.layout(1).spans
     )
     grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
     return grid, step
@@ -259,8 +259,7 @@ def _lightest(runs: Runs) -> float:
 def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
-    unlike, lightest = data.alignment().pitch is None, _lightest(runs)
-    window = window_of(data.wires, numerics, runs, bool(data.overlaps), stitched(data), unlike)
+    lightest, window = _lightest(runs), window_of(data, numerics, runs)
     window = window and window + spans_of_train(data, runs)
     finest = nodes_per_span(data, given or required.spacing)
     if numerics.time_step is None and (given is not None or numerics.accuracy == "full"):
@@ -333,7 +332,7 @@ ERRORS = ((16, 3), (8, 5), (5, 15), (0, 60))
 """From a number of spans on: error (%) of figures where more are needed."""
 
 
-def enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False, unlike: bool = False) -> int:
+def _enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False, unlike: bool = False) -> int:
     """Spans about the slowest train that are enough for figures of an endless line."""
     share = runs.speeds[0] / max(wire.wave_speed for wire in wires)
     if stitched and share < STITCHED_SHARE:
@@ -342,16 +341,8 @@ def enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False, u
     return max(enough, UNLIKE) if (stitched or unlike) and share <= UNLIKE_SHARE else enough
 
 
-def window_of(
-    wires: tuple[Wire, Wire],
-    numerics: Numerics,
-    runs: Runs,
-    overlaps: bool = False,
-    stitched: bool = False,
-    unlike: bool = False,
-) -> int:
-    """Spans computed about the train; 0: the whole line. overlaps, stitched, unlike: whether the line has
-    such, or spans that differ.
+def window_of(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int:
+    """Spans of a line, with the wires of these runs, computed about the train; 0: the whole line.
 
     Raises InputError for a given window where the wire itself has defects, or is blown upon before a run.
     """
@@ -363,10 +354,11 @@ def window_of(
         )
     if numerics.window is not None or whole:
         return numerics.window or 0
-    enough = enough_spans(wires, runs, stitched, unlike)
+    unlike = data.alignment().pitch is None
+    enough = _enough_spans(data.wires, runs, data.layout().stitched, unlike)
     if numerics.accuracy != "full":
         enough = min(enough, FAST)
-    return max(enough, WITH_OVERLAPS if overlaps else 0)
+    return max(enough, WITH_OVERLAPS if data.overlaps else 0)
 
 
 def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last: int) -> int:
@@ -374,11 +366,11 @@ def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last
 
     Waves and the train leave the line's start together.
     """
-    wires = _wires_in(data, runs)
-    window = window_of(wires, numerics, runs, stitched=stitched(data))
+    data = _loaded(data, runs)
+    window = window_of(data, numerics, runs)
     if window:
         return max(CLEAR, window // 2)
-    speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in wires)
+    speed, fastest = runs.speeds[0], max(wire.wave_speed for wire in data.wires)
     if not 0 < speed < math.inf:
         return CLEAR  # refused later, in better words
     needed = math.ceil(last * (fastest + speed) / (2 * speed))
@@ -393,10 +385,10 @@ def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last
 
 def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
     """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires."""
-    wires, window = _wires_in(data, runs), numerics.window
+    wires, window = _loaded(data, runs).wires, numerics.window
     if numerics.accuracy != "full":
         return
-    enough = enough_spans(wires, runs)
+    enough = _enough_spans(wires, runs)
     if window and window < enough:
         error = next(percent for spans, percent in ERRORS if window >= spans)
         warnings.warn(
@@ -407,7 +399,7 @@ def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) ->
             stacklevel=3,
         )
     limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
-    if window is None and stitched(data) and runs.speeds[0] < limit:
+    if window is None and data.layout().stitched and runs.speeds[0] < limit:
         warnings.warn(
             f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
             f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
@@ -417,9 +409,9 @@ def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) ->
         )
 
 
-def _wires_in(data: FlexibleCatenaryData, runs: Runs) -> tuple[Wire, Wire]:
-    """The wires with their tension and ice in these runs."""
+def _loaded(data: FlexibleCatenaryData, runs: Runs) -> FlexibleCatenaryData:
+    """A line with its wires' tension and ice in these runs."""
     condition = runs.conditions[0]
     if not (condition.temperature or condition.ice):
-        return data.wires
-    return with_tension_left(data, condition, tensions_of_fixed(data, condition)).wires
+        return data
+    return with_tension_left(data, condition, tensions_of_fixed(data, condition))

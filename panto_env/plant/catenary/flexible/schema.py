@@ -14,6 +14,7 @@ from ....base.settings import Between, Settings
 from ...alignment import Alignment
 from ...line_condition import LineCondition
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
+from .layout import Layout, layout_of, stitch_at_end
 from .parts import (
     CLOSEST,
     Conductor,
@@ -29,7 +30,7 @@ from .parts import (
     Support,
     check_inside,
 )
-from .spans import laid_out, spans_of, stitch_at_end
+from .spans import laid_out
 
 __all__ = [
     "CLOSEST",
@@ -132,13 +133,14 @@ class FlexibleCatenaryData(CatenaryData):
                     "A line with span_types, overlaps or an end_support needs a sequence of its spans."
                 )
             return line
-        found = spans_of(line)
-        alike = found == ((found.each[0],) * line.spans, (0.0,) * (line.spans + 1), found.encumbrances)
-        alike &= stitch_at_end(line, found.each[-1]) == found.each[0].stitch_wire
-        if not alike or len(set(found.encumbrances)) > 1 or line.overlaps:
+        found = line.layout()
+        first = found.spans[0]
+        alike = all(span == first for span in found.spans) and len(set(found.encumbrances)) == 1
+        alike &= stitch_at_end(line, first) == first.stitch_wire
+        if not alike or any(found.contact_heights) or line.overlaps:
             return line
         names = (name for name in Span.model_fields if name != "contact_height")
-        one = {name: getattr(found.each[0], name) for name in names}
+        one = {name: getattr(first, name) for name in names}
         one = {name: value for name, value in one.items() if value != getattr(line, name)}
         kept = {name: value for name, value in table.items() if name not in SEQUENCE}
         kept["sources"] = {
@@ -151,6 +153,13 @@ class FlexibleCatenaryData(CatenaryData):
         check_inside(self.droppers.positions, self.span_length)
         return self
 
+    def layout(self, spans: int | None = None) -> Layout:
+        """Spans, tension lengths, stitch wires and droppers of the line's sequence, or of a number of spans.
+
+        spans: by default the line's own. Raises InputError as ``Layout`` does.
+        """
+        return layout_of(self, self.spans if spans is None or self.sequence else spans)
+
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own.
 
@@ -159,20 +168,15 @@ class FlexibleCatenaryData(CatenaryData):
         named = tuple((mast.name, mast.chainage) for mast in self.masts)
         if not self.sequence:
             return replace(super().alignment(spans), masts=named)
-        lengths = [span.span_length for span in spans_of(self).each]
+        lengths = [span.span_length for span in self.layout().spans]
         count = len(lengths) if spans is None else spans
         every = (lengths + lengths[-1:] * (count - len(lengths)))[:count]
         return replace(Alignment.of_spans(every), masts=named)
 
     @property
-    def dropper_tables(self) -> tuple[Droppers, ...]:
-        """The droppers of each span of a sequence, or of the one span that is repeated."""
-        return tuple(span.droppers for span in spans_of(self, 1).each)
-
-    @property
     def contact_heights(self) -> tuple[float, ...]:
         """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
-        heights = spans_of(self, 1).contact_heights
+        heights = self.layout(1).contact_heights
         return heights if any(heights) else ()
 
     @property

@@ -8,18 +8,20 @@ long they are, and nodes are needed only where a force or a spring acts on the w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ....base.arrays import Array, Index
 from ....base.checksums import remembered
-from ....base.errors import InputError
 from ..schema import Wire
-from .parts import Droppers
+from .arrays import CONTACT
+
+if TYPE_CHECKING:
+    from .layout import Layout, TensionLength
 
 GRAVITY = 9.81  # m/s^2
 HELD = 1e18  # N/m, that holds a wire, in a banded matrix
@@ -256,13 +258,6 @@ class LongWire:
         return Profile(self.breaks, pieces, self.beams.decay, repeats=False)
 
 
-R = TypeVar("R")
-MOST_ROUNDS = 200
-"""Rounds in which the droppers' weight, which depends on their length, must settle; usual lines take ten."""
-SETTLED, USABLE = 1e-12, 1e-9
-"""Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
-
-
 class InUse(NamedTuple):
     """Height of the wires in use along a line with overlaps; in the place of a ``Profile``."""
 
@@ -303,36 +298,66 @@ class StaticShape:
     spans: int = 1  # number of spans that repeat: all of the line's where they differ
     ropes: tuple[Rope, ...] = ()  # stitch wires
 
-
-def settled(name: str, length: Array, cut: Callable[[Array], tuple[Array, R]]) -> tuple[Array, R]:
-    """Lengths of droppers (m) that ``cut`` returns for themselves, and what it returns beside them.
-
-    length: the first guess. Raises InputError for the line of this name where they do not settle.
-    """
-    for _ in range(MOST_ROUNDS):
-        new, found = cut(length)
-        change = np.abs(new - length).max()
-        length = new
-        if change < SETTLED:
-            break
-    if not change < USABLE:  # nor where it is nan
-        raise InputError(
-            f"The static shape of line '{name}' does not settle in {MOST_ROUNDS} rounds: its droppers "
-            "or clamps are too heavy for its wires; give less mass, or more tension."
+    def over(self, spans: int) -> StaticShape:
+        """The same with arrays of the droppers of so many spans."""
+        times = spans // self.spans
+        return replace(
+            self,
+            dropper_tension=np.tile(self.dropper_tension, times),
+            dropper_length=np.tile(self.dropper_length, times),
+            dropper_stiffness=np.tile(self.dropper_stiffness, times),
+            dropper_mass=np.tile(self.dropper_mass, times),
+            spans=spans,
         )
-    return length, found
 
 
-def stiffness_of(droppers: Droppers, length: Array) -> Array:
-    """Stiffness of each dropper in tension (N/m), by its length (m)."""
-    if droppers.stiffness is not None:
-        return np.full(len(length), droppers.stiffness)
-    assert droppers.axial_stiffness is not None  # the schema asks for one of the two
-    return droppers.axial_stiffness / length
+def joined(layout: Layout, shapes: Sequence[StaticShape]) -> StaticShape:
+    """The static shape of a whole line, whose wires are those in use, from that of each tension length."""
+    parts = layout.tension_lengths
+    limits = np.array([part.in_use[0] for part in parts[1:]])
+    begins, whole = np.array([part.begin for part in parts]), (0.0, parts[-1].end)
+
+    def of_droppers(name: str) -> Array:
+        values = np.zeros(len(layout.droppers))
+        for part, shape in zip(parts, shapes, strict=True):
+            values[part.droppers] = getattr(shape, name)
+        return values
+
+    return StaticShape(
+        contact=InUse(limits, begins, tuple(shape.contact for shape in shapes), whole),
+        messenger=InUse(limits, begins, tuple(shape.messenger for shape in shapes), whole),
+        arm_force=np.zeros(0),
+        dropper_tension=of_droppers("dropper_tension"),
+        dropper_length=of_droppers("dropper_length"),
+        dropper_stiffness=of_droppers("dropper_stiffness"),
+        dropper_mass=of_droppers("dropper_mass"),
+        spans=len(layout.spans),
+        ropes=tuple(
+            Rope(part.begin + rope.places, rope.heights, part.wire)
+            for part, shape in zip(parts, shapes, strict=True)
+            for rope in shape.ropes
+        ),
+    )
 
 
-def unloaded(droppers: Droppers, loaded: Array, tension: Array) -> Array:
-    """Length (m) of each dropper without load, from its length under tension (m) and that tension (N)."""
-    if droppers.axial_stiffness is not None:
-        return loaded / (1 + tension / droppers.axial_stiffness)
-    return loaded - tension / stiffness_of(droppers, loaded)
+def profiles(layout: Layout, shape: StaticShape) -> list[tuple[TensionLength, Profile, Profile]]:
+    """Each tension length with its contact wire and its messenger at rest, along itself."""
+    wires = [
+        wire.profiles if isinstance(wire, InUse) else (wire,) for wire in (shape.contact, shape.messenger)
+    ]
+    return list(zip(layout.tension_lengths, *wires, strict=True))
+
+
+FAR = 100.0  # height (m) at which a wire counts that is not there: no pantograph reaches it
+
+
+def heights_of_pair(layout: Layout, shape: StaticShape, pair: int, x: Array, wire: int = CONTACT) -> Array:
+    """Height of a pair's contact wire or messenger at positions x (m), (n,); ``FAR`` where it has none."""
+    if layout.pairs == 1:
+        return (shape.contact, shape.messenger)[wire].height(x)
+    found = np.full(len(x), FAR)
+    for part, *both in profiles(layout, shape):
+        if part.pair == pair:
+            ours = (x >= part.begin) & (x <= part.end)
+            found[ours] = both[wire].height(x[ours] - part.begin)
+    return found

@@ -13,11 +13,10 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from ....base.arrays import Array
-from ....base.checksums import remembered
 from ....base.errors import InputError, suggest
 from ....base.settings import Between, Settings, explain
 from ..schema import LONGEST_SPAN, SHORTEST_SPAN
-from .parts import CLOSEST, Span, StitchWire
+from .parts import CLOSEST, Span
 
 if TYPE_CHECKING:
     from .schema import FlexibleCatenaryData
@@ -41,11 +40,17 @@ class Spacing(Settings):
 
 
 class Spans(NamedTuple):
-    """A line's spans in the order of travel, and heights at its supports."""
+    """A line's spans in the order of travel, and heights at its supports, as ``Layout`` has them."""
 
     each: tuple[Span, ...]
-    contact_heights: tuple[float, ...]  # (spans + 1,): of the contact wire over the nominal height (m)
-    encumbrances: tuple[float, ...]  # (spans + 1,): of the messenger over the contact wire (m)
+    contact_heights: tuple[float, ...]
+    encumbrances: tuple[float, ...]
+
+
+def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
+    """The spans of a line's ``layout``, and heights at its supports."""
+    layout = line.layout(spans)
+    return Spans(layout.spans, layout.contact_heights, layout.encumbrances)
 
 
 def parabola(x: Array, depth: float) -> Array:
@@ -95,17 +100,11 @@ def laid_out(droppers: Any, span_length: Any) -> Any:
     return kept | {"positions": x.tolist(), "sag": parabola(x, found.pre_sag).tolist()}
 
 
-@remembered
-def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
-    """A line's spans one by one, or a number of them where all are alike.
+def in_sequence(line: FlexibleCatenaryData) -> tuple[Span, ...]:
+    """The spans of a line's sequence.
 
     Raises InputError, naming the type or the span, for one that cannot be.
     """
-    if not line.sequence:
-        count = line.spans if spans is None else spans
-        names = (name for name in Span.model_fields if name != "contact_height")
-        one = Span.model_construct(**{name: getattr(line, name) for name in names})  # valid in the line
-        return Spans((one,) * count, (0.0,) * (count + 1), (line.encumbrance,) * (count + 1))
     own = {
         "span_length": line.span_length,
         "encumbrance": line.encumbrance,
@@ -119,32 +118,10 @@ def spans_of(line: FlexibleCatenaryData, spans: int | None = None) -> Spans:
         name: _changed(own, changes, f"type '{name}' in span_types")
         for name, changes in line.span_types.items()
     }
-    each = tuple(
+    return tuple(
         _of_sequence(item, f"span {number} of the sequence", own, types)
         for number, item in enumerate(line.sequence, start=1)
     )
-    end, last = line.end_support, each[-1]
-    height = last.contact_height if end is None or end.contact_height is None else end.contact_height
-    encumbrance = last.encumbrance if end is None or end.encumbrance is None else end.encumbrance
-    return Spans(
-        each,
-        (*(span.contact_height for span in each), height),
-        (*(span.encumbrance for span in each), encumbrance),
-    )
-
-
-def hung_at(line: FlexibleCatenaryData, spans: int | None = None) -> Array:
-    """Places (m), (droppers,), of the droppers in spans as ``spans_of`` gives them, along the line."""
-    each = spans_of(line, spans).each
-    supports = line.alignment(len(each)).supports
-    hung = zip(supports, each, strict=False)
-    return np.concatenate([begin + np.array(span.droppers.positions) for begin, span in hung])
-
-
-def stitch_at_end(line: FlexibleCatenaryData, last: Span) -> StitchWire | None:
-    """Stitch wire at the last support of a line with this last span."""
-    end = line.end_support
-    return last.stitch_wire if end is None or end.stitch_wire is None else end.stitch_wire
 
 
 def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, Span]) -> Span:

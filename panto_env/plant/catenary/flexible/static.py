@@ -6,7 +6,8 @@ between its supports under the droppers' pull. Both are solved by exact beam ele
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,12 +16,10 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError, beside
 from ....base.table import Table
-from .overlaps import joined, stitches_of, tension_lengths
-from .parts import Span
+from .layout import Layout
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, PeriodicWire, StaticShape, settled, stiffness_of, unloaded
-from .spans import spans_of
-from .whole_line import StitchedMessenger, settle_line
+from .shape import GRAVITY, PeriodicWire, StaticShape, joined
+from .whole_line import StitchedMessenger, cut_droppers, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
 
@@ -44,9 +43,10 @@ def solve(line: FlexibleCatenaryData) -> StaticShape:
     no line can have, such as with a dropper that pushes; ``hang`` refuses that.
     """
     if line.overlaps:
-        return joined(line, [solve(part.line) for part in tension_lengths(line)])
+        layout = line.layout()
+        return joined(layout, [solve(part.layout.line) for part in layout.tension_lengths])
     with np.errstate(over="ignore", invalid="ignore"):
-        return settle_line(line) if line.sequence else _settle(line)
+        return settle_line(line) if line.sequence else _settle(line.layout(1))
 
 
 @remembered
@@ -56,48 +56,27 @@ def hang(line: FlexibleCatenaryData) -> StaticShape:
     Nothing in it gives way under the wires' weight either. Raises InputError, naming the dropper, the wire or
     the support, where it can't.
     """
-    shape = solve(line)
+    shape, layout = solve(line), line.layout(1)
     if line.overlaps:
-        for part in tension_lengths(line):
-            hang(part.line)
+        for part in layout.tension_lengths:
+            hang(part.layout.line)
         return shape
-    _check_supports(line, shape)
-    for each in _each(line):
-        _check_droppers(each, shape)
-    for each in _each(line):
-        _check_wires(each, shape)
+    _check_supports(layout, shape)
+    _check_droppers(layout, shape)
+    _check_wires(layout, shape)
     return shape
 
 
-class _Placed(NamedTuple):
-    """A span of a line in its place; all of a uniform line's spans are one."""
-
-    span: FlexibleCatenaryData | Span
-    where: str
-    begin: float  # m
-    rise: float  # of the contact wire from support to support (m)
-    first: int  # number of its first dropper along the line, from 0
+def _where(layout: Layout, span: int) -> str:
+    """Words for a span, from 1; all of a uniform line's spans are one."""
+    line = layout.line
+    return f"{f'span {layout.alignment.span_name(span)} of ' if line.sequence else ''}line '{line.name}'"
 
 
-def _each(line: FlexibleCatenaryData) -> Iterator[_Placed]:
-    name = f"line '{line.name}'"
-    if not line.sequence:
-        yield _Placed(line, name, 0.0, 0.0, 0)
-        return
-    spans, heights, _ = spans_of(line)
-    alignment, first = line.alignment(), 0
-    for k, span in enumerate(spans):
-        where = f"span {alignment.span_name(k + 1)} of {name}"
-        yield _Placed(span, where, alignment.supports[k], heights[k + 1] - heights[k], first)
-        first += len(span.droppers.positions)
-
-
-def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
-    places, tops = np.zeros(1), np.full(1, line.encumbrance)
-    if line.sequence:
-        _, heights, encumbrances = spans_of(line)
-        places, tops = np.array(line.alignment().supports), np.add(heights, encumbrances)
-    yields = tops - shape.messenger.height(places)
+def _check_supports(layout: Layout, shape: StaticShape) -> None:
+    line, last = layout.line, None if layout.line.sequence else 1
+    tops = np.add(layout.contact_heights, layout.encumbrances)[:last]
+    yields = tops - shape.messenger.height(np.array(layout.supports[:last]))
     most = int(yields.argmax())
     if yields[most] > MOST_YIELD:
         which = f"support {most + 1}" if line.sequence else "supports"
@@ -108,20 +87,21 @@ def _check_supports(line: FlexibleCatenaryData, shape: StaticShape) -> None:
         )
 
 
-def _check_wires(each: _Placed, shape: StaticShape) -> None:
+def _check_wires(layout: Layout, shape: StaticShape) -> None:
     """Raise InputError for wires that cross or are too steep, or a contact wire of too many heights."""
-    x = np.linspace(0.0, each.span.span_length, POINTS)
-    contact, messenger = shape.contact.height(each.begin + x), shape.messenger.height(each.begin + x)
-    below = contact - messenger
-    if below.max() >= 0:
-        raise InputError(
-            f"At rest the messenger wire of {each.where} would hang {below.max():.2g} m below "
-            f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
-        )
-    straight = each.rise / each.span.span_length * x
-    too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
-    too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
-    check_level(each.where, x, (contact, messenger), straight, too_high, too_steep)
+    for k, (span, begin) in enumerate(zip(layout.spans, layout.supports, strict=False)):
+        where, x = _where(layout, k + 1), np.linspace(0.0, span.span_length, POINTS)
+        contact, messenger = shape.contact.height(begin + x), shape.messenger.height(begin + x)
+        below = contact - messenger
+        if below.max() >= 0:
+            raise InputError(
+                f"At rest the messenger wire of {where} would hang {below.max():.2g} m below "
+                f"the contact wire at {x[below.argmax()]:.4g} m; give a larger encumbrance, or more tension."
+            )
+        straight = (layout.contact_heights[k + 1] - layout.contact_heights[k]) / span.span_length * x
+        too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
+        too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
+        check_level(where, x, (contact, messenger), straight, too_high, too_steep)
 
 
 def check_level(
@@ -146,83 +126,78 @@ def check_level(
             )
 
 
-def _check_droppers(each: _Placed, shape: StaticShape) -> None:
-    """Raise InputError for a dropper without tension or without length, or one that gives way."""
-    positions = each.span.droppers.positions
-    places = [f"dropper {k} of {each.where}, at {x:g} m," for k, x in enumerate(positions, 1)]
-    own = slice(each.first, each.first + len(positions))
-    for place, tension in zip(places, shape.dropper_tension[own], strict=True):
-        if tension <= 0:
-            raise InputError(
-                f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
-                "position, or the sags."
-            )
-    stretch = (shape.dropper_tension / shape.dropper_stiffness)[own]
-    for place, length, longer in zip(places, shape.dropper_length[own], stretch, strict=True):
-        if 0 < MOST_STRETCH * (length + longer) < longer:
-            share = beside(100 * longer / (length + longer), 100 * MOST_STRETCH, ".2g")
-            raise InputError(
-                f"At rest {place} would be stretched by {longer:.2g} m, {share} % of its length, more "
-                f"than {100 * MOST_STRETCH:g} %; give stiffer droppers: stiffness in N/m (100 N/mm are "
-                "100e3), axial_stiffness in N."
-            )
-        if length <= 0:
-            raise InputError(
-                f"Unloaded, {place} would be {length:.4g} m long; give a larger encumbrance, more tension "
-                "of the messenger wire, or stiffer droppers."
-            )
+def _check_droppers(layout: Layout, shape: StaticShape) -> None:
+    """Raise InputError for a dropper without tension or without length, or one that gives way.
+
+    In each span, one without tension is named first.
+    """
+    stretches = shape.dropper_tension / shape.dropper_stiffness
+    for span, numbers in groupby(range(len(stretches)), lambda k: layout.droppers[k].span):
+        where, own = _where(layout, span), list(numbers)
+        droppers = [layout.droppers[k] for k in own]
+        places = [f"dropper {each.number} of {where}, at {each.place:g} m," for each in droppers]
+        for place, tension in zip(places, shape.dropper_tension[own], strict=True):
+            if tension <= 0:
+                raise InputError(
+                    f"At rest {place} would carry {tension:.4g} N, and a dropper can only pull; change its "
+                    "position, or the sags."
+                )
+        for place, length, longer in zip(places, shape.dropper_length[own], stretches[own], strict=True):
+            if 0 < MOST_STRETCH * (length + longer) < longer:
+                share = beside(100 * longer / (length + longer), 100 * MOST_STRETCH, ".2g")
+                raise InputError(
+                    f"At rest {place} would be stretched by {longer:.2g} m, {share} % of its length, more "
+                    f"than {100 * MOST_STRETCH:g} %; give stiffer droppers: stiffness in N/m (100 N/mm are "
+                    "100e3), axial_stiffness in N."
+                )
+            if length <= 0:
+                raise InputError(
+                    f"Unloaded, {place} would be {length:.4g} m long; give a larger encumbrance, more "
+                    "tension of the messenger wire, or stiffer droppers."
+                )
 
 
-def _settle(line: FlexibleCatenaryData) -> StaticShape:
-    droppers, messenger = line.droppers, line.messenger_wire
-    x, sag = np.array(droppers.positions), np.array(droppers.sag)
+def _settle(layout: Layout) -> StaticShape:
+    """The static shape of a span that repeats."""
+    line, x, sag = layout.line, layout.positions, np.array([dropper.sag for dropper in layout.droppers])
+    messenger = line.messenger_wire
     breaks = np.concatenate([[0.0], x, [line.span_length]])
     hung, support = np.arange(1, len(breaks) - 1), np.array([0])  # nodes
     held, heights = hung, -sag
     if line.steady_arm.holds_wire:
         held, heights = np.append(hung, support), np.append(heights, 0.0)
     lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
-    stitched = _stitched(line, x)
+    stitched = _stitched(layout)
     contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
-    lift, arm_force = lifts[: len(x)], float(lifts[len(x) :].sum())
 
-    def cut(length: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        dropper_mass = droppers.mass * length
-        tension = lift + GRAVITY * (dropper_mass / 2 + droppers.contact_clamp_mass)
-        pulled = tension + GRAVITY * (dropper_mass / 2 + droppers.messenger_clamp_mass)
+    def hang(pulled: Array) -> tuple[Array, Array]:
+        """Unknowns above droppers that pull down (N), and heights of the droppers' upper ends (m)."""
         if stitched is not None:
             above = stitched.hang(np.array([line.encumbrance]), -pulled)
-            return unloaded(droppers, above[stitched.tops] + sag, tension), (above, tension, dropper_mass)
+            return above, above[stitched.tops]
         carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
         top = np.array([line.encumbrance - carried / line.support.stiffness])
         above, _ = upper.hang(top, np.append(0.0, -pulled))
-        return unloaded(droppers, above[2 * hung] + sag, tension), (above, tension, dropper_mass)
+        return above, above[2 * hung]
 
-    length, (above, tension, mass) = settled(line.name, np.full(len(x), line.encumbrance), cut)
-    stiffness = stiffness_of(droppers, length)
+    above, droppers = cut_droppers(layout, lifts[: len(x)], -sag, hang)
     return StaticShape(
         lower.profile(contact),
         upper.profile(above) if stitched is None else stitched.profile(above),
-        arm_force,
-        tension,
-        length,
-        stiffness,
-        mass,
+        float(lifts[len(x) :].sum()),
+        *droppers,
         ropes=() if stitched is None else stitched.shapes(above),
     )
 
 
-def _stitched(line: FlexibleCatenaryData, x: Array) -> StitchedMessenger | None:
-    if line.stitch_wire is None:
-        return None
-    found = stitches_of(line, 1)
+def _stitched(layout: Layout) -> StitchedMessenger | None:
+    found, x, line = layout.stitches, layout.positions, layout.line
     if not len(found.support):
         return None
-    at_start = found.some(slice(1), np.minimum(found.carrying, 0))
     half = line.span_length / 2
     return StitchedMessenger(
         line.messenger_wire,
-        at_start,
+        found.some(slice(1), np.minimum(found.carrying, 0)),
         np.where(x > half, x - line.span_length, x),
         np.zeros(1),
         np.array([line.support.stiffness]),
@@ -294,18 +269,8 @@ def droppers_at_rest(line: Any) -> list[RestingDropper]:
         return []
     shape = hang(line)
     stretch = shape.dropper_tension / shape.dropper_stiffness
-    rows = list(
-        zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
-    )
-    hung: dict[int, tuple[int, float, float]] = {}  # by number along the line: span, position and sag
-    for part in tension_lengths(line, None if line.sequence else 1):
-        numbers = iter(part.droppers.tolist())
-        for span, own in enumerate(spans_of(part.line, part.spans).each, start=part.first_span + 1):
-            for position, sag in zip(own.droppers.positions, own.droppers.sag, strict=True):
-                hung[next(numbers)] = span, position, sag
-    found: list[RestingDropper] = []
-    for k in range(len(rows)):
-        span, position, sag = hung[k]
-        number = found[-1].number + 1 if found and found[-1].span == span else 1
-        found.append(RestingDropper(number, position, sag, *rows[k], span))
-    return found
+    values = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
+    return [
+        RestingDropper(own.number, own.place, own.sag, *of_own, own.span)
+        for own, of_own in zip(line.layout(1).droppers, values, strict=True)
+    ]

@@ -10,9 +10,8 @@ import numpy as np
 from ....base.arrays import Array, Index
 from ..protocol import NONE, LineView
 from .arrays import CONTACT, MESSENGER, PAD
-from .overlaps import FAR, heights_of_pair, moving_stitches, tension_lengths
 from .scattered_build import present, rope_nodes
-from .shape import Profile, StaticShape
+from .shape import FAR, Profile, StaticShape, heights_of_pair
 from .wires import along
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
         contacts.append(rest + _rise(line, tables, lane, x) + moved[2 * pair + CONTACT])
         messengers.append(_messenger(model, shape, pair, x, place) + moved[2 * pair + MESSENGER])
     used = np.zeros(len(x), dtype=int)
-    for part in tension_lengths(data) if line.pairs > 1 else ():
+    for part in model.layout.tension_lengths if line.pairs > 1 else ():
         used[(x >= part.in_use[0]) & (x <= part.in_use[1])] = part.pair
     ropes = _ropes(model, shape, lane, x, messengers)
     number, tension = present(model.line, model.wire, lane)
@@ -77,7 +76,7 @@ def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
 
 def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
     if model.data.overlaps:
-        return heights_of_pair(model.data, shape, pair, x, MESSENGER)
+        return heights_of_pair(model.layout, shape, pair, x, MESSENGER)
     heights = messenger_heights(shape)
     return np.interp(place, np.linspace(0.0, model.line.shape_length, len(heights)), heights)
 
@@ -93,7 +92,7 @@ def _ropes(
     model: FlexibleCatenary, shape: StaticShape, lane: int, x: Array, messengers: list[Array]
 ) -> dict[int, tuple[Array, Array]]:
     """Places and heights (m) of the stitch wires in a lane's window, by their number along the line."""
-    stitches = moving_stitches(model.data, model.alignment.spans)
+    stitches = model.layout.moving
     found: dict[int, tuple[Array, Array]] = {}
     for k, moved in rope_nodes(model.line, model.wire, lane):
         if not len(x) or stitches.begin[k] < x[0] or stitches.end[k] > x[-1]:
@@ -121,10 +120,9 @@ def _ends(
     messengers: list[Array],
     ropes: dict[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    pair = np.zeros(len(model.droppers), dtype=int)
-    for part in tension_lengths(model.data, model.alignment.spans):
-        pair[part.droppers] = part.pair
-    own, carrying = pair[number], moving_stitches(model.data, model.alignment.spans).carrying[number]
+    layout = model.layout
+    own = np.array([layout.droppers[k].pair for k in number.tolist()], dtype=int)
+    carrying = layout.moving.carrying[number]
     tops, bottoms = np.zeros(len(number)), np.zeros(len(number))
     for k in range(len(contacts)):
         ours = own == k

@@ -8,18 +8,18 @@ messenger carries its tension less the stitch wire's.
 
 from __future__ import annotations
 
-from itertools import accumulate
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ....base.arrays import Array
+from ....base.errors import InputError
 from ..schema import Wire
-from .overlaps import Stitches, as_wire, stitches_of
+from .layout import Layout, Stitches
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape, settled, stiffness_of, unloaded
-from .spans import hung_at, spans_of
+from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape
 
 
 class StitchedMessenger:
@@ -117,7 +117,7 @@ class StitchedMessenger:
                 pull = stitches.tension[k] * (2 * gradient - 1) * slopes[gradient]
                 self._loads.append((heights[[node]], np.array([pull])))
         unknowns = np.stack([heights[:-1], slope[:-1], heights[1:], slope[1:]], axis=1)
-        self._add(as_wire(stitches, k), np.diff(places), unknowns)
+        self._add(stitches.as_wire(k), np.diff(places), unknowns)
         self.ropes.append((places, heights))
 
     def _matrix(self) -> Any:
@@ -163,16 +163,52 @@ class StitchedMessenger:
         return Profile(np.append(0.0, np.cumsum(lengths)), pieces[order], self._decay[order])
 
 
+MOST_ROUNDS = 200
+"""Rounds in which the droppers' weight, which depends on their length, must settle; usual lines take ten."""
+SETTLED, USABLE = 1e-12, 1e-9
+"""Maximum change of the droppers' lengths in a round (m): to stop, and to accept after the last round."""
+
+
+def cut_droppers(
+    layout: Layout, lift: Array, lower: Array, hang: Callable[[Array], tuple[Array, Array]]
+) -> tuple[Array, tuple[Array, Array, Array, Array]]:
+    """Unknowns of the messenger, and tension, length, stiffness and mass of the droppers of ``StaticShape``.
+
+    lift: upward forces that hold the contact wire at the droppers (N); lower: its heights there (m). hang:
+    the messenger's unknowns and heights at the droppers (m) by what these pull down with (N). Raises
+    InputError where the lengths do not settle.
+    """
+    stiffness, elastic, per_length, below, over = map(
+        layout.of_droppers,
+        ("stiffness", "axial_stiffness", "mass", "contact_clamp_mass", "messenger_clamp_mass"),
+    )
+    by_length = np.isnan(stiffness)
+    length = np.array([layout.spans[dropper.span - 1].encumbrance for dropper in layout.droppers])
+    for _ in range(MOST_ROUNDS):
+        mass = per_length * length
+        tension = lift + GRAVITY * (mass / 2 + below)
+        above, tops = hang(tension + GRAVITY * (mass / 2 + over))
+        loaded = tops - lower
+        new = np.where(by_length, loaded / (1 + tension / elastic), loaded - tension / stiffness)
+        change, length = np.abs(new - length).max(), new
+        if change < SETTLED:
+            break
+    if not change < USABLE:  # nor where it is nan
+        raise InputError(
+            f"The static shape of line '{layout.line.name}' does not settle in {MOST_ROUNDS} rounds: its "
+            "droppers or clamps are too heavy for its wires; give less mass, or more tension."
+        )
+    return above, (tension, length, np.where(by_length, elastic / length, stiffness), mass)
+
+
 def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     """The static shape of a whole line, its droppers in their order along it."""
-    spans, contact_heights, encumbrances = spans_of(line)
-    supports, heights = np.array(line.alignment().supports), np.array(contact_heights)
-    tops = heights + np.array(encumbrances)  # of the messenger's supports without load
-    counts = [len(span.droppers.positions) for span in spans]
-    own = [slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True)]
-    x = hung_at(line)
-    sag = np.concatenate([span.droppers.sag for span in spans])
-    masts = np.arange(len(supports)) + np.append(0, np.cumsum(counts))  # nodes
+    layout = line.layout()
+    spans, x = layout.spans, layout.positions
+    supports, heights = np.array(layout.supports), np.array(layout.contact_heights)
+    tops = heights + np.array(layout.encumbrances)  # of the messenger's supports without load
+    before = np.searchsorted([dropper.span for dropper in layout.droppers], np.arange(len(supports)) + 1)
+    masts = np.arange(len(supports)) + before  # nodes
     hung = np.delete(np.arange(len(supports) + len(x)), masts)
     breaks = np.zeros(len(supports) + len(x))
     breaks[masts], breaks[hung] = supports, x
@@ -180,15 +216,14 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
     at_supports = (*spans, spans[-1])
     holding = np.flatnonzero([span.steady_arm.holds_wire for span in at_supports])
     held = np.concatenate([hung, masts[holding]])
-    lower_heights = np.interp(x, supports, heights) - sag
+    lower_heights = np.interp(x, supports, heights) - [dropper.sag for dropper in layout.droppers]
     lower = LongWire(line.contact_wire, breaks, _end_slopes(supports, heights), np.zeros(len(breaks)))
     contact, lifts = lower.hang(held, np.append(lower_heights, heights[holding]), np.zeros(len(breaks)))
-    lift = lifts[: len(x)]
 
     springs = np.zeros(len(breaks))
     springs[masts] = [span.support.stiffness for span in at_supports]
     springs[[0, -1]] /= 2
-    slopes, stitches = _end_slopes(supports, tops), stitches_of(line)
+    slopes, stitches = _end_slopes(supports, tops), layout.stitches
     stitched = None
     if len(stitches.support):
         stitched = StitchedMessenger(
@@ -209,31 +244,12 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
         above, _ = upper.hang(no_nodes, np.zeros(0), forces)
         return above, above[2 * hung]
 
-    def of_droppers(key: str) -> Array:
-        return np.repeat([getattr(span.droppers, key) for span in spans], counts)
-
-    per_length = of_droppers("mass")
-    below, over = of_droppers("contact_clamp_mass"), of_droppers("messenger_clamp_mass")
-
-    def cut(length: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        dropper_mass = per_length * length
-        tension = lift + GRAVITY * (dropper_mass / 2 + below)
-        above, ends = hang(tension + GRAVITY * (dropper_mass / 2 + over))
-        loaded = ends - lower_heights
-        new = [unloaded(span.droppers, loaded[k], tension[k]) for span, k in zip(spans, own, strict=True)]
-        return np.concatenate(new), (above, tension, dropper_mass)
-
-    first = np.repeat([span.encumbrance for span in spans], counts)
-    length, (above, tension, mass) = settled(line.name, first, cut)
-    stiffness = [stiffness_of(span.droppers, length[k]) for span, k in zip(spans, own, strict=True)]
+    above, droppers = cut_droppers(layout, lifts[: len(x)], lower_heights, hang)
     return StaticShape(
-        contact=lower.profile(contact),
-        messenger=upper.profile(above) if stitched is None else stitched.profile(above, repeats=False),
-        arm_force=lifts[len(x) :],
-        dropper_tension=tension,
-        dropper_length=length,
-        dropper_stiffness=np.concatenate(stiffness),
-        dropper_mass=mass,
+        lower.profile(contact),
+        upper.profile(above) if stitched is None else stitched.profile(above, repeats=False),
+        lifts[len(x) :],
+        *droppers,
         spans=len(spans),
         ropes=() if stitched is None else stitched.shapes(above),
     )

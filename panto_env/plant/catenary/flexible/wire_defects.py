@@ -17,8 +17,8 @@ from ....base.arrays import Array
 from ....base.errors import InputError
 from ...line_condition import LineCondition
 from ..schema import Wire
+from .layout import Layout
 from .parts import places_of
-from .schema import FlexibleCatenaryData
 
 RAMP = 1.0  # length over which the running surface rises at either end of a worn stretch (m), own choice
 COPPER = 8900.0  # density of a contact wire (kg/m^3), for its diameter from its mass
@@ -117,9 +117,9 @@ class WireDefects(NamedTuple):
 NO_DEFECTS = WireDefects()
 
 
-def locate(data: FlexibleCatenaryData, spans: int, condition: LineCondition) -> WireDefects:
+def locate(layout: Layout, condition: LineCondition) -> WireDefects:
     """Defects of the contact wire in a condition. Raises InputError for a place beyond the line."""
-    alignment = data.alignment(spans)
+    data, spans, alignment = layout.line, len(layout.spans), layout.alignment
     lengths = alignment.lengths
 
     def position(span: int, offset: float) -> float:
