@@ -92,7 +92,6 @@ def salt_hash(salt: str) -> str:
     return hashlib.sha256(salt.encode()).hexdigest()
 
 
-Array = NDArray[np.float64]
 BLIND, TAPE = "blind of ", "tape of "
 ORACLE_TAPE = TAPE + "oracle"
 OTHER_SEED = 1_000_003
@@ -122,7 +121,7 @@ class Blind:
         self._first: NDArray[np.float32] | None = None
         self._policy.reset(context)
 
-    def act(self, observation: NDArray[np.float32]) -> Array:
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action of the policy, (actions,), for the first observation of the episode."""
         if self._first is None:
             self._first = observation.copy()
@@ -132,7 +131,7 @@ class Blind:
 class Tape:
     """Plays back recorded actions, (control steps, actions); zeros after the last one."""
 
-    def __init__(self, actions: Array, washout: float = 0.0) -> None:
+    def __init__(self, actions: NDArray[np.float64], washout: float = 0.0) -> None:
         """actions: in the order of the control steps, each in -1..1. washout: see ``Policy``."""
         self._actions, self.washout = actions, washout
 
@@ -140,7 +139,7 @@ class Tape:
         """Prepare for an episode."""
         self._step = 0
 
-    def act(self, observation: NDArray[np.float32]) -> Array:
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """The next action, (actions,)."""
         step, self._step = self._step, self._step + 1
         return self._actions[step] if step < len(self._actions) else np.zeros_like(self._actions[0])

@@ -1,4 +1,4 @@
-"""The passive pantograph that a policy is compared with: one at the policy's own mean contact force."""
+"""One pass of a benchmark, and the passive pantograph at the mean contact force of that pass."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.entries import FULL as NOT_MEASURED
@@ -38,25 +39,17 @@ from .settings import (
     policy_of,
 )
 
-Array = NDArray[np.float64]
+NONE = float("nan"), float("nan")
 
 
-class PassiveFigures(NamedTuple):
-    """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
+def passive_at_mean_of(
+    run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]
+) -> tuple[float, float]:
+    """Sigma (N) and CF (N m) of the passive pantograph on the same line, at the mean force of ``run``.
 
-    std: float  # sigma (N)
-    cost_function: float  # CF (N m)
-
-
-NONE = PassiveFigures(float("nan"), float("nan"))
-
-
-def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
-    """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
-
-    Of a train each has the mean force that it had, and the figures are those of the controlled one
-    whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
-    policy.
+    Both are nan if no static force gives this mean. Of a train each has the mean force that it had, and the
+    figures are those of the controlled one whose sigma is largest. arguments: those of ``simulate`` that the
+    run was made with, except its policy.
     """
     means = [own.summary(spans).mean for own in run.train]
     if not min(means) > 0:
@@ -64,12 +57,12 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
     try:
         mean = means if len(means) > 1 else means[0]
         passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
-    except InputError:  # no static force gives this mean
+    except InputError:
         return NONE
     if passive.terminated:
         return NONE
     worst = passive.worst_controlled(spans).summary(spans)
-    return PassiveFigures(worst.std, worst.cost_function)
+    return worst.std, worst.cost_function
 
 
 FULL = 0.999
@@ -164,11 +157,11 @@ def run_pass(
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
         watts = run.mechanical_power(spans)
-        if policy != REFERENCE:
+        if policy == REFERENCE:
+            at_same_mean = figures.std, figures.cost_function
+        else:
             arguments = _arguments(settings, line, speed_kmh, seed)
             at_same_mean = passive_at_mean_of(first, spans, arguments)
-        else:
-            at_same_mean = PassiveFigures(figures.std, figures.cost_function)
     row = Row(
         policy=policy,
         catenary=line.catenary,
@@ -181,8 +174,8 @@ def run_pass(
         action_rate=action_rate,
         saturation=saturation,
         power=watts,
-        pressed_std=at_same_mean.std,
-        pressed_cost_function=at_same_mean.cost_function,
+        pressed_std=at_same_mean[0],
+        pressed_cost_function=at_same_mean[1],
         controlled_means=tuple(
             float("nan") if first.terminated else own.summary(spans).mean for own in several
         ),

@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control.observation import Context
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import STRIP_STIFFNESS, matrices
 
-Array = NDArray[np.float64]
 DELAY, LAG = 0.010, 0.015
 """Delay of actuator and sensors together, and lag of the actuator (s), from the presets "realistic"."""
 RATE = 2500.0

@@ -15,8 +15,8 @@ from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.report import LEGEND
+from ..benchmark.run import Result, read_result
 from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH
-from .result import Result, read_result
 from .tables import BAR, signed, summary
 from .track import track
 

@@ -15,10 +15,10 @@ from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
 from ..benchmark.report import FIGURES, OWN_LABELS
+from ..benchmark.run import Result
 from ..benchmark.settings import LineAtSpeed
 from ..benchmark.statistics import Cell
 from .charts import Scale
-from .result import Result
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""

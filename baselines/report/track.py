@@ -14,11 +14,11 @@ from panto_env.base.errors import InputError
 from panto_env.policies import maker_of
 
 from ..benchmark.actions import Trace
+from ..benchmark.run import Result
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
 from ..benchmark.statistics import Cell
 from ..line import as_toml
 from .charts import Chart, Line, Point, curves, dots
-from .result import Result
 from .tables import FAR_OFF, PageTable, leaderboard, signed, table_of_cells
 
 CONTROLS = {

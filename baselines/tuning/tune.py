@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control import Task
@@ -22,9 +21,8 @@ from panto_env.plant.state import Row
 from panto_env.policies import maker_of, parameters_of, policy_names
 
 from ..benchmark.settings import SELECTION, TRAINING
-from ..policies.lanes_law import LanesLaw, Observations, TunableLaw
+from ..policies.lanes_law import Array, LanesLaw, Observations, TunableLaw
 
-Array = NDArray[np.float64]
 MOST_LANES = 256
 """Maximum number of lanes of one task: their records are kept in memory, some 6 MB per lane."""
 KEPT_RATE = 100.0

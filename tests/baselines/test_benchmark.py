@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command, plot
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.run import Benchmark
+from panto_baselines.benchmark.run import Benchmark, read_result
 from panto_baselines.benchmark.settings import (
     ORACLE_TAPE,
     OTHER_SEED,
@@ -34,7 +34,6 @@ from panto_baselines.benchmark.settings import (
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.oracle import stored
 from panto_baselines.report.page import page
-from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
