@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -80,6 +80,7 @@ class Case:
     least_correlation: tuple[float, ...]  # of any seed, by band
 
 
+@cache
 def run(speed_kmh: float, condition: str = "new") -> Trajectory:
     """A passive pass along the line."""
     return simulate(

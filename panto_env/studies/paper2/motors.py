@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -106,6 +107,7 @@ def rms_by_band(force: Array, time_step: float) -> tuple[float, ...]:
     return tuple(band_rms(force, time_step, *band) for band in BANDS)
 
 
+@cache
 def without_motors(speed_kmh: float) -> MotorPass:
     """The pantograph as it is, with no motors on it."""
     return _kept(simulate(CATENARY, PANTOGRAPH, speed_kmh, record_droppers=False), "", 0.0, 0.0, 0.0, 0.0)
