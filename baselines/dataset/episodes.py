@@ -44,16 +44,6 @@ class Episode(NamedTuple):
     figures: dict[str, float]  # of the whole episode, from the environment's info
 
 
-class Beginning(NamedTuple):
-    """The start of an episode."""
-
-    policy: Policy
-    twin: gymnasium.Env[Any, Any] | None  # gives the policy its observation; None: it sees the recorded one
-    observation: NDArray[np.float32]  # recorded observation
-    seen: NDArray[np.float32]  # observation that the policy sees
-    info: dict[str, Any]
-
-
 def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
     """Make the environment to record, by id and plain arguments, so that others can make it again.
 
@@ -154,15 +144,18 @@ class Stage:
             dict.fromkeys(FIGURES, np.inf) | info["figures"],
         )
 
-    def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
-        """Begin an episode. Raises InputError if the policy cannot begin it."""
+    def begin(self, name: str, seed: int, options: dict[str, Any]) -> tuple[Policy, Any, Any, Any, Any]:
+        """Begin an episode: its policy, twin or None, recorded observation, the policy's, and info.
+
+        Raises InputError if the policy cannot begin it.
+        """
         policy = find_policy(name)
         twin = self._twin(policy, name)
         observation, info = self._env.reset(seed=seed, options=options)
         seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
         with errors_name(name, "reset"):
             policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
-        return Beginning(policy, twin, observation, seen, info)
+        return policy, twin, observation, seen, info
 
     def _twin(self, policy: Policy, name: str) -> gymnasium.Env[Any, Any] | None:
         """Environment with the observation that a policy requests; None if that is the recorded one.

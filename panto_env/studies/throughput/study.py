@@ -7,7 +7,6 @@ import math
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -103,7 +102,7 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> Measured:
         "machine": roofline.describe(),
         "repeats": repeats,
         "plants": plants,
-        "roofline": asdict(limits),
+        "roofline": limits,
         "scaling": scaling | {"cores": by_cores(repeats, report)},
         "environments": environments,
     }
