@@ -16,14 +16,14 @@ from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base.arrays import from_kmh
 from panto_env.base.plotting import LIMIT, POSITION, fit_force_axis, series_colour
 from panto_env.metrics import compliance as en50367
-from panto_env.metrics.figures import LABELS, Label, in_words
+from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.terminal import number
 
 from .overall import next_in_ranking, with_feedback
 from .run import Benchmark
 from .settings import REFERENCE
-from .single_pass import drive
+from .single_pass import ROW_LABELS, drive
 from .statistics import Cell
 
 if TYPE_CHECKING:
@@ -46,11 +46,6 @@ FIGURES = {  # with the decimals shown
 }
 CHANGES = {"std": "Δσ", "cost_function": "ΔCF", "mean": "ΔF_m"}
 """Headings of the changes that stand beside figures."""
-OWN_LABELS = {
-    "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
-    "power": Label("mechanical power of the actuators", "mech. power", "W"),
-    "saturation": Label("share of commands at the limit", "at limit", "-"),
-}
 LEGEND = (
     "Interquartile means over the seeds, or over all passes. Δσ and ΔCF are relative to a passive pantograph "
     "at the same mean force, pass by pass; ΔF_m is relative to the unchanged passive one. Intervals are for "
@@ -136,7 +131,7 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     table.add_column("policy", overflow="fold")
     table.add_column("rank", justify="right")
     for name in FIGURES:
-        table.add_column(_label(name).column, justify="right")
+        table.add_column(ROW_LABELS[name].column, justify="right")
         if name in CHANGES:
             table.add_column(f"{CHANGES[name]}\n(%)", justify="right", no_wrap=name == "std")
     disqualifications: list[RenderableType] = []
@@ -146,7 +141,7 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
             changes = dict(zip(CHANGES, beside, strict=True))
             values = []
             for name, decimals in FIGURES.items():
-                values.append(number(_label(name).scale * cell.figures[name], decimals))
+                values.append(number(ROW_LABELS[name].scale * cell.figures[name], decimals))
                 if name in changes:
                     values.append(changes[name])
             rank = "–" if cell.rank is None else str(cell.rank)
@@ -160,10 +155,6 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
                 table.add_row(*row, *[""] * (len(table.columns) - len(row)), style="dim")
         table.add_section()
     return [table, *disqualifications]
-
-
-def _label(name: str) -> Label:
-    return OWN_LABELS.get(name) or LABELS[name]
 
 
 def _change(cell: Cell) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,10 +18,11 @@ from panto_env.control import Task
 from panto_env.control.entries import FULL as NOT_MEASURED
 from panto_env.control.observation import Context
 from panto_env.control.state import TaskRow
-from panto_env.metrics.figures import Figures
+from panto_env.metrics.figures import LABELS, Figures, Label
 from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
+from ..line import CONDITIONS
 from ..oracle.stored import stored_actions
 from .actions import Played, Trace, trace
 from .apart import find_apart
@@ -69,15 +70,20 @@ FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
 
 
+OWN_LABELS = {
+    "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
+    "saturation": Label("share of commands at the limit", "at limit", "-"),
+    "power": Label("mechanical power of the actuators", "mech. power", "W"),
+}
+"""Labels of the figures that ``Row`` has beside those of a run."""
+ROW_LABELS = LABELS | OWN_LABELS
 ROW_HEADINGS = {
-    "action_rate": "action_rate (N/s)",
-    "saturation": "saturation (-)",
-    "power": "power (W)",
+    **{name: f"{name} ({label.unit})" for name, label in OWN_LABELS.items()},
     "pressed_std": "pressed_std (N)",
     "pressed_cost_function": "pressed_cost_function (N m)",
     **{f"mean_{number}": f"mean_{number} (N)" for number in range(1, MOST_COLLECTORS + 1)},
 }
-"""Headings with units, in files of tables, of the figures that ``Row`` has beside those of a run."""
+"""Headings with units, in files of tables, of what ``Row`` has beside the figures of a run."""
 
 
 @dataclass(frozen=True)
@@ -104,16 +110,17 @@ class Row:
         """Mean force of each controlled pantograph (N)."""
         return self.controlled_means or (self.figures.mean,)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Names and values in the order above; the figures stand in the same table as the rest.
-
-        Means of several controlled pantographs come last, as mean_1, mean_2, ...
-        """
-        names = [f.name for f in fields(self) if f.name != "controlled_means"]
-        before, after = names[: names.index("figures")], names[names.index("figures") + 1 :]
-        first, last = ({name: getattr(self, name) for name in part} for part in (before, after))
+    @property
+    def numbers(self) -> dict[str, float]:
+        """All figures; means of several controlled pantographs come last, as mean_1, mean_2, ..."""
+        own = {name: getattr(self, name) for name in (*OWN_LABELS, "pressed_std", "pressed_cost_function")}
         each = {f"mean_{agent}": mean for agent, mean in enumerate(self.controlled_means, start=1)}
-        return first | self.figures.as_dict() | last | each
+        return self.figures.as_dict() | own | each
+
+    def as_dict(self) -> dict[str, Any]:
+        """What identifies the pass, and its figures, in one table."""
+        names = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
+        return {name: getattr(self, name) for name in names} | self.numbers
 
 
 class Pass(NamedTuple):
@@ -235,17 +242,8 @@ def _record(
 
 def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     """Settings of the runs along a line, by name, except the speed."""
-    return {
-        "catenary": line.catenary,
-        **line.riding,
-        "actuator": settings.actuator,
-        "sensors": settings.sensors,
-        "line_condition": settings.line_condition,
-        "pantograph_scatter": settings.pantograph_scatter,
-        "speed_drift": settings.speed_drift,
-        "control_interval": settings.control_interval,
-        "distance": line.distance,
-    }
+    names = ("actuator", "sensors", *CONDITIONS)
+    return line.settings | {"distance": line.distance} | {name: getattr(settings, name) for name in names}
 
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:

@@ -10,12 +10,12 @@ from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 from panto_env.base.table import Table
-from panto_env.metrics.figures import LABELS
 from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
-from ..benchmark.report import FIGURES, OWN_LABELS
+from ..benchmark.report import FIGURES
 from ..benchmark.run import Result
+from ..benchmark.single_pass import ROW_LABELS
 from ..benchmark.statistics import Cell
 from .charts import Scale
 
@@ -137,7 +137,7 @@ def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Pag
 
 
 def _of_figure(name: str, decimals: int) -> Column[Cell]:
-    label = (LABELS | OWN_LABELS)[name]
+    label = ROW_LABELS[name]
     return Column(
         label.short_heading.removesuffix(" (-)"),
         lambda cell: _figure(label.scale * cell.figures.get(name, nan), decimals),
