@@ -13,7 +13,7 @@ from pydantic import Field
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
-from panto_baselines.benchmark.statistics import Clusters, interquartile_mean, interval_of_mean
+from panto_baselines.benchmark.statistics import Clusters, Interval, interquartile_mean, interval_of_mean
 from panto_configs import find
 from panto_env.analysis.pool import Progress
 from panto_env.base.arrays import Array
@@ -107,9 +107,6 @@ def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             made[key] = value
     return made
-
-
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
