@@ -67,9 +67,7 @@ class LineAndTrain(Settings):
         (), description="of a train, the first in front, instead of pantograph"
     )
     distances: tuple[Positive, ...] = Field((), description=description("distances"))
-    controlled: Annotated[tuple[int, ...], BeforeValidator(as_clause(controlled_numbers))] = of_run(
-        "controlled"
-    )
+    controlled: _Controlled = of_run("controlled")
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
 
     @model_validator(mode="before")

@@ -17,7 +17,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark import command, plot
+from panto_baselines.benchmark import command, report
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.run import Benchmark, read_result
 from panto_baselines.benchmark.settings import (
@@ -230,7 +230,7 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
 
 
 def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
-    figure = plot.plot(outcome)
+    figure = report.plot(outcome)
     forces, sigmas, changes = figure.axes
     *named, limit, none = forces.get_legend_handles_labels()[1]
     assert [*named, none] == ["passive", P, "nominal force", "0 N: no contact"]
