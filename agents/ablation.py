@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from panto_baselines.benchmark.run import Benchmark
 from panto_baselines.benchmark.run import run as run_benchmark
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
-from panto_baselines.benchmark.statistics import Clusters, interquartile_mean, interval_of_mean
+from panto_baselines.benchmark.statistics import Clusters, Interval, interquartile_mean, interval_of_mean
 from panto_configs import find
 from panto_env.analysis.pool import Progress
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
@@ -107,10 +107,6 @@ def _changed(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             made[key] = value
     return made
-
-
-Array = NDArray[np.float64]
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)

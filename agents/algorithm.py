@@ -62,9 +62,14 @@ class Algorithm(Settings, ABC):
     )
     activation: Literal["tanh", "relu"] = Field("tanh", description="of the hidden layers")
 
-    @abstractmethod
     def make_learner(self, lanes: Any, seed: int) -> Any:
-        """Learner (a Stable-Baselines3 ``BaseAlgorithm``) for a ``VecEnv``."""
+        """Learner for a ``VecEnv``: by default the ``BaseAlgorithm`` of this name of Stable-Baselines3."""
+        import stable_baselines3
+
+        kwargs = self.policy_kwargs()
+        given = self.model_dump(exclude={"learning_rate", "net_arch", "activation", "log_std_init"})
+        given |= {"learning_rate": self.learning_rate_schedule(), "device": "cpu", "policy_kwargs": kwargs}
+        return getattr(stable_baselines3, type(self).__name__)("MlpPolicy", lanes, seed=seed, **given)
 
     @abstractmethod
     def actor(self, model: Any) -> Actor:
@@ -84,12 +89,6 @@ class Algorithm(Settings, ABC):
         if isinstance(self.learning_rate, tuple):
             return LinearSchedule(*self.learning_rate, end_fraction=1.0)
         return self.learning_rate
-
-    def _arguments(self) -> dict[str, Any]:
-        """Arguments of a learner of Stable-Baselines3 but those that shape its networks."""
-        shaping = {"learning_rate", "net_arch", "activation", "log_std_init"}
-        rate = {"learning_rate": self.learning_rate_schedule(), "device": "cpu"}
-        return self.model_dump(exclude=shaping) | rate
 
     def policy_kwargs(self) -> dict[str, Any]:
         """Arguments that shape the networks, named as in Stable-Baselines3."""
@@ -143,10 +142,11 @@ class PPO(Algorithm):
 
         if isinstance(lanes, DeviceLanes):
             return DevicePPO(self, lanes, seed)
-        import stable_baselines3
+        return super().make_learner(lanes, seed)
 
-        kwargs = self.policy_kwargs() | {"log_std_init": self.log_std_init}
-        return stable_baselines3.PPO("MlpPolicy", lanes, policy_kwargs=kwargs, seed=seed, **self._arguments())
+    def policy_kwargs(self) -> dict[str, Any]:
+        """Arguments that shape the networks, named as in Stable-Baselines3."""
+        return super().policy_kwargs() | {"log_std_init": self.log_std_init}
 
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
         """Fit a new learner's actor to a policy's actions, and its critic to the rewards that followed."""
@@ -202,13 +202,6 @@ class SAC(Algorithm):
                 f"learning_starts = {self.learning_starts} must be less than total_steps = "
                 f"{training.total_steps}"
             )
-
-    def make_learner(self, lanes: Any, seed: int) -> Any:
-        """Learner for a ``VecEnv``."""
-        import stable_baselines3
-
-        kwargs = self.policy_kwargs()
-        return stable_baselines3.SAC("MlpPolicy", lanes, policy_kwargs=kwargs, seed=seed, **self._arguments())
 
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
         """Fit a new learner's actor to a policy's actions, and fill the replay buffer with them.

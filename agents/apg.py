@@ -1,36 +1,265 @@
-"""The analytic policy gradient: passes, each on a line of its own, and a learner that descends in them."""
+"""The analytic policy gradient: its network, which kernels drive through passes, and its learner.
+
+Passes, each on a line of its own, are measured as linear models (``linear_pass``); it descends in them.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
+from torch import nn
 
 from panto_baselines.benchmark.settings import TRAINING
 from panto_baselines.benchmark.statistics import MOVED
 from panto_baselines.policies.lanes_law import LanesLaw
+from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.analysis.pool import in_threads
 from panto_env.backend import WIDTH
 from panto_env.base.errors import InputError
+from panto_env.base.machine import cores
 from panto_env.control import Task
+from panto_env.control.entries import AVERAGED
 from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
 from panto_env.policies import Policy, find_policy
 
 from .device_ppo import OwnLearner
-from .linear_pass import Base, LinearPass, Pulsing, columns_of, measure
-from .linear_rollout import Group, Network, Rollout, Terms, grouped
-from .model_file import Actor
+from .linear_pass import Base, Columns, LinearPass, Numbers, Pulsing, columns_of, measure
+from .model_file import Actor, Cell
 from .policy import WashedOut
+from .rollout import Entries, Given, Slopes, Trace, Washout, Weights, backward, forward
 from .settings import Training
 
 if TYPE_CHECKING:
     from .algorithm import APG
+
+FIRST = 0.01
+"""Factor on the last layer's initial weights: the first passes are nearly passive."""
+
+
+class Network(nn.Module):  # type: ignore[misc]
+    """Layers, with a gated recurrent unit after the first one if it has any units: as ``RecurrentActor``."""
+
+    def __init__(self, entries: int, widths: tuple[int, ...], activation: Any, units: int) -> None:
+        """entries: of an observation; widths: of the hidden layers; units: of the cell, 0 for none."""
+        super().__init__()
+        self.activation = activation()
+        self.first = nn.Linear(entries, widths[0])
+        self.cell = nn.GRUCell(widths[0], units) if units else None
+        sizes = (widths[0] + units, *widths[1:], 1)
+        self.rest = nn.ModuleList(nn.Linear(wide, narrow) for wide, narrow in pairwise(sizes))
+        with torch.no_grad():
+            self.rest[-1].weight *= FIRST
+            self.rest[-1].bias.zero_()
+
+    def weights(self) -> Weights:
+        """Its parameters, in their order, for the kernels of a rollout."""
+        first, first_bias, *others = (each.detach().numpy() for each in self.parameters())
+        cell = [np.zeros((0, len(first)), np.float32), np.zeros((0, 0), np.float32)]
+        biases = [np.zeros(0, np.float32)] * 2
+        if self.cell is not None:
+            *cell, biases[0], biases[1] = others[:4]
+            others = others[4:]
+        relu = isinstance(self.activation, nn.ReLU)
+        rest = tuple(others[::2]), tuple(others[1::2])
+        return Weights(first, first_bias, cell[0], biases[0], cell[1], biases[1], *rest, relu)
+
+    def arrays(self) -> Cell | None:
+        """The cell's arrays, if it has one."""
+        if self.cell is None:
+            return None
+        own = self.cell.weight_ih, self.cell.weight_hh, self.cell.bias_ih, self.cell.bias_hh
+        return Cell(*(each.detach().numpy().copy() for each in own))
+
+
+class Terms(NamedTuple):
+    """What all passes of a training have in common."""
+
+    columns: Columns
+    interval: float  # of control (s)
+    limit: float  # of the actuator's force (N)
+    washout: WashoutSettings | None  # of the action
+
+
+class Judged(NamedTuple):
+    """What a pass is judged by; times are control steps."""
+
+    force: Numbers  # (times + 1,): without a change, as EN 50317 filters it (N)
+    counted_from: int
+    end: int
+    passive_mean: float  # N
+    passive_variance: float  # N^2
+
+    @property
+    def ratio(self) -> float:
+        """Sigma over that without control, of the pass as it was measured."""
+        return math.sqrt(float(self.force[self.counted_from + 1 : self.end].var()) / self.passive_variance)
+
+
+class Group(NamedTuple):
+    """Passes that are driven abreast, at most ``WIDTH``."""
+
+    given: Given
+    judged: list[Judged]
+
+
+def grouped(passes: Sequence[LinearPass]) -> list[Group]:
+    """Passes in groups of similar lengths; one with fewer than ``WIDTH`` is filled with its first pass."""
+    ordered, groups = sorted(passes, key=lambda each: len(each.actions)), []
+    for first in range(0, len(ordered), WIDTH):
+        some = ordered[first : first + WIDTH]
+        judged = [
+            Judged(each.force, each.counted_from, len(each.actions), each.passive_mean, each.passive_variance)
+            for each in some
+        ]
+        groups.append(Group(_given([*some, *[some[0]] * (WIDTH - len(some))]), judged))
+    return groups
+
+
+class Rollout:
+    """Groups of passes side by side; a network drives them in place of their own policy."""
+
+    def __init__(self, groups: Sequence[Group], terms: Terms) -> None:
+        """terms: of all passes."""
+        columns, settings = terms.columns, terms.washout
+        average = np.zeros(columns.now.shape[1], dtype=np.float32)
+        if columns.deviate:
+            average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
+        self._groups, self._given = groups, [each.given for each in groups]
+        self._entries = Entries(
+            columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average
+        )
+        self._washout = Washout(0.0, 1.0, 0.0, terms.interval)
+        if settings is not None:
+            share = 1.0 - math.exp(-terms.interval / settings.time_constant)
+            rate = settings.rate / terms.limit
+            self._washout = Washout(share, rate, float(settings.lag), terms.interval)
+
+    def __call__(self, network: Network) -> tuple[torch.Tensor, torch.Tensor, list[torch.Tensor]]:
+        """What the network makes of the passes, with derivatives by its parameters.
+
+        Variance of the force, where it counts, over the passive one, (passes,); shift of the mean force,
+        relative to the passive one, (passes,); actions of each pass, (times,).
+        """
+        driven = _Driving.apply(self, network, *network.parameters())  # force and actions of each group
+        ratios, shifts, taken = [], [], []
+        for number, group in enumerate(self._groups):
+            moved, actions = driven[2 * number : 2 * number + 2]
+            for p, own in enumerate(group.judged):
+                counted = slice(own.counted_from + 1, own.end)
+                force = torch.from_numpy(own.force[counted]) + moved[counted, p]
+                ratios.append(force.var(correction=0) / own.passive_variance)
+                shifts.append(force.mean() / own.passive_mean - 1.0)
+                taken.append(actions[: own.end, p])
+        return torch.stack(ratios), torch.stack(shifts), taken
+
+    def forward(self, weights: Weights) -> list[Trace]:
+        """Drive all groups."""
+
+        def drive(given: Given) -> Trace:
+            times, seen, _ = given.observations.shape
+            units, values = weights.state.shape[1], len(self._entries.average)
+            widths = (values + 1,), (values,), (seen,), (units + len(weights.first),), (4 * units,)
+            rest = _zeros(*((times, len(each)) for each in weights.rest))
+            scalars = _zeros((times,), (times,), (times,))
+            trace = Trace(*[*_zeros(*((times, *each) for each in widths)), rest, *scalars])
+            work = _zeros((2, 3 * units), (values,), (2,))
+            forward(given, self._entries, weights, self._washout, trace, *work)
+            return trace
+
+        return _side_by_side(drive, self._given)
+
+    def backward(
+        self, weights: Weights, traces: list[Trace], by_force: list[Numbers], by_action: list[Numbers]
+    ) -> list[Numbers]:
+        """Derivatives by each array of the weights, from those by force and action, (times, WIDTH)."""
+
+        def differentiate(given: Given, trace: Trace, force: Numbers, action: Numbers) -> list[Numbers]:
+            shapes = ((len(action), len(each)) for each in (weights.first, weights.cell, weights.state))
+            layers = Slopes(*[*_zeros(*shapes), tuple(np.zeros_like(each) for each in trace.rest)])
+            units, values = weights.state.shape[1], len(self._entries.average)
+            work = _zeros((weights.first.shape[1],), (trace.joined.shape[1],), (units,), (values,), (2,))
+            rest = self._entries, weights, self._washout, trace, force, action, layers
+            backward(given, *rest, np.zeros_like(trace.now), work)
+            return _by_weights(trace, layers, units)
+
+        every = _side_by_side(differentiate, self._given, traces, by_force, by_action)
+        return [np.sum(own, axis=0, dtype=np.float32) for own in zip(*every, strict=True)]
+
+
+class _Driving(torch.autograd.Function):  # type: ignore[misc]
+    """Changes of the force, and actions, of each group by turns, (times, WIDTH), by the parameters."""
+
+    @staticmethod
+    def forward(ctx: Any, rollout: Rollout, network: Network, *_: torch.Tensor) -> Any:
+        ctx.rollout, ctx.weights = rollout, network.weights()
+        ctx.traces = rollout.forward(ctx.weights)
+        pairs = [(np.ascontiguousarray(each.moved[:, -1]), each.taken) for each in ctx.traces]
+        return tuple(torch.from_numpy(each) for pair in pairs for each in pair)
+
+    @staticmethod
+    def backward(ctx: Any, *slopes: torch.Tensor) -> Any:
+        by = [np.ascontiguousarray(each.numpy()) for each in slopes]
+        found = ctx.rollout.backward(ctx.weights, ctx.traces, by[::2], by[1::2])
+        return None, None, *map(torch.from_numpy, found)
+
+
+def _side_by_side(work: Any, *groups: Any) -> list[Any]:
+    """The work for each group, on all cores."""
+    with ThreadPoolExecutor(cores()) as pool:
+        return list(pool.map(work, *groups))
+
+
+def _zeros(*shapes: tuple[int, ...]) -> Any:
+    return tuple(np.zeros((*shape, WIDTH), dtype=np.float32) for shape in shapes)
+
+
+def _given(group: list[LinearPass]) -> Given:
+    """Passes as the kernels take them; those that are shorter than the longest one end in zeros."""
+    steps = max(len(each.actions) for each in group)
+
+    def padded(values: list[Any], axis: int = -1) -> Any:
+        every = np.zeros((len(values), steps, *values[0].shape[1:]), dtype=values[0].dtype)
+        for own, value in zip(every, values, strict=True):
+            count = min(steps, len(value))
+            own[:count] = value[:count]
+        return np.ascontiguousarray(np.moveaxis(every, 0, axis))
+
+    recalled = padded([each.recalled.reshape(len(each.recalled), -1) for each in group])
+    before = np.floor(recalled).astype(np.int32)
+    return Given(
+        padded([each.observations for each in group]),
+        padded([each.actions for each in group]),
+        padded([each.response for each in group], axis=0),
+        np.array([each.unit for each in group], dtype=np.float32),
+        before,
+        (recalled - before).astype(np.float32),
+    )
+
+
+def _by_weights(trace: Trace, slopes: Slopes, units: int) -> list[Numbers]:
+    """Derivatives by weights and biases, in the order of a network's parameters."""
+    state = np.concatenate([np.zeros_like(trace.joined[:1, :units]), trace.joined[:-1, :units]])
+    layers = [[(slopes.first, trace.entries)]]
+    if units:
+        layers.append([(slopes.cell, trace.joined[:, units:]), (slopes.state, state)])
+    layers += [[pair] for pair in zip(slopes.rest, [trace.joined, *trace.rest[:-1]], strict=True)]
+    found: list[Numbers] = []
+    for pairs in layers:
+        found += [np.tensordot(slope, values, axes=((0, 2), (0, 2))) for slope, values in pairs]
+        found += [slope.sum(axis=(0, 2)) for slope, _ in pairs]
+    return found
+
 
 MOST_FAILURES = 20
 """Passes in a row that may end early, under the policy or a pulse, before the training does."""

@@ -117,9 +117,9 @@ def export(
 
     The policy is the same, but it cannot be trained further.
     """
-    from .model_file import export_model
+    from .model_file import read_model, write_policy
 
-    export_model(model, Path(output))
+    write_policy(Path(output), *read_model(model))
 
 
 @with_settings(

@@ -222,18 +222,12 @@ class DevicePPO(OwnLearner[DeviceLanes]):
         return tuple(each.flatten(0, 1) for each in steps)
 
     def _update(self, collected: tuple[torch.Tensor, ...]) -> None:
-        self.logger.record("train/value_loss", self._learn_from(*collected))
+        self.logger.record("train/value_loss", self._learn_from(collected))
         self.logger.record("train/std", float(self.network.log_std.detach().exp().mean()))
 
-    def _learn_from(
-        self,
-        observations: torch.Tensor,
-        actions: torch.Tensor,
-        probabilities: torch.Tensor,
-        advantages: torch.Tensor,
-        returns: torch.Tensor,
-    ) -> float:
+    def _learn_from(self, collected: tuple[torch.Tensor, ...]) -> float:
         """Learn from a rollout; mean loss of the values in its last pass."""
+        observations, actions, probabilities, advantages, returns = collected
         settings = self._settings
         losses: list[torch.Tensor] = []
         for _ in range(settings.n_epochs):

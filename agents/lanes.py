@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
 from panto_baselines.policies.repetitive import Washout
@@ -287,7 +287,7 @@ def make_lanes(training: Training) -> Any:
         lanes = PantographVecEnv(native)
         alone = training.residual_of is None and training.washout is None
         parts.append(lanes if alone else AgentLanes(lanes, training))
-    return VecMonitor(parts[0] if len(parts) == 1 else SideBySide(parts))
+    return parts[0] if len(parts) == 1 else SideBySide(parts)
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:

@@ -225,14 +225,6 @@ def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool
     write_arrays(path, facts.model_dump(mode="json"), _layers(actor) | arrays)
 
 
-def export_model(source: Path, target: Path) -> None:
-    """Copy only the policy of a model file, facts and layers, without the state for further training.
-
-    Raises InputError, naming the file, if ``source`` is damaged or ``target`` cannot be written.
-    """
-    write_policy(target, *read_model(source))
-
-
 def write_policy(path: Path, facts: Facts, actor: Actor) -> None:
     """Write a model file without the state for further training. Raises InputError if it can't be written."""
     write_arrays(path, facts.model_dump(mode="json"), _layers(actor))

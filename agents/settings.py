@@ -109,7 +109,9 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(name, str) or name not in IDS:
         raise InputError(f"unknown id {shown(name)}: {suggest(shown(name), list(IDS))}.")
     own = {key: value for key, value in environment.items() if key != "id"}
-    _check_keys(own, tuple(fields()), "[environment]")
+    for key in own:
+        if key not in fields():
+            raise InputError(f"unknown key '{key}' in [environment]: {suggest(key, tuple(fields()))}")
     return {**IDS[name], **own}
 
 
@@ -134,22 +136,13 @@ def load_training(path: str | Path, **changes: Any) -> Training:
 def parse_training(table: Mapping[str, Any], name: str) -> Training:
     """Training from a table. Raises InputError, beginning with ``name``, if it is not valid."""
     try:
-        _check_keys(table, tuple(Training.model_fields), "the top level")
         algorithm = table.get("algorithm")
         if not isinstance(algorithm, str) or algorithm not in ALGORITHMS:
             raise InputError(
                 f"unknown algorithm {shown(algorithm)}: {suggest(shown(algorithm), list(ALGORITHMS))}"
             )
-        algorithm_type = ALGORITHMS[algorithm]
-        known: dict[str, Any] = {
-            "hyperparameters": algorithm_type,
-            "evaluation": Evaluation,
-            "cloning": Cloning,
-        }
-        for key, expected in known.items():
-            if isinstance(table.get(key), Mapping):
-                _check_keys(table[key], tuple(expected.model_fields), f"[{key}] of {algorithm}")
-        hyperparameters = parse(algorithm_type, table.get("hyperparameters", {}), "[hyperparameters]")
+        given = table.get("hyperparameters", {})
+        hyperparameters = parse(ALGORITHMS[algorithm], given, f"[hyperparameters] of {algorithm}")
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training)
         _check(training)
@@ -189,9 +182,3 @@ def _check(training: Training) -> None:
         if name is not None:
             check_named(name, "it")
             find_fitting_policy(name, settings)
-
-
-def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise InputError(f"unknown key '{key}' in {where}: {suggest(key, known)}")

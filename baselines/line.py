@@ -19,6 +19,13 @@ from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 T = TypeVar("T")
 OPTIONS = ("catenary", "pantograph", "distances", "controlled")
 """Options of a command that say which train runs on which line."""
+CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
+"""Settings of runs that all lines of a file have in common."""
+
+
+def of_run(name: str) -> Any:
+    """A field with the default and the description of a run's setting of this name."""
+    return Field(default(name), validate_default=True, description=description(name))
 
 
 def as_clause(read: Callable[[Any], T]) -> Callable[[Any], T]:
@@ -48,20 +55,19 @@ def _condition(value: Any) -> LineCondition:
 Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
 Condition = Annotated[LineCondition, BeforeValidator(as_clause(_condition))]
 Span = Annotated[int, Between(1, MOST_SPANS)]
+_Controlled = Annotated[tuple[int, ...], BeforeValidator(as_clause(controlled_numbers))]
 
 
 class LineAndTrain(Settings):
     """A train on a line, and the speeds to run at."""
 
-    catenary: str = Field(default("catenary"), description=description("catenary"))
-    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
+    catenary: str = of_run("catenary")
+    pantograph: str = of_run("pantograph")
     pantographs: tuple[str, ...] = Field(
         (), description="of a train, the first in front, instead of pantograph"
     )
     distances: tuple[Positive, ...] = Field((), description=description("distances"))
-    controlled: Annotated[tuple[int, ...], BeforeValidator(as_clause(controlled_numbers))] = Field(
-        default("controlled"), validate_default=True, description=description("controlled")
-    )
+    controlled: _Controlled = of_run("controlled")
     speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
 
     @model_validator(mode="before")
@@ -77,12 +83,13 @@ class LineAndTrain(Settings):
         return distinct(value)
 
     @property
-    def riding(self) -> dict[str, Any]:
-        """The train as settings of a run, by name."""
+    def settings(self) -> dict[str, Any]:
+        """Line and train as settings of a run, by name."""
         if not (self.pantographs or self.distances) and self.controlled == (1,):
-            return {"pantograph": self.pantograph}
+            return {"catenary": self.catenary, "pantograph": self.pantograph}
         several = self.pantographs or (self.pantograph,)
-        return {"pantographs": several, "distances": self.distances, "controlled": self.controlled}
+        train = {"pantographs": several, "distances": self.distances, "controlled": self.controlled}
+        return {"catenary": self.catenary} | train
 
 
 def as_toml(table: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from .analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, Take, collect, in_processes
+from .analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, collect, in_processes
 from .backend.cache import source_hash
 from .base.checksums import __version__, commit, read_checked, write_checked
 from .base.errors import InputError, shown
@@ -34,14 +34,13 @@ def spread(
     workers: int | None = None,
     ray: str | None = None,
     progress: Progress | None = None,
-    take: Take[T] | None = None,
 ) -> list[T]:
     """Results of jobs, in the given order; they must not depend on where a job runs.
 
     workers: processes on this machine, one per core by default. ray: address of a cluster to use instead,
     one task on each of its CPUs: that of its head, e.g. "10.0.0.5:6379"; "auto" for the one on this machine;
     or LOCAL. There a job whose worker or machine dies is run again, so a repeated job must give the same
-    result. take: called in this process with the index and the result of each job as soon as it is finished.
+    result.
 
     Raises a job's error, and InputError where both are given, as ``in_processes`` does, and where Ray is not
     installed, this process is already connected to it, there is no cluster, one of its machines cannot load a
@@ -49,7 +48,7 @@ def spread(
     run are then stopped.
     """
     if ray is None:
-        return in_processes(jobs, workers=workers, progress=progress, take=take)
+        return in_processes(jobs, workers=workers, progress=progress)
     if workers is not None:
         raise InputError("A Ray cluster has as many workers as CPUs; leave out either workers or ray.")
     with _connected(ray) as package:
@@ -57,7 +56,7 @@ def spread(
         task = package.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(_run)
         try:
             home = source_hash(), Path.cwd()
-            return collect([task.remote(job, *home).future() for job in jobs], progress, take)
+            return collect([task.remote(job, *home).future() for job in jobs], progress)
         except package.exceptions.RayTaskError as error:
             if isinstance(error.cause, package.exceptions.RaySystemError):
                 raise InputError(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from panto_baselines.report.result import read_result
+from panto_baselines.benchmark.run import read_result
 from panto_baselines.report.tables import summary
 from panto_env.base.files import write_whole
 from panto_env.base.table import Table

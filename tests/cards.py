@@ -15,7 +15,7 @@ from huggingface_hub import EvalResult, ModelCardData
 
 from panto_agents.policy import load
 from panto_agents.stored import FOLDER
-from panto_baselines.report.result import read_result
+from panto_baselines.benchmark.run import read_result
 from panto_env.base.files import write_whole
 
 from .documents import ROOT

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import secrets
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from panto_env.analysis.options import with_settings
 from panto_env.base.files import PAGES
+from panto_env.base.settings import parse
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
 from panto_env.terminal import (
@@ -28,12 +29,11 @@ from panto_env.terminal import (
 )
 
 from ..line import OPTIONS
-from .run import SUFFIXES, run
-
-if TYPE_CHECKING:
-    from .settings import BenchmarkSettings
-    from .submission import Checked
-
+from .run import SUFFIXES, parse_result, read_result, run
+from .settings import BenchmarkSettings, load_benchmark, salt_hash
+from .submission import Checked
+from .submission import check as run_check
+from .submission import replay as play
 
 PLACE = (*OPTIONS, "pantographs")
 """Options that say what runs on which line: they replace the lines of a file."""
@@ -94,10 +94,8 @@ def benchmark(
     from panto_env.analysis.plots import save
 
     from ..report.page import save as save_page
-    from ..report.result import parse_result
-    from .plot import plot as draw
+    from .report import plot as draw_plot
     from .report import tables
-    from .settings import salt_hash
 
     line = {name: given.pop(name, None) for name in PLACE}
     settings = _settings(
@@ -118,7 +116,7 @@ def benchmark(
         if output is not None:
             later(outcome.save, output)
         if plot is not None:
-            later(save, draw(outcome), plot)
+            later(save, draw_plot(outcome), plot)
         if html is not None:
             later(save_page, [parse_result(outcome.as_dict(), "the outcome")], html)
         if json:
@@ -135,10 +133,6 @@ def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> Benchm
 
     A catenary or pantograph replaces all of the file's lines; speeds apply to every line.
     """
-    from panto_env.base.settings import parse
-
-    from .settings import BenchmarkSettings, load_benchmark
-
     base = BenchmarkSettings() if config is None else load_benchmark(config)
     line_changes = _without_none(line)
     table = base.model_dump() | _without_none(given)
@@ -170,8 +164,6 @@ def replay(
     No policy runs. Ends with status 1 where a figure differs by more than the tolerance. On another kind of
     processor figures differ in their last digits: give a tolerance there.
     """
-    from .submission import replay as play
-
     with counting("passes") as progress:
         played = play(result, policy or (), workers, progress)
     if json:
@@ -212,7 +204,6 @@ def returns(
     Every policy of the result runs episodes on its line, at its speeds in turn. Disqualified policies
     share the last rank of the benchmark.
     """
-    from ..report.result import read_result
     from .returns import INGREDIENTS, as_dict, rank_correlation
     from .returns import returns as measure
 
@@ -268,12 +259,6 @@ def check(
 
     Its policy runs in a process of its own, by the Python that PANTO_POLICY_PYTHON names.
     """
-    from panto_env.base.settings import parse
-
-    from ..report.result import read_result
-    from .settings import BenchmarkSettings, load_benchmark
-    from .submission import check as run_check
-
     given: dict[str, Any] = {"seeds": seeds, "salt": salt}
     settings = parse(BenchmarkSettings, load_benchmark(config).model_dump() | given, "the benchmark")
     ranked = [] if against is None else [each for each in read_result(against).standings if each.rank]

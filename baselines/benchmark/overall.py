@@ -141,6 +141,7 @@ def _clusters(rows: Sequence[Row]) -> Clusters:
 
 def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clusters) -> Standing:
     worst = max(cells, key=lambda cell: -np.inf if np.isnan(cell.change) else cell.change)
+    shares = [cell.oracle_share for cell in cells if cell.oracle_share is not None]
 
     def mean(name: str) -> float:
         return float(np.mean([cell.figures[name] for cell in cells]))
@@ -159,7 +160,7 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
         effort=mean("effort"),
         power=mean("power"),
         saturation=mean("saturation"),
-        oracle_share=_oracle_share(cells),
+        oracle_share=float(np.mean(shares)) if len(shares) == len(cells) else None,
         passes=sum(cell.seeds for cell in cells),
         moved=sum(cell.moved for cell in cells),
         most_moved=max((cell.most_moved for cell in cells), key=_size),
@@ -203,8 +204,3 @@ def _disqualification(cells: Sequence[Cell]) -> str:
             f"a third of them or more ({ADVICE})"
         )
     return ""
-
-
-def _oracle_share(cells: Sequence[Cell]) -> float | None:
-    shares = [cell.oracle_share for cell in cells if cell.oracle_share is not None]
-    return float(np.mean(shares)) if len(shares) == len(cells) else None

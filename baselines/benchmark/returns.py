@@ -74,8 +74,7 @@ def returns(
     standings = [each for each in result.standings if not (control_of(each.policy) or each.trainings)]
     check_passes(episodes * len(standings), "This comparison")
     speeds = sorted({cell.speed_kmh for cell in result.cells})
-    place = {"catenary": line.catenary, **line.riding}
-    place |= {name: result.settings[name] for name in ("actuator", "sensors")}
+    place = line.settings | {name: result.settings[name] for name in ("actuator", "sensors")}
     given = [place | {"speed_kmh": speeds[k % len(speeds)]} | dict(arguments or {}) for k in range(episodes)]
     jobs = [
         partial(one_return, identifier, given[seed], each.policy, seed)

@@ -25,18 +25,12 @@ from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control.observation import Context
-from panto_env.control.settings import (
-    ControlInterval,
-    PantographScatter,
-    SpeedDrift,
-    default,
-    description,
-)
+from panto_env.control.settings import ControlInterval, PantographScatter, SpeedDrift
 from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import Policy, check_named, wishes
 
-from ..line import Actuator, Condition, LineAndTrain, Span, as_clause, distinct
+from ..line import Actuator, Condition, LineAndTrain, Span, as_clause, distinct, of_run
 
 Number = Annotated[
     float,
@@ -92,7 +86,6 @@ def salt_hash(salt: str) -> str:
     return hashlib.sha256(salt.encode()).hexdigest()
 
 
-Array = NDArray[np.float64]
 BLIND, TAPE = "blind of ", "tape of "
 ORACLE_TAPE = TAPE + "oracle"
 OTHER_SEED = 1_000_003
@@ -122,7 +115,7 @@ class Blind:
         self._first: NDArray[np.float32] | None = None
         self._policy.reset(context)
 
-    def act(self, observation: NDArray[np.float32]) -> Array:
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action of the policy, (actions,), for the first observation of the episode."""
         if self._first is None:
             self._first = observation.copy()
@@ -132,7 +125,7 @@ class Blind:
 class Tape:
     """Plays back recorded actions, (control steps, actions); zeros after the last one."""
 
-    def __init__(self, actions: Array, washout: float = 0.0) -> None:
+    def __init__(self, actions: NDArray[np.float64], washout: float = 0.0) -> None:
         """actions: in the order of the control steps, each in -1..1. washout: see ``Policy``."""
         self._actions, self.washout = actions, washout
 
@@ -140,7 +133,7 @@ class Tape:
         """Prepare for an episode."""
         self._step = 0
 
-    def act(self, observation: NDArray[np.float32]) -> Array:
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """The next action, (actions,)."""
         step, self._step = self._step, self._step + 1
         return self._actions[step] if step < len(self._actions) else np.zeros_like(self._actions[0])
@@ -209,20 +202,14 @@ class BenchmarkSettings(Settings):
         description="whether installed policies run in the process of the plant instead of apart from it; "
         "those from a file never do",
     )
-    actuator: Actuator = Field(
-        default("actuator"), validate_default=True, description=description("actuator")
-    )
-    sensors: _Sensors = Field(default("sensors"), validate_default=True, description=description("sensors"))
+    actuator: Actuator = of_run("actuator")
+    sensors: _Sensors = of_run("sensors")
     line_condition: Condition = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
-    pantograph_scatter: PantographScatter = Field(
-        default("pantograph_scatter"), description=description("pantograph_scatter")
-    )
-    speed_drift: SpeedDrift = Field(default("speed_drift"), description=description("speed_drift"))
-    control_interval: ControlInterval = Field(
-        default("control_interval"), description=description("control_interval")
-    )
+    pantograph_scatter: PantographScatter = of_run("pantograph_scatter")
+    speed_drift: SpeedDrift = of_run("speed_drift")
+    control_interval: ControlInterval = of_run("control_interval")
 
     @property
     def drawn_seeds(self) -> tuple[int, ...]:

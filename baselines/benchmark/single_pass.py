@@ -1,26 +1,28 @@
-"""The passive pantograph that a policy is compared with: one at the policy's own mean contact force."""
+"""One pass of a benchmark, and the passive pantograph at the mean contact force of that pass."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.entries import FULL as NOT_MEASURED
 from panto_env.control.observation import Context
 from panto_env.control.state import TaskRow
-from panto_env.metrics.figures import Figures
+from panto_env.metrics.figures import LABELS, Figures, Label
 from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
+from ..line import CONDITIONS
 from ..oracle.stored import stored_actions
 from .actions import Played, Trace, trace
 from .apart import find_apart
@@ -38,25 +40,17 @@ from .settings import (
     policy_of,
 )
 
-Array = NDArray[np.float64]
+NONE = float("nan"), float("nan")
 
 
-class PassiveFigures(NamedTuple):
-    """Figures of the passive pantograph at a policy's mean force; nan if it can't reach that mean."""
+def passive_at_mean_of(
+    run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]
+) -> tuple[float, float]:
+    """Sigma (N) and CF (N m) of the passive pantograph on the same line, at the mean force of ``run``.
 
-    std: float  # sigma (N)
-    cost_function: float  # CF (N m)
-
-
-NONE = PassiveFigures(float("nan"), float("nan"))
-
-
-def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]) -> PassiveFigures:
-    """Run the passive pantograph on the same line, with a static force that gives the mean force of ``run``.
-
-    Of a train each has the mean force that it had, and the figures are those of the controlled one
-    whose sigma is largest. arguments: those of ``simulate`` that the run was made with, except its
-    policy.
+    Both are nan if no static force gives this mean. Of a train each has the mean force that it had, and the
+    figures are those of the controlled one whose sigma is largest. arguments: those of ``simulate`` that the
+    run was made with, except its policy.
     """
     means = [own.summary(spans).mean for own in run.train]
     if not min(means) > 0:
@@ -64,27 +58,32 @@ def passive_at_mean_of(run: Trajectory, spans: tuple[int, int], arguments: dict[
     try:
         mean = means if len(means) > 1 else means[0]
         passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
-    except InputError:  # no static force gives this mean
+    except InputError:
         return NONE
     if passive.terminated:
         return NONE
     worst = passive.worst_controlled(spans).summary(spans)
-    return PassiveFigures(worst.std, worst.cost_function)
+    return worst.std, worst.cost_function
 
 
 FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
 
 
+OWN_LABELS = {
+    "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
+    "saturation": Label("share of commands at the limit", "at limit", "-"),
+    "power": Label("mechanical power of the actuators", "mech. power", "W"),
+}
+"""Labels of the figures that ``Row`` has beside those of a run."""
+ROW_LABELS = LABELS | OWN_LABELS
 ROW_HEADINGS = {
-    "action_rate": "action_rate (N/s)",
-    "saturation": "saturation (-)",
-    "power": "power (W)",
+    **{name: f"{name} ({label.unit})" for name, label in OWN_LABELS.items()},
     "pressed_std": "pressed_std (N)",
     "pressed_cost_function": "pressed_cost_function (N m)",
     **{f"mean_{number}": f"mean_{number} (N)" for number in range(1, MOST_COLLECTORS + 1)},
 }
-"""Headings with units, in files of tables, of the figures that ``Row`` has beside those of a run."""
+"""Headings with units, in files of tables, of what ``Row`` has beside the figures of a run."""
 
 
 @dataclass(frozen=True)
@@ -111,16 +110,17 @@ class Row:
         """Mean force of each controlled pantograph (N)."""
         return self.controlled_means or (self.figures.mean,)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Names and values in the order above; the figures stand in the same table as the rest.
-
-        Means of several controlled pantographs come last, as mean_1, mean_2, ...
-        """
-        names = [f.name for f in fields(self) if f.name != "controlled_means"]
-        before, after = names[: names.index("figures")], names[names.index("figures") + 1 :]
-        first, last = ({name: getattr(self, name) for name in part} for part in (before, after))
+    @property
+    def numbers(self) -> dict[str, float]:
+        """All figures; means of several controlled pantographs come last, as mean_1, mean_2, ..."""
+        own = {name: getattr(self, name) for name in (*OWN_LABELS, "pressed_std", "pressed_cost_function")}
         each = {f"mean_{agent}": mean for agent, mean in enumerate(self.controlled_means, start=1)}
-        return first | self.figures.as_dict() | last | each
+        return self.figures.as_dict() | own | each
+
+    def as_dict(self) -> dict[str, Any]:
+        """What identifies the pass, and its figures, in one table."""
+        names = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
+        return {name: getattr(self, name) for name in names} | self.numbers
 
 
 class Pass(NamedTuple):
@@ -164,11 +164,11 @@ def run_pass(
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
         watts = run.mechanical_power(spans)
-        if policy != REFERENCE:
+        if policy == REFERENCE:
+            at_same_mean = figures.std, figures.cost_function
+        else:
             arguments = _arguments(settings, line, speed_kmh, seed)
             at_same_mean = passive_at_mean_of(first, spans, arguments)
-        else:
-            at_same_mean = PassiveFigures(figures.std, figures.cost_function)
     row = Row(
         policy=policy,
         catenary=line.catenary,
@@ -181,8 +181,8 @@ def run_pass(
         action_rate=action_rate,
         saturation=saturation,
         power=watts,
-        pressed_std=at_same_mean.std,
-        pressed_cost_function=at_same_mean.cost_function,
+        pressed_std=at_same_mean[0],
+        pressed_cost_function=at_same_mean[1],
         controlled_means=tuple(
             float("nan") if first.terminated else own.summary(spans).mean for own in several
         ),
@@ -242,17 +242,8 @@ def _record(
 
 def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     """Settings of the runs along a line, by name, except the speed."""
-    return {
-        "catenary": line.catenary,
-        **line.riding,
-        "actuator": settings.actuator,
-        "sensors": settings.sensors,
-        "line_condition": settings.line_condition,
-        "pantograph_scatter": settings.pantograph_scatter,
-        "speed_drift": settings.speed_drift,
-        "control_interval": settings.control_interval,
-        "distance": line.distance,
-    }
+    names = ("actuator", "sensors", *CONDITIONS)
+    return line.settings | {"distance": line.distance} | {name: getattr(settings, name) for name in names}
 
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:

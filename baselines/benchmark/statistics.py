@@ -213,9 +213,6 @@ def _quantile(parts: Sequence[_Part]) -> float:
     return float(t.ppf((1 + CONFIDENCE) / 2, freedom))
 
 
-IDENTITY = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
-"""Columns that identify a row; all others are figures."""
-
 MOVED = 0.015
 """Share by which a policy may move the mean force from that of its own passive run."""
 MOVED_AT_MOST = 0.05
@@ -308,9 +305,8 @@ def _ranked_cells(
 def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float]) -> Cell:
     """Cell of one policy on one line at one speed, without its rank."""
     first = rows[0]
-    tables = [row.as_dict() for row in rows]
-    names = [name for name in tables[0] if name not in IDENTITY]
-    figures = {name: interquartile_mean(np.array([table[name] for table in tables])) for name in names}
+    tables = [row.numbers for row in rows]
+    figures = {name: interquartile_mean(np.array([each[name] for each in tables])) for name in tables[0]}
     sigma = np.array([row.figures.std for row in rows])
     changes = relative_changes(rows)
     costs = _relative(

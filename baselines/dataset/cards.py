@@ -54,7 +54,7 @@ class Column(NamedTuple):
 
 def columns(settings: DesignsSettings) -> list[Column]:
     """All columns, in order."""
-    labels = settings.labels()
+    labels, figures = settings.labels(), [(name, LABELS[name]) for name in FIGURES]
     drawn = [
         Column(name, "float64", f"{labels[name]}, drawn from {low:g} to {high:g}")
         for name, (low, high) in settings.ranges.items()
@@ -69,12 +69,8 @@ def columns(settings: DesignsSettings) -> list[Column]:
         Column("wave_speed", "float64", "wave speed of the contact wire (m/s)"),
         Column("time_step", "float64", "time step of the computation (s)"),
         Column("spacing", "float64", "spacing of the computation's grid (m)"),
-        *(Column(each, "float64", f"{LABELS[each].name} ({_unit(LABELS[each].unit)})") for each in FIGURES),
+        *(Column(name, "float64", f"{each.name} ({each.si or each.unit})") for name, each in figures),
     ]
-
-
-def _unit(shown: str) -> str:
-    return {"mm": "m"}.get(shown, shown)  # the table uses SI units
 
 
 def card_of_designs(

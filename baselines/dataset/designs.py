@@ -20,8 +20,9 @@ from panto_env.base.errors import AccuracyWarning, InputError
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Settings, parse
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.control.settings import default, description
 from panto_env.metrics.figures import Figures
+
+from ..line import of_run
 
 SPAN_LENGTH = "catenary.span_length"
 MOST = 2**20
@@ -32,8 +33,8 @@ class DesignsSettings(Settings):
     """Designs around a line and a pantograph of the catalogue."""
 
     title: str = Field(description="what the card calls the table")
-    catenary: str = Field(default("catenary"), description=description("catenary"))
-    pantograph: str = Field(default("pantograph"), description=description("pantograph"))
+    catenary: str = of_run("catenary")
+    pantograph: str = of_run("pantograph")
     count: Annotated[int, Field(gt=0, le=MOST)] = Field(
         2**14, description="number of designs; powers of two fill the ranges evenly"
     )

@@ -1,8 +1,11 @@
-"""Recording of episodes: a policy's actions, and the environment's responses."""
+"""Episodes: a policy's actions and the environment's responses, as a Minari data set and as one table.
+
+Minari, part of the extra 'data', is imported late.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,13 +16,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from panto_env.base.checksums import read_arrays, write_arrays
+from panto_env.base.checksums import __version__, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.metrics.figures import Figures
 from panto_env.policies import Policy, checked_action, errors_name, find_policy, wishes
 
 from ..benchmark.settings import DATA
-from .settings import ENVIRONMENT, EpisodesSettings, Plan
+from .settings import ENVIRONMENT, EpisodesSettings, Plan, PolicySet
 
 INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "speed_kmh")
 """Entries of the environment's info that are recorded, in addition to the terms of the reward."""
@@ -39,16 +42,6 @@ class Episode(NamedTuple):
     truncations: NDArray[np.bool_]  # (n,)
     infos: dict[str, NDArray[np.float64]]  # (n + 1, ...): INFOS, "reward_terms/...", "policy_action"
     figures: dict[str, float]  # of the whole episode, from the environment's info
-
-
-class Beginning(NamedTuple):
-    """The start of an episode."""
-
-    policy: Policy
-    twin: gymnasium.Env[Any, Any] | None  # gives the policy its observation; None: it sees the recorded one
-    observation: NDArray[np.float32]  # recorded observation
-    seen: NDArray[np.float32]  # observation that the policy sees
-    info: dict[str, Any]
 
 
 def make(settings: EpisodesSettings, **changes: Any) -> gymnasium.Env[Any, Any]:
@@ -151,15 +144,18 @@ class Stage:
             dict.fromkeys(FIGURES, np.inf) | info["figures"],
         )
 
-    def begin(self, name: str, seed: int, options: dict[str, Any]) -> Beginning:
-        """Begin an episode. Raises InputError if the policy cannot begin it."""
+    def begin(self, name: str, seed: int, options: dict[str, Any]) -> tuple[Policy, Any, Any, Any, Any]:
+        """Begin an episode: its policy, twin or None, recorded observation, the policy's, and info.
+
+        Raises InputError if the policy cannot begin it.
+        """
         policy = find_policy(name)
         twin = self._twin(policy, name)
         observation, info = self._env.reset(seed=seed, options=options)
         seen = observation if twin is None else twin.reset(seed=seed, options=options)[0]
         with errors_name(name, "reset"):
             policy.reset((twin or self._env).unwrapped.context)  # type: ignore[attr-defined]
-        return Beginning(policy, twin, observation, seen, info)
+        return policy, twin, observation, seen, info
 
     def _twin(self, policy: Policy, name: str) -> gymnasium.Env[Any, Any] | None:
         """Environment with the observation that a policy requests; None if that is the recorded one.
@@ -271,3 +267,102 @@ def _column(array: Any) -> Any:
     if array.ndim == 1:
         return pa.array(array)
     return pa.FixedSizeListArray.from_arrays(pa.array(array.ravel()), array.shape[1])
+
+
+KEY = "panto_env"
+"""Key of a data set's identity in its metadata."""
+
+
+def check_minari() -> None:
+    """Raise InputError if Minari, or h5py, which it writes with, is not installed."""
+    try:
+        import h5py  # noqa: F401
+        import minari  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            f"Data sets of episodes need Minari, which is not installed ({error}); install panto-env with "
+            "its extra: pip install 'panto-env[data]'."
+        ) from error
+
+
+def write_minari(
+    folder: Path,
+    settings: EpisodesSettings,
+    policy_set: PolicySet,
+    episodes: Iterable[tuple[Plan, Episode]],
+    made_of: Mapping[str, Any],
+    description: str,
+) -> None:
+    """Write a data set to a folder, for ``minari.load_dataset``.
+
+    Each episode's metadata hold its seed and options, with which ``reset`` begins it again, its policy, the
+    noise on the action, and its figures.
+    """
+    import minari
+    from minari.data_collector import EpisodeBuffer
+    from minari.dataset.minari_storage import MinariStorage
+
+    env = make(settings)
+    data = folder.resolve() / "data"  # Minari takes no relative path
+    data.mkdir(parents=True)
+    storage = MinariStorage.new(
+        data, env_spec=env.spec, observation_space=env.observation_space, action_space=env.action_space
+    )
+    env.close()
+    version = f"panto-env {made_of['version']}"
+    noises = sorted(noise for noise in policy_set.noise if noise)
+    added = f", with white noise of rms {', '.join(f'{noise:g}' for noise in noises)} on the action"
+    storage.update_metadata(
+        {
+            "dataset_id": settings.dataset_id(policy_set),
+            "minari_version": minari.__version__,
+            "author": {settings.author},
+            "algorithm_name": " and ".join(policy_set.policies) + (added if noises else ""),
+            "code_permalink": f"{version}, commit {made_of['commit']}" if made_of["commit"] else version,
+            "description": description,
+            "requirements": [f"panto-env=={__version__}"],
+            KEY: dict(made_of),
+        }
+    )
+    for plan, episode in episodes:
+        storage.update_episodes(
+            [
+                EpisodeBuffer(
+                    seed=plan.seed,
+                    options=settings.options(plan) or None,
+                    observations=episode.observations,
+                    actions=episode.actions,
+                    rewards=episode.rewards,
+                    terminations=episode.terminations,
+                    truncations=episode.truncations,
+                    infos=_nested(episode.infos),
+                )
+            ]
+        )
+        storage.update_episode_metadata([_facts(settings, plan, episode)], [plan.number])
+
+
+def _facts(settings: EpisodesSettings, plan: Plan, episode: Episode) -> dict[str, Any]:
+    """Metadata of an episode; figures that it does not have are infinite."""
+    place = settings.places[plan.place]
+    facts = {
+        "policy": plan.policy,
+        "noise": plan.noise,
+        "catenary": place.catenary,
+        "pantograph": place.pantograph,
+        "speed_kmh": float(episode.infos["speed_kmh"][0]),
+        "return": float(np.sum(episode.rewards)),
+    }
+    return facts | {f"figures/{name}": value for name, value in episode.figures.items()}
+
+
+def _nested(infos: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables from keys such as "a/b"."""
+    nested: dict[str, Any] = {}
+    for key, value in infos.items():
+        *above, last = key.split("/")
+        table = nested
+        for name in above:
+            table = table.setdefault(name, {})
+        table[last] = value
+    return nested

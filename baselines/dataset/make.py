@@ -28,8 +28,19 @@ from panto_env.cluster import (
 
 from .cards import TABLE, card_of_designs, card_of_episodes, columns, description, summary
 from .designs import DesignsSettings, simulate_designs
-from .episodes import STEPS, Episode, StepsTable, check_places, make, read_episodes, read_part, record
-from .minari_set import KEY, check_minari, write_minari
+from .episodes import (
+    KEY,
+    STEPS,
+    Episode,
+    StepsTable,
+    check_minari,
+    check_places,
+    make,
+    read_episodes,
+    read_part,
+    record,
+    write_minari,
+)
 from .settings import NAMESPACE, EpisodesSettings, Plan, PolicySet
 
 LIST = "SHA256SUMS"

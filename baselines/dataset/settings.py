@@ -36,11 +36,7 @@ class EpisodePlace(Settings):
 
     def options(self) -> dict[str, Any]:
         """Options of ``reset`` for an episode at this place."""
-        return {
-            "catenary": self.catenary,
-            "pantograph": self.pantograph,
-            "speed_kmh": list(self.speed_kmh),
-        }
+        return self.model_dump(mode="json")
 
 
 class PolicySet(Settings):

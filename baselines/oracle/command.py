@@ -26,13 +26,10 @@ from panto_env.terminal import (
     written_last,
 )
 
-from ..line import OPTIONS
+from ..line import CONDITIONS, OPTIONS
 
 if TYPE_CHECKING:
     from .search import Iteration, Oracle
-
-CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
-"""Options that all cells have in common."""
 
 
 @with_settings(only=(*OPTIONS, "actuator", *CONDITIONS), defaults=False)

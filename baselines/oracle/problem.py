@@ -39,11 +39,10 @@ NEAR = 0.01
 
 
 class Limits(NamedTuple):
-    """Linear limits of a sequence of knots (N): low <= matrix @ knots <= high."""
+    """Linear limits of a sequence of knots (N): -bound <= matrix @ knots <= bound."""
 
     matrix: csc_matrix  # (rows, knots)
-    low: Array  # (rows,): N
-    high: Array  # (rows,): N
+    bound: Array  # (rows,): N
 
 
 class Knots:
@@ -80,19 +79,18 @@ class Knots:
         if self.reached < 1.0:
             parts.append(one - (1.0 - self.reached) * before)
             bounds.append(self.reached * self.limit)
-        high = np.repeat(bounds, count)
-        return Limits(csc_matrix(vstack(parts)), -high, high)
+        return Limits(csc_matrix(vstack(parts)), np.repeat(bounds, count))
 
     def within(self, knots: Array) -> Array:
         """Knots, (count, places), scaled down by one factor if they exceed the limits."""
         limits = self.limits(len(knots))
-        excess = np.abs(limits.matrix @ knots) / limits.high[:, None]
+        excess = np.abs(limits.matrix @ knots) / limits.bound[:, None]
         return np.asarray(knots / max(1.0, float(excess.max())))
 
     def at_limits(self, knots: Array) -> float:
         """Share of knots, (count, places), that are at a limit of force or rate."""
         limits = self.limits(len(knots))
-        near = np.abs(limits.matrix @ knots) >= (1.0 - NEAR) * limits.high[:, None]
+        near = np.abs(limits.matrix @ knots) >= (1.0 - NEAR) * limits.bound[:, None]
         return float(near.reshape(-1, *knots.shape).any(axis=0).mean())
 
     def commands(self, knots: Array) -> Array:

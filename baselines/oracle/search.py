@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csc_matrix, eye_array, kron
@@ -22,6 +22,7 @@ from panto_env.base.errors import InputError, shown
 from panto_env.metrics.figures import Figures
 from panto_env.metrics.low_pass import zero_phase_low_pass
 
+from ..policies.mpc import quadratic_solver
 from .problem import Limits, Problem
 
 SHARES = (1.0, 0.6, 0.3, 0.1)
@@ -89,7 +90,7 @@ def descend(
     one = problem.knots.limits(problem.count)
     # Of the knots of all actuators, (count, places), flattened row by row.
     matrix = csc_matrix(kron(one.matrix, eye_array(problem.places)))
-    limits = Limits(matrix, np.repeat(one.low, problem.places), np.repeat(one.high, problem.places))
+    limits = Limits(matrix, np.repeat(one.bound, problem.places))
     force, damping = problem.forces(knots[None])[0], DAMPING
     found = [_iteration(problem, 0, knots, force, 0.0)]
     if progress is not None:
@@ -143,24 +144,24 @@ def _mean_met(problem: Problem, force: Array) -> bool:
 class Model(NamedTuple):
     """Quadratic model of a step: squares of the filtered force about its mean, and of the mean's error."""
 
-    square: Array  # (directions, directions)
-    slope: Array  # (directions,)
-    size: float  # of ``square``: mean of its diagonal
+    hessian: Array  # (directions, directions)
+    gradient: Array  # (directions,)
+    size: float  # of ``hessian``: mean of its diagonal
     basis: Array | None
 
     @classmethod
     def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
         """Model about the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
-        rest = force[:: problem.every]
+        compared = force[:: problem.every]
         mean = response.mean(axis=0)
-        stiffness = MEAN_STIFFNESS * len(rest)
+        stiffness = MEAN_STIFFNESS * len(compared)
         missing = problem.figures.mean - float(force.mean())
         about_mean = response - mean
-        square = about_mean.T @ about_mean
-        size = float(np.trace(square)) / len(square)
-        square += stiffness * np.outer(mean, mean)
-        slope = about_mean.T @ (rest - rest.mean()) - stiffness * missing * mean
-        return cls(square, slope, size, basis)
+        hessian = about_mean.T @ about_mean
+        size = float(np.trace(hessian)) / len(hessian)
+        hessian += stiffness * np.outer(mean, mean)
+        gradient = about_mean.T @ (compared - compared.mean()) - stiffness * missing * mean
+        return cls(hessian, gradient, size, basis)
 
     def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
         """Best step along each direction (N) within the limits; damping: see ``DAMPING``.
@@ -170,11 +171,11 @@ class Model(NamedTuple):
         """
         now = limits.matrix @ knots
         matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
-        square = self.square + damping * self.size * np.eye(len(self.square))
-        scale = 1.0 / float(np.diag(square).max())
-        solver = quadratic_solver()
-        quadratic = csc_matrix(np.triu(scale * square))
-        solver.setup(quadratic, scale * self.slope, matrix, limits.low - now, limits.high - now, **OSQP)
+        hessian = self.hessian + damping * self.size * np.eye(len(self.hessian))
+        scale = 1.0 / float(np.diag(hessian).max())
+        solver = quadratic_solver("An oracle")
+        low, high = -limits.bound - now, limits.bound - now
+        solver.setup(csc_matrix(np.triu(scale * hessian)), scale * self.gradient, matrix, low, high, **OSQP)
         answer = solver.solve(raise_error=False)
         if answer.x is None or not np.isfinite(answer.x).all():
             raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
@@ -187,18 +188,6 @@ def corrected(response: Array, step: Array, change: Array) -> Array:
     Broyden's formula: Broyden, Math. Comp. 19 (1965) 577.
     """
     return np.asarray(response + np.outer(change - response @ step, step) / (step @ step))
-
-
-def quadratic_solver() -> Any:
-    """A solver of OSQP. Raises InputError if OSQP, an extra, is not installed."""
-    try:
-        import osqp
-    except ImportError as error:
-        raise InputError(
-            f"An oracle needs OSQP, which is not installed ({error}); install panto-env with its extra "
-            "'control'."
-        ) from error
-    return osqp.OSQP()
 
 
 def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:

@@ -25,13 +25,11 @@ from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,
     SpeedDrift,
-    default,
-    description,
     run_settings,
 )
 from panto_env.plant.line_condition import LINE_CONDITIONS
 
-from ..line import Actuator, Condition, LineAndTrain, Span
+from ..line import CONDITIONS, Actuator, Condition, LineAndTrain, Span, of_run
 from .search import METHOD, STARTS, Oracle
 
 MOST_HOPS = 1000
@@ -42,9 +40,7 @@ Start = Literal[STARTS]  # type: ignore[valid-type]
 class OracleCell(LineAndTrain):
     """A train with an actuator on a line, and the speeds to run at."""
 
-    actuator: Actuator = Field(
-        default("actuator"), validate_default=True, description=description("actuator")
-    )
+    actuator: Actuator = of_run("actuator")
     speeds_kmh: tuple[Positive, ...] = Field((300.0,), min_length=1, description="km/h")
 
 
@@ -68,13 +64,9 @@ class OracleSettings(Settings):
     line_condition: Condition = Field(
         LINE_CONDITIONS["smooth"], description="on a new line every seed gives the same run"
     )
-    pantograph_scatter: PantographScatter = Field(
-        default("pantograph_scatter"), description=description("pantograph_scatter")
-    )
-    speed_drift: SpeedDrift = Field(default("speed_drift"), description=description("speed_drift"))
-    control_interval: ControlInterval = Field(
-        default("control_interval"), description=description("control_interval")
-    )
+    pantograph_scatter: PantographScatter = of_run("pantograph_scatter")
+    speed_drift: SpeedDrift = of_run("speed_drift")
+    control_interval: ControlInterval = of_run("control_interval")
 
     def runs(self) -> Iterator[dict[str, Any]]:
         """Settings of a run, by name, for each cell at each speed."""
@@ -84,16 +76,8 @@ class OracleSettings(Settings):
 
     def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
         """Settings of a run, by name, for a cell at a speed (km/h)."""
-        return {
-            "catenary": cell.catenary,
-            **cell.riding,
-            "speed_kmh": speed_kmh,
-            "actuator": cell.actuator,
-            "line_condition": self.line_condition,
-            "pantograph_scatter": self.pantograph_scatter,
-            "speed_drift": self.speed_drift,
-            "control_interval": self.control_interval,
-        }
+        own = cell.settings | {"speed_kmh": speed_kmh, "actuator": cell.actuator}
+        return own | {name: getattr(self, name) for name in CONDITIONS}
 
 
 def oracle_settings(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from panto_env.control.observation import Context
 
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
-from .line_model import DELAY, LAG, OUTPUTS, LineModel
+from .line_model import DELAY, LAG, OUTPUTS, LineModel, Sampled
 from .repetitive import PLACES, Pace, Repetitive
 
 SIGNALS = {
@@ -193,7 +193,7 @@ class Adaptive(Repetitive):
         """Responses of the contact force to the learnt force (N/N), complex, (n,), at frequencies (Hz)."""
         interval = self.context.control_interval
         turns = np.exp(2j * np.pi * frequencies * interval)
-        opened = model.sampled(interval).response(turns)
+        opened = Sampled(model, interval).response(turns)
         signals = opened[[OUTPUTS.index(name) for name in SIGNALS]]
         return np.asarray(opened[0] / (1 - loop_gain(self._of_feedback, signals, turns)))
 

@@ -99,11 +99,6 @@ def load_gains(path: Path) -> GainFile:
     return _load(path, path.stat().st_mtime_ns)
 
 
-def place_of(channels: Sequence[int]) -> str:
-    """Place where the actuators act: frame, head or both."""
-    return "both" if len(channels) > 1 else Place(channels[0]).name.lower()
-
-
 def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArray[np.float64]:
     """Gains for an episode, (gains,): the given ones, or stored ones, interpolated linearly over speed.
 
@@ -117,7 +112,8 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
             raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
         return np.array(source, dtype=float)
     path = gain_file(source)
-    place, tunings = place_of(context.channels), load_gains(path).tunings
+    place = "both" if len(context.channels) > 1 else Place(context.channels[0]).name.lower()
+    tunings = load_gains(path).tunings
     able = [each for each in tunings if each.washout in (0.0, context.washout)]
     able.sort(key=lambda each: each.washout != context.washout)
     own = [each for each in able if each.is_for(context.catenary, context.pantograph, place)]

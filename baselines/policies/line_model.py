@@ -11,17 +11,16 @@ string between two supports, 6 T / s. Both wires are modelled as one string.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control.observation import Context
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import STRIP_STIFFNESS, matrices
 
-Array = NDArray[np.float64]
 DELAY, LAG = 0.010, 0.015
 """Delay of actuator and sensors together, and lag of the actuator (s), from the presets "realistic"."""
 RATE = 2500.0
@@ -74,13 +73,12 @@ class LineModel:
         force = [self.c[0] @ np.linalg.solve(each * eye - self.a, self.b[:, 0]) for each in s]
         return np.asarray(np.array(force) * np.exp(-s * self.delay))
 
-    def sampled(self, interval: float) -> Sampled:
-        """The model sampled at a controller's interval (s), with commands and heights held in between."""
-        return Sampled(self, interval)
-
 
 class Sampled:
-    """A model in discrete time; its state also holds the commands within the delay, the newest last."""
+    """A model in discrete time; its state also holds the commands within the delay, the newest last.
+
+    It is sampled at a controller's interval (s), with commands and heights held in between.
+    """
 
     def __init__(self, model: LineModel, interval: float) -> None:
         whole = int(model.delay / interval + 1e-9)
@@ -103,17 +101,14 @@ class Sampled:
         self.height = np.concatenate([transition @ height_before + height, np.zeros(late)])
         self.c = np.hstack([model.c, np.zeros((len(model.c), late))])
         self.d_height = model.d[:, 1]
+        self.size = size + late
+        """Number of states."""
 
     def response(self, turns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Outputs for a periodic command of 1 N, complex, (5, n); turns: e^(i w T) of an interval, (n,)."""
         eye = np.eye(self.size)
         columns = [self.c @ np.linalg.solve(each * eye - self.a, self.b) for each in turns]
         return np.array(columns).T
-
-    @cached_property
-    def size(self) -> int:
-        """Number of states."""
-        return len(self.a)
 
 
 def line_model(context: Context, line: MeanLine, delay: float = DELAY, lag: float = LAG) -> LineModel:

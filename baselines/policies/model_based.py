@@ -70,7 +70,7 @@ class LinearQuadraticGaussian(TunableLaw):
         effort, harmonics, wandering, damper, spring, motion = 10.0**self.gains
         line = mean_line(context)
         line = MeanLine(line.damper * damper, line.spring * spring)
-        sampled = line_model(context, line, *self._delays).sampled(context.control_interval)
+        sampled = Sampled(line_model(context, line, *self._delays), context.control_interval)
         self.model = Disturbed(sampled, context, harmonics, wandering)
         self.feedback = regulator(self.model.a, self.model.b, self.model.c[0], effort, HELD)
         known = len(self.model.a) - 1  # all states but the command's integral

@@ -101,6 +101,18 @@ class PredictiveControl(TunableLaw):
         return self._last
 
 
+def quadratic_solver(whose: str) -> Any:
+    """A solver of OSQP, an extra. Raises InputError, naming what needs it, if it is not installed."""
+    try:
+        import osqp
+    except ImportError as error:
+        raise InputError(
+            f"{whose} needs OSQP, which is not installed ({error}); install panto-env with its extra "
+            "'control'."
+        ) from error
+    return osqp.OSQP()
+
+
 class Programs:
     """The quadratic programs of all steps through a span; limit: N, rate: N/s, interval: s."""
 
@@ -124,16 +136,16 @@ class Programs:
 
         last: command before (N); total: integral of all commands before (N s).
         """
-        slope = free @ self.answers[step] + total * self._of_sum
-        best = -self._inverse[step] @ slope
+        gradient = free @ self.answers[step] + total * self._of_sum
+        best = -self._inverse[step] @ gradient
         changes = np.diff(best, prepend=last)
         if np.abs(best).max() > self._limit or np.abs(changes).max() > self._change:
-            best = self._limited(step, slope, last)
+            best = self._limited(step, gradient, last)
         return float(
             np.clip(best[0], max(-self._limit, last - self._change), min(self._limit, last + self._change))
         )
 
-    def _limited(self, step: int, slope: Array, last: float) -> Array:
+    def _limited(self, step: int, gradient: Array, last: float) -> Array:
         from scipy.sparse import csc_matrix
 
         # The upper triangle by columns, zeros too: its structure must not change from step to step.
@@ -142,18 +154,14 @@ class Programs:
         high = -low
         low[HORIZON], high[HORIZON] = low[HORIZON] + last, high[HORIZON] + last
         if self._solver is None:
-            try:
-                import osqp
-            except ImportError as error:
-                raise InputError("mpc needs osqp: install panto-env with its extra 'control'.") from error
             limits = np.vstack([np.eye(HORIZON), np.eye(HORIZON) - np.eye(HORIZON, k=-1)])
             columns = np.arange(HORIZON)
             rows = np.concatenate([columns[: k + 1] for k in columns])
             begins = np.concatenate([[0], np.cumsum(columns + 1)])
-            self._solver = osqp.OSQP()
+            self._solver = quadratic_solver("mpc")
             self._solver.setup(
                 csc_matrix((packed, rows, begins), shape=(HORIZON, HORIZON)),
-                slope,
+                gradient,
                 csc_matrix(limits),
                 low,
                 high,
@@ -162,7 +170,7 @@ class Programs:
                 eps_rel=TOLERANCE,
             )
         else:
-            self._solver.update(Px=packed, q=slope, l=low, u=high)
+            self._solver.update(Px=packed, q=gradient, l=low, u=high)
         best: Array = self._solver.solve(raise_error=False).x
         if not np.isfinite(best).all():
             raise InputError("mpc's quadratic program was not solved; take a larger effort.")

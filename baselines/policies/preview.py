@@ -143,7 +143,7 @@ class FrontPreview:
     over passes under training seeds on lines as built, the square of the force that it leaves,
     sum(h * front) + g * u, beside 0.3 of its own square; g is the mean response of the
     contact force to commands, found from test forces in the same passes. So it knows line, train and
-    actuator as designed, and nothing of the line's defects but what the one in front has told.
+    actuator as designed, and nothing of the line's defects but what the one in front has felt.
 
     Its command is added to that of a base policy, which runs in these passes too; "" for none. Own choice of
     the project.
@@ -193,8 +193,8 @@ class FrontPreview:
         """Action, (1,), for an observation."""
         ahead = observation[self._columns] * self._scale
         self._past = np.append(self._past[1:], ahead[0])
-        told = np.append(ahead, self._past[[-1 - steps for steps in PAST]]) - self._gains.mean
-        more = told @ self._gains.gains / self._limit
+        observed = np.append(ahead, self._past[[-1 - steps for steps in PAST]]) - self._gains.mean
+        more = observed @ self._gains.gains / self._limit
         return np.clip(self._base.act(observation) + more, -1.0, 1.0)
 
 
@@ -229,16 +229,16 @@ def _gains(
     )
     passes = [_Pass(settings, policy, seed) for seed in TRAINING[:PASSES]]
     response = _response(settings, policy, passes[:EXCITED])
-    mean = float(np.mean([own.told[BEGIN:, 0].mean() for own in passes]))
-    told, moved, left = [], [], []
+    mean = float(np.mean([own.observed[BEGIN:, 0].mean() for own in passes]))
+    observed, moved, deviations = [], [], []
     for own in passes:
         features = own.features(mean)
         acted = np.stack([np.convolve(each, response)[: len(each)] for each in features.T], axis=1)
         force = own.force[BEGIN:]
-        told.append(features[BEGIN:])
+        observed.append(features[BEGIN:])
         moved.append(acted[BEGIN:])
-        left.append(force - force.mean())
-    x, z, y = np.concatenate(moved), np.concatenate(told), np.concatenate(left)
+        deviations.append(force - force.mean())
+    x, z, y = np.concatenate(moved), np.concatenate(observed), np.concatenate(deviations)
     normal = x.T @ x + RIDGE * z.T @ z + 1e-3 * len(x) * np.eye(x.shape[1])
     return Gains(mean, np.linalg.solve(normal, -x.T @ y))
 
@@ -249,7 +249,7 @@ def _wished(policy: Policy) -> dict[str, Any]:
 
 
 class _Pass:
-    """One pass under a seed: what the one in front told, commands, and the contact force that followed."""
+    """One pass under a seed: the observed force in front, commands, and the contact force that followed."""
 
     def __init__(
         self, settings: RunSettings, policy: Policy, seed: int, commands: Array | None = None
@@ -260,22 +260,22 @@ class _Pass:
         policy.reset(task.context(0))
         columns = [task.layout.index(f"front force, {metres:g} m ahead") for metres in PLACES]
         scale, limit = task.layout.scale[columns], task.actuator.force_limit
-        told: list[Array] = []
+        observed: list[Array] = []
         given: list[float] = []
         while not task.results.flags[0].any():
-            told.append(task.results.observation[0, columns] * scale)
+            observed.append(task.results.observation[0, columns] * scale)
             given.append(0.0 if commands is None else commands[len(given) % len(commands)])
             action = policy.act(task.results.observation[0].copy()) + given[-1] / limit
             task.step(action[None])
         own = task.trajectory(0, last=True).controlled
         count = len(given) * task.length.control_steps
         force = low_pass(own.contact_force, own.time_step)[-count:]
-        self.told, self.given = np.array(told), np.array(given)
+        self.observed, self.given = np.array(observed), np.array(given)
         self.force = force.reshape(len(given), -1).mean(axis=1)
 
     def features(self, mean: float) -> Array:
-        """Deviations of what was told, at places ahead and in the past, (n, gains)."""
-        ahead = self.told - mean
+        """Deviations of the observed force, at places ahead and in the past, (n, gains)."""
+        ahead = self.observed - mean
         here = ahead[:, 0]
         past = [np.concatenate([np.zeros(steps), here[: len(here) - steps]]) for steps in PAST]
         return np.concatenate([ahead, np.stack(past, axis=1)], axis=1)

@@ -15,7 +15,7 @@ from panto_env.base.settings import NonNegative, Positive, Settings
 from panto_env.control.observation import Context
 
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
-from .line_model import DELAY, LAG, RATE, LineModel, line_model, mean_line
+from .line_model import DELAY, LAG, RATE, LineModel, Sampled, line_model, mean_line
 
 
 class WashoutSettings(Settings):
@@ -238,7 +238,7 @@ class Repetitive(TunableLaw):
         answers = self.answers(model, numbers * span_rate)
         pace = Pace(*self.gains[-len(Pace._fields) :])
         self._learner = SpanLearner(pace, numbers, answers, interval * span_rate, limit, lanes)
-        self._sampled = model.sampled(interval)
+        self._sampled = Sampled(model, interval)
         self._state = np.zeros((self._sampled.size, lanes))
         self._from_average = FromAverage(interval, 1 / span_rate)
         self._washout = Washout(WASHED, interval, limit, (lanes,))

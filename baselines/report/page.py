@@ -1,24 +1,248 @@
-"""A self-contained HTML page; the same results give the same bytes."""
+"""A self-contained HTML page of tracks; the same results give the same bytes, and no user's code is run."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import isfinite, nan
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from panto_env.analysis.options import DroppersFile, FiguresFile
+from panto_env.base import plugins
 from panto_env.base.errors import InputError
 from panto_env.base.files import JSON, PAGES, check_output, suffix_of, with_suffix, write_text
+from panto_env.policies import maker_of
 from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
+from ..benchmark.actions import Trace
 from ..benchmark.report import LEGEND
-from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH
-from .result import Result, read_result
-from .tables import BAR, signed, summary
-from .track import track
+from ..benchmark.run import Result, read_result
+from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
+from ..benchmark.statistics import Cell
+from ..line import as_toml
+from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Chart, Line, Point, curves, dots
+from .tables import BAR, FAR_OFF, PageTable, leaderboard, signed, summary, table_of_cells
+
+CONTROLS = {
+    BLIND: "A control: {}, given its first observation at every step.",
+    TAPE: "A control: the actions that {} took on another line, under another seed, played back.",
+}
+
+
+def what_is(policy: str) -> str:
+    """First paragraph of an installed policy's docstring; for any other policy, what its name says."""
+    control = control_of(policy)
+    if control:
+        return CONTROLS[control].format(policy_of(policy))
+    name = policy.partition(":")[0]
+    if name in plugins.installed(plugins.POLICIES):
+        try:
+            text = inspect.getdoc(maker_of(name)) or "It has no description."
+        except InputError as error:  # a package that it needs is missing
+            return str(error)
+        return " ".join(text.partition("\n\n")[0].split())
+    if name.endswith(".py"):
+        return "A class in a Python file of the user's, which is not read for this page."
+    if Path(policy).suffix[1:] in plugins.installed(plugins.LOADERS):
+        return "A model from a file, which is not read for this page."
+    return "It is not installed where this page was made."
+
+
+STRONGEST = 0.6
+"""Opacity of a heat map's strongest colour, so that text on it stays legible."""
+
+
+@dataclass(frozen=True)
+class Shade:
+    """A coloured cell of a table: its text, and its strength from -1 (better) through 0 to 1 (worse)."""
+
+    text: str
+    strength: float
+    disqualified: bool = False
+    note: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Name of its colour."""
+        return "better" if self.strength < 0 else "worse"
+
+    @property
+    def opacity(self) -> float:
+        """Opacity of its colour."""
+        return round(STRONGEST * min(abs(self.strength), 1.0), 3)
+
+
+@dataclass(frozen=True)
+class Section:
+    """Table and charts of one line at one speed."""
+
+    title: str
+    table: PageTable
+    charts: list[Chart]
+
+
+@dataclass(frozen=True)
+class About:
+    """One policy: its description, its rank, and the cell where it is worst."""
+
+    name: str
+    text: str
+    rank: int | None
+    worst: Cell
+    disqualified: list[Cell]
+    everywhere: bool
+    method: str  # of which it is a training, or ""
+
+
+@dataclass(frozen=True)
+class Track:
+    """Everything that the page shows of one result."""
+
+    result: Result
+    settings: str  # as TOML
+    numbers: dict[str, int]  # of policies, for their colours
+    shown_first: set[str]  # policies whose traces are shown when the page opens
+    leaderboard: PageTable
+    lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
+    heat: dict[str, list[Shade | None]]  # by policy, over all places
+    pairs: dict[str, list[Shade | None]]  # by policy, over all others
+    overview: Chart | None
+    sections: list[Section]
+    policies: list[About]
+
+
+def track(result: Result) -> Track:
+    """Contents of the page for a result."""
+    ranked = [one for one in result.by_rank if one.rank]
+    first = {REFERENCE, *(next(iter(one.trainings), one.policy) for one in ranked[:3])}
+    method_of = result.method_of
+    methods = dict.fromkeys(method_of.values())
+    return Track(
+        result=result,
+        settings=as_toml(result.settings),
+        numbers={policy: number for number, policy in enumerate([*result.policies, *methods])},
+        shown_first=first if len(ranked) > 2 else set(result.policies[:4]) | first,
+        leaderboard=leaderboard(result),
+        lines=[
+            (places[0], len(places))
+            for places in (list(own) for _, own in groupby(result.places, key=lambda place: place[:2]))
+        ],
+        heat=_heat(result),
+        pairs=_pairs(result),
+        overview=dots(
+            "Δσ over effort, all lines and speeds",
+            ("effort, mean over lines and speeds (N)", "Δσ (%)"),
+            [
+                Point(method_of[one.policy], *at, one.policy)
+                if one.policy in method_of
+                else Point(one.policy, *at)
+                for one in result.standings
+                for at in [(one.effort, one.change, bool(one.disqualified))]
+            ],
+        ),
+        sections=[_section(result, place) for place in result.places],
+        policies=[_about(result, policy) for policy in result.policies],
+    )
+
+
+def _heat(result: Result) -> dict[str, list[Shade | None]]:
+    """Heat map of changes of σ; the strongest colour is the maximum change, up to ``FAR_OFF``."""
+    cells = {(cell.policy, cell.place): cell for cell in result.cells}
+    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
+    maximum = min(max([1.0, *sizes]), FAR_OFF)
+    return {
+        policy: [_shade(cells.get((policy, place)), maximum) for place in result.places]
+        for policy in result.policies
+    }
+
+
+def _shade(cell: Cell | None, maximum: float) -> Shade | None:
+    if cell is None:
+        return None
+    strength = cell.change / maximum if isfinite(cell.change) else 0.0
+    return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
+
+
+def _pairs(result: Result) -> dict[str, list[Shade | None]]:
+    """Share of passes in which the row's policy has a smaller change of σ than the column's."""
+    compared = [one for one in result.standings if one.policy not in result.method_of]
+    shares = {one.policy: [one.better_than.get(other.policy) for other in compared] for one in compared}
+    return {
+        policy: [
+            one if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+            for one in each
+        ]
+        for policy, each in shares.items()
+    }
+
+
+def _section(result: Result, place: LineAtSpeed) -> Section:
+    cells = [cell for cell in result.cells if cell.place == place]
+    title = f"{place.pantograph} on {place.catenary} at {place.speed_kmh:g} km/h"
+    first, last = result.spans[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
+    count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
+    points = [
+        Point(
+            cell.policy,
+            cell.figures.get("effort", nan),
+            cell.figures.get("std", nan),
+            bool(cell.disqualified),
+        )
+        for cell in cells
+    ]
+    over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
+    traces = [trace for trace in result.traces if trace.place == place]
+    return Section(
+        title=title,
+        table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
+        charts=[
+            *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
+            *([over_effort] if over_effort else []),
+        ],
+    )
+
+
+def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> list[Chart]:
+    """Charts of the contact force along the spans, and of its spectrum."""
+    first, last = spans
+    begin, end = traces[0].position[0], traces[0].position[-1]
+    span = (end - begin) / (last - first + 1)
+    inner = [begin + k * span for k in range(last - first + 2)]
+    return [
+        curves(
+            f"Contact force, seed {traces[0].seed}; dotted: nominal force",
+            ("position (m); vertical lines: supports", "force to 20 Hz (N)"),
+            [Line(one.policy, one.position, one.force) for one in traces],
+            supports=inner,
+            level=nominal,
+        ),
+        curves(
+            f"Spectrum of the contact force, seed {traces[0].seed}",
+            ("frequency (Hz)", "amplitude (N)"),
+            [Line(one.policy, one.frequency, one.amplitude) for one in traces],
+            from_zero=True,
+        ),
+    ]
+
+
+def _about(result: Result, policy: str) -> About:
+    own = [cell for cell in result.cells if cell.policy == policy]
+    standing = next((one for one in result.standings if one.policy == policy), None)
+    return About(
+        name=policy,
+        text=what_is(policy),
+        rank=None if standing is None else standing.rank,
+        worst=max(own, key=lambda cell: cell.change if isfinite(cell.change) else -float("inf")),
+        disqualified=[cell for cell in own if cell.disqualified],
+        everywhere=standing is not None,
+        method=result.method_of.get(policy, ""),
+    )
 
 
 def page(results: Sequence[Result]) -> str:

@@ -10,15 +10,14 @@ from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 from panto_env.base.table import Table
-from panto_env.metrics.figures import LABELS
 from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
-from ..benchmark.report import FIGURES, OWN_LABELS
-from ..benchmark.settings import LineAtSpeed
+from ..benchmark.report import FIGURES
+from ..benchmark.run import Result
+from ..benchmark.single_pass import ROW_LABELS
 from ..benchmark.statistics import Cell
 from .charts import Scale
-from .result import Result
 
 BAR = 96.0
 """Width of the picture of an interval, in units of its view box."""
@@ -138,7 +137,7 @@ def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> Pag
 
 
 def _of_figure(name: str, decimals: int) -> Column[Cell]:
-    label = (LABELS | OWN_LABELS)[name]
+    label = ROW_LABELS[name]
     return Column(
         label.short_heading.removesuffix(" (-)"),
         lambda cell: _figure(label.scale * cell.figures.get(name, nan), decimals),
@@ -231,9 +230,10 @@ def summary(result: Result) -> Table:
         name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
         own = [[cells[run, place] for run in one.trainings or (one.policy,)] for place in result.places]
         rows.append((name, *map(_text, own), *_overall(one, after.get(one.policy))))
-    oracles = [_oracle(result, place) for place in result.places]
-    if any(oracles):
-        rows.append(("*oracle*", *(each or "–" for each in oracles), *["–"] * len(OVERALL)))
+    oracles = {cell.place: f"{cell.oracle:.1f}" for cell in result.cells if cell.oracle is not None}
+    if oracles:
+        changes = (oracles.get(place, "–") for place in result.places)
+        rows.append(("*oracle*", *changes, *["–"] * len(OVERALL)))
     seeds = result.cells[0].seeds
     title = with_feedback(f"{result.title}: Δσ (%), {seeds} seeds", result.standings)
     return Table(title, headings, tuple(rows))
@@ -266,11 +266,3 @@ def _text(cells: Sequence[Cell]) -> str:
     if any(cell.disqualified for cell in cells):
         return f"({change:.1f}; mean {moved:+.1f})"
     return f"{change:.1f}{' *' if cells[0].rank == 1 and len(cells) == 1 else ''}"
-
-
-def _oracle(result: Result, place: LineAtSpeed) -> str:
-    """Change of sigma (%) of the stored oracle for a line at a speed, or ""."""
-    for cell in result.cells:
-        if cell.place == place and cell.oracle is not None:
-            return f"{cell.oracle:.1f}"
-    return ""

@@ -11,22 +11,10 @@ from panto_env.analysis.options import with_settings
 from panto_env.cluster import RayAddress
 from panto_env.terminal import Force, Json, counting_on, print_json, print_table, this_command, written_last
 
-from ..line import OPTIONS
+from ..line import CONDITIONS, OPTIONS
 
 
-@with_settings(
-    only=(
-        *OPTIONS,
-        "pantograph_scatter",
-        "speed_drift",
-        "actuator",
-        "sensors",
-        "line_condition",
-        "control_interval",
-        "washout",
-    ),
-    defaults=False,
-)
+@with_settings(only=(*OPTIONS, *CONDITIONS, "actuator", "sensors", "washout"), defaults=False)
 def tune(
     given: dict[str, Any],
     policy: Annotated[str, typer.Argument(help="Name of a policy that has gains: periodic, skyhook, ...")],

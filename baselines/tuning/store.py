@@ -15,7 +15,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import alone_in, check_output, write_text
 from panto_env.base.table import Table
 from panto_env.catalog.loader import content_unless_catalogue
-from panto_env.cluster import identity, open_parts, spread
+from panto_env.cluster import identity, make_parts, open_parts
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings
 from panto_env.terminal import number
@@ -46,27 +46,26 @@ def tune(
 
     Each speed is written to the folder once it is done; speeds that are there already are not tuned again.
     seeds, passes: see ``tune_at``. workers, ray: see ``spread``; the gains do not depend on them. Raises
-    InputError for a policy without gains, if the folder holds parts of another tuning or a damaged one, and
-    if another process is tuning into it.
+    InputError for a policy without gains, if the folder holds parts of another tuning, and if another
+    process is tuning into it.
     """
     tunable(policy)
     made_of = {"policy": policy, "seeds": seeds, "passes": passes} | settings.model_dump(mode="json")
     with alone_in(folder, "tunes into"):
         open_parts(folder, identity("tuning", made_of))
-        parts = {speed: folder / f"{speed!r}.json" for speed in speeds_kmh}
-        missing = [speed for speed, path in parts.items() if not path.is_file()]
-        kept = len(parts) - len(missing)
-        if progress is not None:
-            progress(kept, len(parts))
-        spread(
-            [partial(tune_at, policy, settings, speed, seeds, passes) for speed in missing],
-            workers=workers,
-            ray=ray,
-            progress=None if progress is None else lambda done, _: progress(kept + done, len(parts)),
-            take=lambda place, tuned: write_checked(parts[missing[place]], asdict(tuned)),
-        )
-        found = map(read_checked, parts.values())
+        parts = {
+            folder / f"{speed!r}.json": partial(_tune_part, policy, settings, speed, seeds, passes)
+            for speed in speeds_kmh
+        }
+        make_parts(parts, read_checked, workers=workers, ray=ray, progress=progress)
+        found = map(read_checked, parts)
         return [Tuned(**each | {name: tuple(each[name]) for name in ("gains", "history")}) for each in found]
+
+
+def _tune_part(
+    policy: str, settings: RunSettings, speed_kmh: float, seeds: int, passes: int, path: Path
+) -> None:
+    write_checked(path, asdict(tune_at(policy, settings, speed_kmh, seeds, passes)))
 
 
 DIGITS = 5

@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError
 from panto_env.control import Task
@@ -22,9 +21,8 @@ from panto_env.plant.state import Row
 from panto_env.policies import maker_of, parameters_of, policy_names
 
 from ..benchmark.settings import SELECTION, TRAINING
-from ..policies.lanes_law import LanesLaw, Observations, TunableLaw
+from ..policies.lanes_law import Array, LanesLaw, Observations, TunableLaw
 
-Array = NDArray[np.float64]
 MOST_LANES = 256
 """Maximum number of lanes of one task: their records are kept in memory, some 6 MB per lane."""
 KEPT_RATE = 100.0
@@ -163,28 +161,28 @@ def fit(residuals: Residuals, start: Array, steps: Array, iterations: int, ridge
     gains, history, size = np.asarray(start, dtype=float), list[float](), len(start)
     for _ in range(iterations):
         values = residuals(gains + np.concatenate([np.zeros((1, size)), np.diag(steps)]))
-        base = values[0]
-        if not np.isfinite(base).all():
+        residual = values[0]
+        if not np.isfinite(residual).all():
             raise InputError("The tuning cannot start: a pass with its initial gains ends early.")
-        cost = float(base @ base + ridge * np.sum((gains / steps) ** 2))
-        history = history or [cost]
+        objective = float(residual @ residual + ridge * np.sum((gains / steps) ** 2))
+        history = history or [objective]
         usable = np.asarray(np.isfinite(values[1:]).all(axis=1))
         if not usable.any():
             break
-        jacobian = np.where(usable[:, None], values[1:] - base, 0.0).T
-        square = jacobian.T @ jacobian + ridge * np.eye(size)
-        slope = jacobian.T @ base + ridge * gains / steps
-        typical = np.trace(square) / size
-        moves = [np.linalg.solve(square + each * typical * np.eye(size), -slope) for each in DAMPINGS]
+        jacobian = np.where(usable[:, None], values[1:] - residual, 0.0).T
+        hessian = jacobian.T @ jacobian + ridge * np.eye(size)
+        gradient = jacobian.T @ residual + ridge * gains / steps
+        typical = np.trace(hessian) / size
+        moves = [np.linalg.solve(hessian + each * typical * np.eye(size), -gradient) for each in DAMPINGS]
         candidates = gains + np.array(moves) * np.where(usable, steps, 0.0)
         reached = residuals(candidates)
-        costs = (reached**2).sum(axis=1) + ridge * ((candidates / steps) ** 2).sum(axis=1)
-        best = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
-        if not costs[best] < cost:
+        objectives = (reached**2).sum(axis=1) + ridge * ((candidates / steps) ** 2).sum(axis=1)
+        best = int(np.argmin(np.where(np.isfinite(objectives), objectives, np.inf)))
+        if not objectives[best] < objective:
             break
         gains = candidates[best]
-        history.append(float(costs[best]))
-        if costs[best] > (1 - ENOUGH) * cost:
+        history.append(float(objectives[best]))
+        if objectives[best] > (1 - ENOUGH) * objective:
             break
     return Fit(gains, tuple(history))
 

@@ -41,8 +41,6 @@ Job = Callable[[], T]
 """Work without arguments; for another process, a ``functools.partial`` of a function of a module."""
 Progress = Callable[[int, int], None]
 """Called with the numbers of finished jobs and of all jobs."""
-Take = Callable[[int, T], None]
-"""Called with the index and the result of each job as soon as it is finished."""
 MOST_PASSES = 100_000
 """Maximum number of passes of a sweep or a benchmark: an hour and more, on two cores."""
 LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
@@ -55,11 +53,7 @@ def check_passes(count: int, what: str) -> None:
 
 
 def in_processes(
-    jobs: Sequence[Job[T]],
-    *,
-    workers: int | None = None,
-    progress: Progress | None = None,
-    take: Take[T] | None = None,
+    jobs: Sequence[Job[T]], *, workers: int | None = None, progress: Progress | None = None
 ) -> list[T]:
     """Results of jobs that run in fresh processes, one per core by default.
 
@@ -73,7 +67,7 @@ def in_processes(
             workers_for(len(jobs), workers), mp_context=get_context("spawn"), initializer=end_with_parent
         )
         try:
-            return _through(executor, jobs, progress, take)
+            return _through(executor, jobs, progress)
         except BrokenProcessPool as error:
             raise InputError(
                 "A worker process died; in a script, make this call under `if __name__ == '__main__':`."
@@ -112,23 +106,18 @@ def workers_for(jobs: int, workers: int | None) -> int:
     return max(1, min(cores() if workers is None else workers, 4 * cores(), jobs))
 
 
-def collect(futures: Sequence[Future[T]], progress: Progress | None, take: Take[T] | None = None) -> list[T]:
+def collect(futures: Sequence[Future[T]], progress: Progress | None) -> list[T]:
     """Results of futures, in the given order, reported as they finish; raises the first error at once."""
-    places = {future: place for place, future in enumerate(futures)}
     for done, future in enumerate(as_completed(futures), start=1):
-        result = future.result()
-        if take is not None:
-            take(places[future], result)
+        future.result()
         if progress is not None:
             progress(done, len(futures))
     return [future.result() for future in futures]
 
 
-def _through(
-    executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None, take: Take[T] | None = None
-) -> list[T]:
+def _through(executor: Executor, jobs: Sequence[Job[T]], progress: Progress | None) -> list[T]:
     try:
-        return collect([executor.submit(job) for job in jobs], progress, take)
+        return collect([executor.submit(job) for job in jobs], progress)
     except (KeyboardInterrupt, SystemExit):
         if isinstance(executor, ProcessPoolExecutor):
             for process in list((executor._processes or {}).values()):  # a job may take many minutes yet

@@ -13,9 +13,8 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from panto_agents import apg
-from panto_agents.apg import APGLearner, PassLanes
+from panto_agents.apg import APGLearner, PassLanes, Rollout, grouped
 from panto_agents.linear_pass import LinearPass, Pulsing, measure
-from panto_agents.linear_rollout import Rollout, grouped
 from panto_agents.policy import WashedOut, load
 from panto_agents.settings import Training, parse_training
 from panto_agents.train import train
@@ -238,7 +237,10 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     [
         ({"start_from": "repetitive"}, "apg starts from nothing"),
         ({"lines": 2}, "apg draws a line for each pass"),
-        ({"hyperparameters": {"gamma": 0.9}}, "unknown key 'gamma' in .hyperparameters. of apg"),
+        (
+            {"hyperparameters": {"gamma": 0.9}},
+            ".hyperparameters. of apg is not valid: key 'gamma' is not known",
+        ),
         ({"hyperparameters": {"updates": 0}}, "updates"),
     ],
 )

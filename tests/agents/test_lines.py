@@ -146,12 +146,11 @@ def test_each_variant_has_its_share_of_the_lanes():
         ]
         ended += int(dones.sum())
     assert ended >= 4
-    side_by_side = together.venv
-    assert isinstance(side_by_side, SideBySide)
-    assert side_by_side.seconds > 0
-    assert len(side_by_side.get_attr("num_envs")) == 4
-    assert side_by_side.env_is_wrapped(object) == [False] * 4
-    assert side_by_side.get_attr("num_envs", indices=[3]) == [2]
+    assert isinstance(together, SideBySide)
+    assert together.seconds > 0
+    assert len(together.get_attr("num_envs")) == 4
+    assert together.env_is_wrapped(object) == [False] * 4
+    assert together.get_attr("num_envs", indices=[3]) == [2]
     for lanes in (together, *alone):
         lanes.close()
 

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from panto_agents.apg import Network, Rollout, Terms, grouped
 from panto_agents.linear_pass import Columns, LinearPass
-from panto_agents.linear_rollout import Network, Rollout, Terms, grouped
 from panto_agents.model_file import RecurrentActor
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env.control.entries import AVERAGED

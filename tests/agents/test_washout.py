@@ -13,7 +13,8 @@ from safetensors.numpy import load_file
 from typer.testing import CliRunner
 
 from panto_agents import train
-from panto_agents.model_file import export_model, read_model
+from panto_agents.command import export
+from panto_agents.model_file import read_model
 from panto_agents.policy import TrainedPolicy, load
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env import InputError, simulate
@@ -125,7 +126,7 @@ def test_a_damaged_model_is_not_exported(washed, tmp_path):
     damaged = tmp_path / "damaged.safetensors"
     damaged.write_bytes(washed.best.read_bytes()[:-200])
     with pytest.raises(InputError, match="not a whole model file"):
-        export_model(damaged, tmp_path / "out.safetensors")
+        export(damaged, str(tmp_path / "out.safetensors"))
     assert not (tmp_path / "out.safetensors").exists()
 
 

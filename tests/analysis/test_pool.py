@@ -69,18 +69,17 @@ def test_the_number_of_workers(monkeypatch):
         workers_for(5, 0)
 
 
-def test_each_result_is_taken_with_its_place_as_soon_as_it_is_there():
+def test_each_result_is_reported_as_soon_as_it_is_there():
     first, second = Future(), Future()
     second.set_result("b")
-    taken, done = [], []
+    done = []
 
-    def take(place, result):
-        taken.append((place, result))
+    def progress(*counts):
+        done.append(counts)
         if not first.done():
             first.set_result("a")
 
-    assert collect([first, second], lambda *counts: done.append(counts), take) == ["a", "b"]
-    assert taken == [(1, "b"), (0, "a")]
+    assert collect([first, second], progress) == ["a", "b"]
     assert done == [(1, 2), (2, 2)]
     assert collect([], None) == []
 

@@ -13,9 +13,9 @@ from panto_agents.model_file import read_model
 from panto_agents.settings import parse_training
 from panto_agents.stored import FOLDER
 from panto_agents.trainings import RunFolder
+from panto_baselines.benchmark.run import read_result
 from panto_baselines.dataset.make import LIST, verify
 from panto_baselines.oracle import stored
-from panto_baselines.report.result import read_result
 from panto_env import InputError, Trajectory, simulate
 from panto_env.base.checksums import CHECKSUM, read_checked, write_checked
 from panto_env.cluster import IDENTITY, open_parts

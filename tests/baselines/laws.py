@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_baselines.policies.lanes_law import LanesLaw
-from panto_baselines.policies.line_model import OUTPUTS, line_model, mean_line
+from panto_baselines.policies.line_model import OUTPUTS, Sampled, line_model, mean_line
 from panto_env.control import Task
 from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
@@ -44,7 +44,7 @@ def repeated(
     too high.
     """
     rate = CONTEXT.speed / CONTEXT.alignment.mean_length * CONTEXT.control_interval
-    sampled = MODEL.sampled(CONTEXT.control_interval)
+    sampled = Sampled(MODEL, CONTEXT.control_interval)
     law.begin(CONTEXT, 1)
     state = np.zeros(sampled.size)
     told = {"speed": CONTEXT.speed * (1 + speed_error)}

@@ -16,7 +16,7 @@ from panto_baselines.policies.adaptive import (
 )
 from panto_baselines.policies.fb_ff import FeedbackFeedforward, TunedFeedbackFeedforward
 from panto_baselines.policies.feedback import ProportionalDerivative, TunedProportionalDerivative
-from panto_baselines.policies.line_model import OUTPUTS
+from panto_baselines.policies.line_model import OUTPUTS, Sampled
 from panto_baselines.policies.repetitive import LISTENING, Repetitive
 from panto_baselines.tuning.tune import MEAN_TOLERANCE, Still, run_batch
 from panto_env import InputError
@@ -35,7 +35,7 @@ def test_answers_of_the_closed_loop_are_those_of_a_simulation() -> None:
     """Of the sampled model under the feedback itself, in time; slow averages are left out of the answers."""
     policy, turn = Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 2 * np.pi * CONTEXT.control_interval
     policy.begin(CONTEXT, 1)
-    interval, sampled = CONTEXT.control_interval, MODEL.sampled(CONTEXT.control_interval)
+    interval, sampled = CONTEXT.control_interval, Sampled(MODEL, CONTEXT.control_interval)
     rows = [OUTPUTS.index(name) for name in SIGNALS]
     for frequency in (4.0, 9.0):
         feedback, state = LinearFeedback(FEEDBACK, interval, 1), np.zeros(sampled.size)

@@ -17,9 +17,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from panto_baselines.benchmark import command, plot
+from panto_baselines.benchmark import command, report
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.run import Benchmark
+from panto_baselines.benchmark.run import Benchmark, read_result
 from panto_baselines.benchmark.settings import (
     ORACLE_TAPE,
     OTHER_SEED,
@@ -34,7 +34,6 @@ from panto_baselines.benchmark.settings import (
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.oracle import stored
 from panto_baselines.report.page import page
-from panto_baselines.report.result import read_result
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
@@ -231,7 +230,7 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
 
 
 def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
-    figure = plot.plot(outcome)
+    figure = report.plot(outcome)
     forces, sigmas, changes = figure.axes
     *named, limit, none = forces.get_legend_handles_labels()[1]
     assert [*named, none] == ["passive", P, "nominal force", "0 N: no contact"]

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from panto_baselines.policies.adaptive import HARMONICS, LEAD, Periodic
 from panto_baselines.policies.lanes_law import LanesLaw
-from panto_baselines.policies.line_model import MeanLine, line_model, mean_line
+from panto_baselines.policies.line_model import MeanLine, Sampled, line_model, mean_line
 from panto_baselines.policies.model_based import (
     ROUNDING,
     Disturbed,
@@ -103,7 +103,7 @@ def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay:
             atol=1e-12,
         ).y[:, -1]
         time = end
-    sampled = model.sampled(interval)
+    sampled = Sampled(model, interval)
     x = np.zeros(sampled.size)
     for command in commands:
         x = sampled.a @ x + sampled.b * command
@@ -160,7 +160,7 @@ def test_repetitive_control_backs_off_where_its_model_is_wrong() -> None:
 
 
 def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
-    model = Disturbed(MODEL.sampled(0.01), CONTEXT, harmonics=1.0, wandering=3.0)
+    model = Disturbed(Sampled(MODEL, 0.01), CONTEXT, harmonics=1.0, wandering=3.0)
     effort, held = 0.4, 0.7
     a, b, force = model.a, model.b, model.c[0]
     cost = np.outer(force, force)

@@ -105,8 +105,8 @@ def test_limits_are_those_of_the_real_actuator():
     assert knots.at_limits(steepest * 0.5) < 1.0
     assert np.allclose(knots.within(1000 * steepest).max(), knots.within(2000 * steepest).max())
     limits = knots.limits(4)
-    assert (limits.matrix @ steepest[:, 0] > limits.high).any()  # near its limit a lag cannot go on so fast
-    assert (np.abs(limits.matrix @ knots.within(steepest)[:, 0]) <= limits.high * (1 + 1e-12)).all()
+    assert (limits.matrix @ steepest[:, 0] > limits.bound).any()  # near its limit a lag cannot go on so fast
+    assert (np.abs(limits.matrix @ knots.within(steepest)[:, 0]) <= limits.bound * (1 + 1e-12)).all()
 
 
 # --- the response --------------------------------------------------------------------------------

@@ -13,13 +13,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.run import parse_result, read_result
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.line import as_toml
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
-from panto_baselines.report.page import page, report
-from panto_baselines.report.result import parse_result, read_result
+from panto_baselines.report.page import page, report, what_is
 from panto_baselines.report.tables import summary
-from panto_baselines.report.track import as_toml, what_is
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import read_checked, with_checksum, write_checked

@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark.command import returns as command
 from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return, rank_correlation, returns
-from panto_baselines.benchmark.run import run
+from panto_baselines.benchmark.run import parse_result, run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-from panto_baselines.report.result import parse_result
 from panto_env import InputError
 from panto_env.control.settings import read_settings
 from panto_env.envs import IDS

@@ -13,7 +13,7 @@ from rich.table import Table
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.numerics import Numerics
-from panto_env.studies.en50318.convergence import in_use
+from panto_env.studies.en50318.reference import in_use
 
 from . import simulation, twin
 from .differences import at_rest

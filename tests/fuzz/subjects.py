@@ -17,13 +17,13 @@ from panto_agents.stored import FOLDER as MODELS
 from panto_agents.trainings import RunFolder
 from panto_baselines.benchmark import actions
 from panto_baselines.benchmark.actions import Played
+from panto_baselines.benchmark.run import read_result
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.dataset.designs import load_designs
 from panto_baselines.dataset.episodes import Episode, read_episodes
 from panto_baselines.dataset.settings import load_episodes
 from panto_baselines.oracle import stored
 from panto_baselines.policies.lanes_law import load_gains
-from panto_baselines.report.result import read_result
 from panto_env import Trajectory, simulate
 from panto_env.base.checksums import read_checked, write_arrays
 from panto_env.base.files import read_text

@@ -6,7 +6,7 @@ from panto_env import simulate
 from panto_env.cli import studies as validate
 from panto_env.plant.numerics import Numerics
 from panto_env.studies.en50318 import conditions as wear
-from panto_env.studies.en50318 import convergence, reference
+from panto_env.studies.en50318 import reference
 from panto_env.studies.en50318 import study as tables
 from panto_env.studies.en50318.lines import LineCheck
 
@@ -14,20 +14,20 @@ from ..finite_element import __main__ as comparison
 
 
 def test_numerics_in_use_are_those_that_a_run_takes():
-    used = convergence.in_use(Numerics(), 300.0)
+    used = reference.in_use(Numerics(), 300.0)
     assert (used.spacing, used.time_step) == pytest.approx((60 / 192, 1e-2 / 6))
     default, told = simulate(distance=120.0), simulate(distance=120.0, **used.model_dump())
     assert default.time_step == used.time_step
     assert (default.contact_force == told.contact_force).all()
     asked = Numerics(spacing=0.25, time_step=1e-3, window=9, precision="double")
-    assert convergence.in_use(asked, 300.0) == asked
+    assert reference.in_use(asked, 300.0) == asked
 
 
 @pytest.fixture
 def short(monkeypatch):
     """Tables of one row."""
-    monkeypatch.setattr(convergence, "DISCRETISATIONS", (Numerics(),))
-    monkeypatch.setattr(convergence, "SPEEDS_KMH", (300.0,))
+    monkeypatch.setattr(reference, "DISCRETISATIONS", (Numerics(),))
+    monkeypatch.setattr(reference, "CONVERGENCE_KMH", (300.0,))
     monkeypatch.setattr(wear, "CONDITIONS", wear.CONDITIONS[:1])
     monkeypatch.setattr(wear, "DISCRETISATIONS", (Numerics(),))
     monkeypatch.setattr(wear, "SEEDS", 2)

@@ -8,7 +8,7 @@ from unittest import mock
 
 import numpy as np
 
-from panto_baselines.benchmark import plot as benchmark_plot
+from panto_baselines.benchmark import report as benchmark_report
 from panto_baselines.benchmark.statistics import Cell
 from panto_baselines.oracle import report as oracle_report
 from panto_env.analysis import line_check
@@ -131,8 +131,8 @@ def benchmark():
         settings=settings, spans=((1, 3),), cells=tuple(cells()), rows=rows, played=[None] * 3
     )
     runs = [(replace(run, speed=300 / 3.6), None) for run in (RUN, OTHER, QUIET)]
-    with mock.patch.object(benchmark_plot, "drive", side_effect=runs):
-        return benchmark_plot.plot(outcome)
+    with mock.patch.object(benchmark_report, "drive", side_effect=runs):
+        return benchmark_report.plot(outcome)
 
 
 def findings(run, number):

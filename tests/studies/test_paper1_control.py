@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from panto_env import simulate
+from panto_env.metrics.figures import losses_of_contact
 from panto_env.policies import find_policy
 from panto_env.studies import write
 from panto_env.studies.paper1_control import passes
@@ -36,7 +37,8 @@ def test_the_angles_go_once_round_and_meet_the_papers():
     ("lost", "samples"), [([], 0), ([0, 0], 0), ([1, 1, 0, 1], 2), ([0, 1, 1, 1], 3), ([1] * 4, 4)]
 )
 def test_longest_loss_counts_samples_in_a_row(lost, samples):
-    assert passes.longest(np.array(lost, dtype=bool)) == samples
+    begins, ends = losses_of_contact(1.0 - np.array(lost, dtype=float))
+    assert (ends - begins).max(initial=0) == samples
 
 
 def test_a_lane_is_the_pass_that_simulate_makes():

@@ -12,8 +12,7 @@ from ...base.arrays import from_kmh
 from ...metrics.trajectory import Trajectory
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
-from .convergence import in_use
-from .reference import LINE_SPANS, REFERENCE_MODEL
+from .reference import LINE_SPANS, REFERENCE_MODEL, in_use
 
 WORN = LINE_CONDITIONS["worn"]
 CONDITIONS = (

@@ -29,8 +29,7 @@ from ...plant.catenary.flexible.resolution import resolution
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
 from ...plant.numerics import RUNS, Numerics, Runs
 from ...plant.pantograph.schema import PantographData
-from .convergence import WHOLE_LINE
-from .reference import REFERENCE_MODEL
+from .reference import REFERENCE_MODEL, WHOLE_LINE
 
 SPEEDS_KMH = (30.0, 100.0, 200.0, 250.0, 300.0, 350.0, 400.0)
 HIGHEST = 0.95

@@ -13,7 +13,7 @@ from ...metrics.figures import LABELS
 from ...metrics.trajectory import Trajectory
 from ...terminal import number
 from ..study import Cell, Columns, tabled
-from . import conditions, convergence, lines, reference
+from . import conditions, lines, reference
 
 Report = Callable[[str], None]
 """Called with what is being run."""
@@ -80,7 +80,7 @@ def kinds_table(checks: Sequence[reference.KindCheck]) -> Table:
 
 def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
     """Figures of the reference model over grid, time step, window and precision."""
-    by_speed = sorted(runs, key=lambda row: convergence.SPEEDS_KMH.index(row["speed_kmh"]))
+    by_speed = sorted(runs, key=lambda row: reference.CONVERGENCE_KMH.index(row["speed_kmh"]))
     converged = {row["speed_kmh"]: row["std"] for row in reversed(by_speed)}
     uplift = LABELS["max_uplift"]
     return tabled(
@@ -262,9 +262,9 @@ PARTS = {
         (kinds_table,),
     ),
     "convergence": _Part(
-        lambda: convergence.DISCRETISATIONS,
+        lambda: reference.DISCRETISATIONS,
         str,
-        convergence.converge,
+        reference.converge,
         (convergence_table,),
     ),
     "windows": _Part(

@@ -12,14 +12,13 @@ from itertools import groupby, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis.pool import Progress, in_processes
 from ...base.errors import InputError
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
 from ...control.settings import RunSettings, run_settings
-from ...metrics.figures import Figures
+from ...metrics.figures import Figures, losses_of_contact
 from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -268,20 +267,15 @@ def result_of(case: Case, record: Trajectory) -> Result:
     """What is kept of a record."""
     inside = record.inside(SPANS)
     force, turns = record.contact_force[inside], record.alignment.in_spans(record.position[inside])
+    begins, ends = losses_of_contact(force)
     return Result(
         case,
         record.summary(SPANS),
         float(force.std()),
-        longest(force <= 0) * record.time_step,
+        int((ends - begins).max(initial=0)) * record.time_step,
         complex(2 * np.mean(force * np.exp(-2j * np.pi * turns))),
         tuple(band_rms(force, record.time_step, *band) for band in BANDS),
     )
-
-
-def longest(lost: NDArray[np.bool_]) -> int:
-    """Most samples in a row that are true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:

@@ -44,7 +44,7 @@ MEANS = (1, 3)
 RATES = (0.01, 0.03, 0.1, 0.3, 1.0)
 """False alarms per km for which thresholds are set, to draw what each costs."""
 NEAR = ECHOES[0][0]
-"""Way (spans) from a defect within which a finding is of it: a sunk support is felt at its neighbours too."""
+"""Distance (spans) from a defect within which a finding is of it: neighbours feel a sunk support too."""
 
 
 @dataclass(frozen=True)
@@ -194,8 +194,8 @@ def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
     healthy = [case for case in cases if not case.kind]
     if not healthy:
         return float("nan"), float("nan")
-    alarms, way = sum(case.others for case in healthy), sum(case.distance for case in healthy)
-    return 10 * alarms / way, float(10 * chi2.ppf(0.95, 2 * alarms + 2) / 2 / way)
+    alarms, distance = sum(case.others for case in healthy), sum(case.distance for case in healthy)
+    return 10 * alarms / distance, float(10 * chi2.ppf(0.95, 2 * alarms + 2) / 2 / distance)
 
 
 def elsewhere_per_10_km(cases: Sequence[Case]) -> float:
@@ -217,9 +217,9 @@ def broken_row(cases: Sequence[Case]) -> tuple[str, ...]:
     noticed, _, _ = share(broken, lambda case: case.detected)
     named, _, _ = share([case for case in broken if case.detected], lambda case: case.named == BROKEN)
     alarms, bound = alarms_per_10_km(cases)
-    way = sum(case.distance for case in cases if not case.kind)
+    distance = sum(case.distance for case in cases if not case.kind)
     found = f"{100 * noticed:.1f}", f"{100 * located:.1f}", f"{100 * low:.0f}–{100 * high:.0f}"
-    return f"{len(broken)}", *found, f"{100 * named:.0f}", f"{way:.0f}", f"{alarms:.2f}", f"{bound:.2f}"
+    return f"{len(broken)}", *found, f"{100 * named:.0f}", f"{distance:.0f}", f"{alarms:.2f}", f"{bound:.2f}"
 
 
 def broken_table(cases: Sequence[Case]) -> Table:

@@ -1,4 +1,4 @@
-"""Paper 2's estimator (section 4.1): how well each way finds the contact force, and which parameters besides.
+"""Paper 2's estimator (section 4.1): how well each method finds the contact force, and parameters.
 
 The pantograph that the estimators know differs from the simulated one by 5 % rms in every mass, spring and
 damper; sensors have the noise of the preset "realistic". Figures are medians over seeds of mismatch and
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -70,7 +70,7 @@ HIGHEST = 20.0
 
 @dataclass(frozen=True)
 class Case:
-    """One way to estimate the force of one pass, median over seeds."""
+    """One method to estimate the force of one pass, median over seeds."""
 
     speed_kmh: float
     condition: str
@@ -80,6 +80,7 @@ class Case:
     least_correlation: tuple[float, ...]  # of any seed, by band
 
 
+@cache
 def run(speed_kmh: float, condition: str = "new") -> Trajectory:
     """A passive pass along the line."""
     return simulate(
@@ -127,8 +128,8 @@ def cases(
     jobs = [partial(_assess, measure(runs[speed], seed=seed), seed) for speed, seed in keys]
     found = dict(zip(keys, in_processes(jobs, progress=progress), strict=True))
     return [
-        _median((speed, condition, *way), [found[speed, seed][way] for seed in range(SEEDS)])
-        for speed, way in product(speeds_kmh, product(OBSERVATIONS, METHODS))
+        _median((speed, condition, *method), [found[speed, seed][method] for seed in range(SEEDS)])
+        for speed, method in product(speeds_kmh, product(OBSERVATIONS, METHODS))
     ]
 
 
@@ -193,7 +194,7 @@ def parameter_information(trajectory: Trajectory) -> ParameterInformation:
 
 
 def ways_table(cases: Sequence[Case]) -> Table:
-    """Every way at the paper's speed, by band."""
+    """Every method at the paper's speed, by band."""
 
     def by_band(what: str, cell: Callable[[Score], str]) -> list[tuple[str, Cell]]:
         def at(k: int) -> Cell:
@@ -222,7 +223,7 @@ def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
     """One table a quantity, in 0 to 20 Hz: methods and observations down, speeds across."""
     found = {(case.observation, case.method, case.speed_kmh): case.scores[-1] for case in cases}
     speeds = sorted({speed for *_, speed in found})
-    ways = list(dict.fromkeys((observation, method) for observation, method, _ in found))
+    methods = list(dict.fromkeys((observation, method) for observation, method, _ in found))
     quantities: dict[str, Callable[[Score], str]] = {
         "correlation with the true force": lambda score: number(score.correlation, 4),
         "rms error without its mean (N)": lambda score: number(score.rms, 2),
@@ -232,7 +233,7 @@ def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
         Table(
             f"Estimated force, {title}, 0 to {BANDS[-1]:g} Hz",
             ("observations", "method", *(f"{speed:g} km/h" for speed in speeds)),
-            [(*way, *(cell(found[*way, speed]) for speed in speeds)) for way in ways],
+            [(*method, *(cell(found[*method, speed]) for speed in speeds)) for method in methods],
             text_columns=2,
         )
         for title, cell in quantities.items()
@@ -323,7 +324,7 @@ def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
 
 
 def outcome(report: Report) -> Outcome:
-    """Every way at every speed, over noise, which parameters a pass determines, and the figures."""
+    """Every method at every speed, over noise, which parameters a pass determines, and the figures."""
     report("estimator: a pass over the line", 0.0)
     trajectory = run(SPEED_KMH)
     every = cases(progress=lambda done, all_: report("estimator: every way", 0.05 + 0.75 * done / all_))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -29,7 +30,6 @@ from ...base.table import Table
 from ...catalog import load_catenary, load_pantograph
 from ...control import Task
 from ...control.observation import Context
-from ...control.settings import far_enough, run_settings
 from ...metrics.figures import Figures
 from ...metrics.low_pass import band_rms
 from ...metrics.trajectory import Trajectory
@@ -67,7 +67,7 @@ class ForceFeedback:
 
     def __init__(self, gain: float, mean: float) -> None:
         """Take a gain (N/N) and the contact force that is aimed at (N)."""
-        self.gain, self.mean = gain, mean
+        self.gain, self.mean, self.name = gain, mean, f"force feedback, gain {gain:g}"
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
@@ -107,6 +107,7 @@ def rms_by_band(force: Array, time_step: float) -> tuple[float, ...]:
     return tuple(band_rms(force, time_step, *band) for band in BANDS)
 
 
+@cache
 def without_motors(speed_kmh: float) -> MotorPass:
     """The pantograph as it is, with no motors on it."""
     return _kept(simulate(CATENARY, PANTOGRAPH, speed_kmh, record_droppers=False), "", 0.0, 0.0, 0.0, 0.0)
@@ -120,19 +121,18 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
     Raises InputError where the pass leaves the plant's valid range.
     """
     actuator = cast(MotorActuator, actuator_settings(motor)).model_copy(update={"place": place})
-    settings = {"catenary": CATENARY, "pantograph": PANTOGRAPH, "speed_kmh": speed_kmh, "actuator": actuator}
-    task = Task(far_enough(run_settings(settings | {"control_interval": CONTROL_INTERVAL})))
-    task.reset(0, np.random.default_rng(0))
-    policy, results, plant = ForceFeedback(gain, mean), task.results, task.plant
-    policy.reset(task.context(0))
-    motors = cast(MotorArrays, plant.actuators)
-    begin, end = plant.alignment.limits(SPANS)
     taken: list[tuple[float, Array]] = []  # time (s) and energy (J) at each of the two ends of SPANS
-    while not (results.truncated[0] or results.terminated[0]):
-        task.step(policy.act(results.observation[0])[None])
+
+    def watch(task: Task) -> None:
+        plant = task.plant
+        begin, end = plant.alignment.limits(SPANS)
         if plant.of(0, Row.STEP) * plant.of(0, Row.STRIDE) >= (begin, end - 1e-6)[min(len(taken), 1)]:
-            taken = [*taken[:1], (plant.of(0, Row.STEP) * plant.time_step, motors.energy(0))]
-    record = task.trajectory(0, policy=f"force feedback, gain {gain:g}", last=True)
+            motors = cast(MotorArrays, plant.actuators)
+            taken[1:] = [(plant.of(0, Row.STEP) * plant.time_step, motors.energy(0))]
+
+    given: dict[str, Any] = {"actuator": actuator, "control_interval": CONTROL_INTERVAL, "watch": watch}
+    policy = ForceFeedback(gain, mean)
+    record = simulate(CATENARY, PANTOGRAPH, speed_kmh, policy, record_droppers=False, **given)
     if record.terminated:
         reason = record.ending.removesuffix(".")
         raise InputError(f"With motors on the {place} a gain of {gain:g} is too much: {reason}; take less.")

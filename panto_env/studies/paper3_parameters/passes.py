@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -107,6 +108,7 @@ def influences() -> tuple[Influence, ...]:
     return (Influence("speed", "speed_kmh", "v", "km/h", SPEEDS_KMH, 4), *varied)
 
 
+@cache
 def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     """One pass with one parameter off its basic value, at 300 km/h unless that is the parameter.
 

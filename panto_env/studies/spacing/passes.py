@@ -183,8 +183,8 @@ def fit(curve: Curve, frequency: float) -> Fit:
     terms = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
     found = np.linalg.lstsq(terms, std)[0]
     _, cosine, sine = found
-    left = std - terms @ found
-    share = max(0.0, 1.0 - float(left.var() / std.var()))
+    residual = std - terms @ found
+    share = max(0.0, 1.0 - float(residual.var() / std.var()))
     phase = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
     return Fit(frequency, math.sqrt(share), phase, correlation(std, np.cos(angle)))
 

@@ -28,7 +28,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 STARTS = 64
 """Starts of episodes: their number does not change the speed."""
-LEAST = 0.2
+MINIMUM = 0.2
 """Minimum time (s) of a repeat."""
 PAIR = 2**30
 """Bytes that are copied to measure the memory."""
@@ -91,7 +91,7 @@ def _median(step: Callable[[], Any], env: PantographTensorEnv, repeats: int, mos
     begun = time.perf_counter()
     step()
     _wait(env.device)
-    count = min(most, max(1, round(LEAST / (time.perf_counter() - begun))))
+    count = min(most, max(1, round(MINIMUM / (time.perf_counter() - begun))))
     rates = []
     for _ in range(repeats):
         env.reset(seed=0)

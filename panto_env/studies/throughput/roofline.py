@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import llvmlite.binding
 import numpy as np
@@ -49,17 +49,6 @@ WIDE = 16
 _load, _store = row_access(WIDE)
 
 
-@dataclass(frozen=True)
-class Roofline:
-    """Limits of one core, and the kernel beside them."""
-
-    multiply_add: float  # measured peak of multiply and add in registers (GFLOP/s)
-    cache: float  # measured traffic of a triad in the nearest cache (GB/s)
-    arithmetic: float  # arithmetic of the kernel (GFLOP/s)
-    traffic: float  # traffic of its leapfrog along the wires (GB/s)
-    bound: float  # times real time, were the kernel at the nearer of both limits
-
-
 @kernel
 def multiply_add(sums, rounds):
     """Multiply-adds, CHAIN to a number that is read and written once, eight rows of WIDE at a time."""
@@ -93,17 +82,19 @@ def triad(a, b, c, rounds):
         s = s + _load(c, 0)
 
 
-def _fastest(run: object, repeats: int) -> float:
+def _fastest(run: Callable[[], object], repeats: int) -> float:
     best = np.inf
     for _ in range(repeats):
         start = time.perf_counter()
-        run()  # type: ignore[operator]
+        run()
         best = min(best, time.perf_counter() - start)
     return best
 
 
-def measure(nodes: int, droppers: int, time_step: float, times_real_time: float, single: bool) -> Roofline:
-    """Limits in the wires' precision, and the kernel that runs ``times_real_time``.
+def measure(
+    nodes: int, droppers: int, time_step: float, times_real_time: float, single: bool
+) -> dict[str, float]:
+    """Limits of one core in the wires' precision, and the kernel that runs ``times_real_time`` beside them.
 
     nodes: of both wires together. time_step: s.
     """
@@ -119,10 +110,10 @@ def measure(nodes: int, droppers: int, time_step: float, times_real_time: float,
     flops = FLOPS_PER_NODE * nodes + FLOPS_PER_DROPPER * droppers
     moved = NUMBERS_PER_NODE * nodes * a.itemsize
     steps = times_real_time / time_step  # per second
-    return Roofline(
-        multiply_add=peak / 1e9,
-        cache=cache / 1e9,
-        arithmetic=flops * steps / 1e9,
-        traffic=moved * steps / 1e9,
-        bound=time_step / max(flops / peak, moved / cache),
-    )
+    return {
+        "multiply_add": peak / 1e9,  # measured peak of multiply and add in registers (GFLOP/s)
+        "cache": cache / 1e9,  # measured traffic of a triad in the nearest cache (GB/s)
+        "arithmetic": flops * steps / 1e9,  # of the kernel (GFLOP/s)
+        "traffic": moved * steps / 1e9,  # of its leapfrog along the wires (GB/s)
+        "bound": time_step / max(flops / peak, moved / cache),  # times real time at the nearer of both limits
+    }

@@ -7,7 +7,6 @@ import math
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -71,7 +70,7 @@ LANES = {
 """Lanes of vectors measured; wider ones of a line with wires gain nothing and take minutes."""
 SHARED = (("Pantograph-v0", 64), ("Pantograph-v0", 256), ("PantographStiffness-v0", 4096))
 """Vector environments, and their lanes, whose speed is measured on one core and more."""
-LEAST = 0.3
+MINIMUM = 0.3
 """Minimum time (s) of a repeat: as many whole episodes as that takes."""
 BLOCK = 0.05
 """Time (s) after which an environment and its yardstick take turns: a machine's clock may change."""
@@ -103,7 +102,7 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> Measured:
         "machine": roofline.describe(),
         "repeats": repeats,
         "plants": plants,
-        "roofline": asdict(limits),
+        "roofline": limits,
         "scaling": scaling | {"cores": by_cores(repeats, report)},
         "environments": environments,
     }
@@ -244,7 +243,7 @@ def _in_turns(name: str, repeats: int, lanes: int | None, settings: dict[str, An
     block = max(1, round(BLOCK / _time(ours, 20) * 20))  # after twenty steps to warm up
     other = max(1, round(BLOCK / _time(theirs, 20) * 20))
     steps = env.spec.max_episode_steps + 1  # in which every lane ends an episode
-    blocks = max(-(-steps // block), round(LEAST / BLOCK))
+    blocks = max(-(-steps // block), round(MINIMUM / BLOCK))
     rates, references = [], []
     for _ in range(repeats):
         times = [(_time(ours, block), _time(theirs, other)) for _ in range(blocks)]
