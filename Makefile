@@ -42,6 +42,9 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Bytecode is kept whatever the environment says: tests start more than a hundred processes.
+test proofs: export PYTHONDONTWRITEBYTECODE =
+
 test: $(READY) lint
 	$(BIN)/python -m tests.known_kernels
 	$(BIN)/pytest -n auto --dist loadfile -m 'not slow and not study'

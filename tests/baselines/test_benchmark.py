@@ -370,7 +370,8 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> No
     ("source", "speeds_kmh", "spans"),
     [
         ("family:high-speed", (260.0, 350.0), (10, 19)),
-        ("section:main-line", (160.0,), (10, 28)),  # the shortest has 36, and its end is felt in 8 of them
+        # The shortest has 36 spans, and its end is felt in 8 of them.
+        pytest.param("section:main-line", (160.0,), (10, 28), marks=pytest.mark.slow),
     ],
 )
 def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, spans):

@@ -127,6 +127,7 @@ def test_long_dropper_lowers_and_short_one_raises_the_wire():
     assert heights[0] == pytest.approx(-heights[1]) == pytest.approx(-8.6e-3, abs=0.2e-3)
 
 
+@pytest.mark.slow
 def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     """Load the wire below it: the kernel comes to rest where finite elements put it."""
     data = load_catenary(BENCHMARK)
@@ -165,6 +166,7 @@ def test_dropper_far_too_long_is_as_good_as_broken():
     assert (broken.dropper_force[:, 3 * 9 + 4] == 0).all()
 
 
+@pytest.mark.slow
 def test_contact_force_over_a_broken_dropper_agrees_with_finite_elements(monkeypatch):
     """Its finite elements, less the dropper, about their own static state without it."""
     data, condition = load_catenary(EN50318), LineCondition(broken_droppers=[(4, 5)])

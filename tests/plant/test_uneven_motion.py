@@ -26,6 +26,7 @@ def test_every_section_agrees_with_fine_finite_elements(name):
     agrees(SECTIONS[name], element=0.25)
 
 
+@pytest.mark.slow
 def test_both_codes_are_printed_and_drawn_section_by_section(monkeypatch, tmp_path, capsys):
     line = load_catenary("en50318-2002").model_copy(update={"spans": 5})
     short = Section(line, load_pantograph("en50318-2002"), 250.0, spans=(2, 3))

@@ -63,6 +63,7 @@ def test_first_run_is_the_same_through_gymnasium(run, tmp_path):
     np.testing.assert_array_equal(again.contact_force, once.contact_force)
 
 
+@pytest.mark.slow
 def test_own_controller_is_ranked_and_pd_is_not(run):
     example, told, said = run("own_controller")
     assert told in said
@@ -132,6 +133,7 @@ def test_sac_example_is_better_than_passive(monkeypatch, tmp_path):
     assert max(cell.change for cell in own) < 0
 
 
+@pytest.mark.slow
 def test_ppo_example_earns_more_than_at_first(monkeypatch):
     pytest.importorskip("torch")
     example = load("ppo_cleanrl", monkeypatch)
@@ -190,6 +192,7 @@ def test_ppo_example_is_better_than_passive(monkeypatch):
     assert abs(mean) < 1.5
 
 
+@pytest.mark.slow
 def test_notebook_shows_what_it_prints_now():
     """Without the part that learns, which a slow test runs."""
     stored = nbformat.read(LEARNING, as_version=4)
@@ -208,6 +211,7 @@ def test_notebook_learns_as_it_shows():
     )
 
 
+@pytest.mark.slow
 def test_notebook_films_an_agent_on_a_line_that_nobody_has_seen(tmp_path):
     stored = nbformat.read(UNSEEN_LINE, as_version=4)
     again = executed(UNSEEN_LINE, before="## The film", folder=tmp_path)
