@@ -88,7 +88,8 @@ urls:
 	@test -n "$(URL)" || { echo "Name the address: make urls URL=https://..."; exit 1; }
 	sed -i 's|$(PLACEHOLDER)|$(URL)|; s|^# Placeholders:.*||' pyproject.toml CITATION.cff examples/*.ipynb
 
-# Slow proofs: more lines against finite elements, longer trainings, random environments.
+# Slow proofs: more lines against finite elements, longer trainings, random environments, and, from the command line only,
+# COMMANDS=, NONSENSE= and FILES= of command lines, lines and damaged files.
 CASES := 2000
 proofs: $(READY)
 	CASES=$(CASES) $(BIN)/pytest -n auto --dist worksteal -m slow

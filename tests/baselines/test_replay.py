@@ -186,12 +186,16 @@ def checked(folder, *arguments):
     return CliRunner().invoke(replay_command.submission, [*words, *arguments], env={"COLUMNS": "200"})
 
 
-def test_the_example_would_be_ranked_and_one_that_presses_not(folder, result):
+def test_the_example_would_be_ranked(folder, result):
     done = checked(folder, "--against", str(result))
     assert done.exit_code == 0, done.output
     for words in ("Damped frame by A. Author (MIT)", "It requires: numpy>=2.0", "Learnt from: nothing"):
         assert words in done.stdout
     assert "It would be ranked, at place 2 of " in done.stdout
+
+
+@pytest.mark.slow
+def test_one_that_presses_would_not(folder):
     (folder / "policy.py").write_text(
         "import numpy as np\nclass DampedFrame:\n    def reset(self, context): pass\n"
         "    def act(self, observation): return np.full(1, 0.2)\n"
