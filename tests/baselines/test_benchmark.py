@@ -173,6 +173,9 @@ def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], wo
     with pytest.raises(InputError) as caught:
         benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
     assert words in str(caught.value)
+
+
+def test_no_workers_are_refused() -> None:
     with pytest.raises(InputError, match="workers must be 1 or more"):
         benchmark.run(settings(), workers=0)
 

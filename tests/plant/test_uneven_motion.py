@@ -14,7 +14,7 @@ from ..marks import some_in_proofs
 
 SECTIONS = sections()
 IN_PROOFS = ("both", "stitched-330", "overlap-2002")
-"""One of each kind, and "both" is "mixed" under "bridge"; others are compared in `make studies`, for all of them take ten minutes."""
+"""One of each kind, and "both" is "mixed" under "bridge". The others are compared in `make studies`."""
 
 
 def test_contact_force_and_uplift_on_unlike_spans_are_those_of_finite_elements():
