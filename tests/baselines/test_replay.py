@@ -128,6 +128,7 @@ def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
         replay(alone)
 
 
+@pytest.mark.slow
 def test_a_policy_that_learns_from_earlier_passes_is_not_ranked(tmp_path):
     """Through a file that its process leaves behind."""
     notes, path = tmp_path / "notes", tmp_path / "mine.py"

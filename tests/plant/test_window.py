@@ -20,7 +20,7 @@ from panto_env.plant.catenary.schema import CLEAR
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.studies.en50318 import lines as windows
 
-from .test_flexible import travel
+from .test_flexible import PRECISIONS, travel
 
 STEP = 2e-3
 
@@ -35,7 +35,7 @@ def swinging(line, wire):
     return total
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
+@PRECISIONS
 def test_ends_let_waves_out(precision):
     """A pulse on bare wires leaves a window in the middle of a line; what is reflected is told."""
     line = load_catenary("en50318-2002")

@@ -41,6 +41,7 @@ def run(monkeypatch, capsys):
     return of
 
 
+@pytest.mark.slow
 def test_a_rig_over_udp_feels_the_line_that_another_process_computes(monkeypatch):
     """Its pantograph and cylinder are written once more there: the force is that under the line itself."""
     example = load("rig_over_udp", monkeypatch)
@@ -85,6 +86,7 @@ def test_line_from_toml_keeps_the_standards(run, tmp_path):
     assert example.one_pass().catenary == "my_line"
 
 
+@pytest.mark.slow
 def test_design_sweep_finds_the_lightest_head_and_the_tightest_wire(run, tmp_path):
     example, told, said = run("design_sweep", "--plot", tmp_path / "design.png")
     assert len(told.splitlines()) == 13
@@ -105,6 +107,7 @@ def test_identify_from_csv_finds_the_truth(run, tmp_path):
         assert fit.parameters[name] == pytest.approx(example.TRUTH[name], rel=0.01)
 
 
+@pytest.mark.slow
 def test_sac_example_trains_and_acts(monkeypatch, tmp_path):
     """A second of it: the critics have learnt, and what it would do is a policy of the benchmark."""
     torch = pytest.importorskip("torch")

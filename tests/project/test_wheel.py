@@ -177,6 +177,7 @@ def test_what_is_published_names_authors_and_addresses_that_a_release_fills_in(t
     assert filled["Issues"] == f"{own}/issues"
 
 
+@pytest.mark.slow
 def test_the_wheel_says_for_whom_it_is_and_what_it_needs(wheel):
     with zipfile.ZipFile(wheel) as packed:
         (name,) = (each for each in packed.namelist() if each.endswith(".dist-info/METADATA"))

@@ -224,6 +224,7 @@ def test_a_window_shows_each_step_and_closes(monkeypatch):
     assert not pygame.display.get_init()
 
 
+@pytest.mark.slow
 def test_record_video_writes_an_episode(tmp_path):
     pytest.importorskip("moviepy")
     env = gymnasium.make(
