@@ -148,7 +148,7 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
         load[4 * node + 2] = force
         change, tension = static_by_finite_elements(system, data, condition, load)
         plant.model.settle(0, DrawnLine(condition), 0.0)
-        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights)
+        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights, np.zeros(3))
         static = float(system.static[node, 0] + change[4 * node + 2])
         assert heights[-1] == pytest.approx(static, abs=2e-4)
         line = plant.model.line
