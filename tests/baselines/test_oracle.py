@@ -367,7 +367,7 @@ def called(*arguments: str) -> Any:
 
 
 def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(search, "descend", partial(descend, iterations=1))
+    monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
     file, picture = tmp_path / "o.json", tmp_path / "o.png"
     result = called(
         "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
