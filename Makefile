@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo benchmark cards test lint wheel docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
+.PHONY: demo benchmark cards test kernels lint wheel docs notebook proofs accuracy studies coverage mutants same nonsense bounds fuzz floors pythons ptx ray rllib libraries urls clean
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
@@ -42,9 +42,16 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: $(READY) lint
-	$(BIN)/python -m tests.known_kernels
+# Bytecode is kept whatever the environment says: tests start more than a hundred processes.
+test proofs: export PYTHONDONTWRITEBYTECODE =
+
+test: $(READY)
+	$(MAKE) -j 2 lint kernels
 	$(BIN)/pytest -n auto --dist loadfile -m 'not slow and not study'
+
+# The usual kernels, beside the lint, which leaves a core idle.
+kernels: $(READY)
+	$(BIN)/python -m tests.known_kernels
 
 # A wheel that brings the usual kernels, compiled for x86-64-v3: the first step takes seconds. One version of Python each.
 wheel: $(READY)
@@ -85,7 +92,8 @@ urls:
 	@test -n "$(URL)" || { echo "Name the address: make urls URL=https://..."; exit 1; }
 	sed -i 's|$(PLACEHOLDER)|$(URL)|; s|^# Placeholders:.*||' pyproject.toml CITATION.cff examples/*.ipynb
 
-# Slow proofs: more lines against finite elements, longer trainings, random environments.
+# Slow proofs: more lines against finite elements, longer trainings, random environments, and, from the command line only,
+# COMMANDS=, NONSENSE= and FILES= of command lines, lines and damaged files.
 CASES := 2000
 proofs: $(READY)
 	CASES=$(CASES) $(BIN)/pytest -n auto --dist worksteal -m slow

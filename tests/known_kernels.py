@@ -51,8 +51,8 @@ def compile_all(statements: tuple[str, ...], environment: dict[str, str]) -> Non
         list(processes.map(run, statements))
 
 
-def build_wheel(folder: Path) -> None:
-    """Build a wheel of the packed sources with the usual kernels."""
+def build_wheel(folder: Path, statements: tuple[str, ...] = USUAL) -> None:
+    """Build a wheel of the packed sources with the kernels of these statements."""
     own = [sys.executable, "-m", "build", "--no-isolation"]
     with tempfile.TemporaryDirectory() as made:
         subprocess.run([*own, "--sdist", "--outdir", made, ROOT], check=True, stdout=subprocess.DEVNULL)
@@ -61,7 +61,9 @@ def build_wheel(folder: Path) -> None:
             sources.extractall(made, filter="data")
         unpacked = packed.with_name(packed.name.removesuffix(".tar.gz"))
         cache = unpacked / BROUGHT.relative_to(ROOT)
-        compile_all(USUAL, {"PANTO_CACHE_DIR": str(cache), "NUMBA_CPU_NAME": CLASS, "NUMBA_CPU_FEATURES": ""})
+        compile_all(
+            statements, {"PANTO_CACHE_DIR": str(cache), "NUMBA_CPU_NAME": CLASS, "NUMBA_CPU_FEATURES": ""}
+        )
         for each in (*cache.glob("*/*.lock"), *cache.glob("hashes/*")):
             each.unlink()
         subprocess.run([*own, "--wheel", "--outdir", folder, unpacked], check=True, stdout=subprocess.DEVNULL)

@@ -1,6 +1,12 @@
-"""Which of many long cases are proofs, and which are studies."""
+"""Which of many cases are tested each time, which are proofs, and which are studies."""
 
 import pytest
+
+
+def some_at_once(names, quick):
+    """Parameters: cases by name, of which some are run by `make test`, and the others by `make proofs`."""
+    assert set(quick) <= set(names)
+    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in names]
 
 
 def some_in_proofs(names, proofs):

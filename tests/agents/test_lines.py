@@ -22,6 +22,8 @@ from panto_env import InputError, simulate
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
 
+from ..marks import some_at_once
+
 ENVIRONMENT = {
     "id": "Pantograph-v0",
     "catenary": "family:high-speed",
@@ -48,7 +50,9 @@ def training(**changes):
     return parse_training(table | changes, "test")
 
 
-@pytest.mark.parametrize("source", ["family:high-speed", "section:fast-line"])
+@pytest.mark.parametrize(
+    "source", some_at_once(["family:high-speed", "section:fast-line"], ["family:high-speed"])
+)
 def test_a_training_gives_a_policy_for_lines_that_it_has_not_met(source, tmp_path):
     own = training(environment=ENVIRONMENT | {"catenary": source})
     folder = train.train(own, tmp_path / "run", progress=False)

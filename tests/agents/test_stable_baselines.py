@@ -155,10 +155,19 @@ def base_of(env):
     return (env.envs[0] if "envs" in vars(env) else env.env).unwrapped
 
 
+FEW = (
+    *("normalised", "stacked on zeros, flat", "stacked twice, then normalised", "VecNormalize on stacks"),
+    *("other actions", "vector"),
+)
+
+
 @pytest.mark.parametrize(
     ("kind", "chain"),
-    [(PPO, chain) for chain in CHAINS]
-    + [(SAC, chain) for chain in ("none", "other actions", "VecNormalize on stacks", "vector")],
+    [pytest.param(PPO, chain, marks=() if chain in FEW else pytest.mark.slow) for chain in CHAINS]
+    + [
+        pytest.param(SAC, chain, marks=() if chain == "vector" else pytest.mark.slow)
+        for chain in ("none", "other actions", "VecNormalize on stacks", "vector")
+    ],
 )
 def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
     more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}

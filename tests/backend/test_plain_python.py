@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import gymnasium
@@ -18,6 +18,8 @@ import panto_env
 from panto_env.backend import JIT
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
+
+from ..marks import some_at_once
 
 pytestmark = pytest.mark.plain
 
@@ -179,6 +181,10 @@ RUNS = {
     "a rig": rig_run,
     "several lanes": several_lanes,
 }
+LONG = ("a train", "a rig", "stitch wires and an overlap") if JIT else ()
+"""Runs whose kernels nothing else has, and which take half a minute to compile: for `make proofs`."""
+USUAL = tuple(name for name in RUNS if name not in LONG)
+CHOSEN = pytest.mark.parametrize("name", some_at_once(RUNS, USUAL))
 STORED = Path(__file__).with_name("kernel_results.json")
 
 
@@ -189,29 +195,26 @@ def digest(rows):
     return (weights @ values / weights.sum(axis=1)).tolist()
 
 
-def in_the_other_way():
-    """All runs, compiled where this process runs plain Python and the other way round."""
-    code = f"import json; from {__name__} import RUNS; print(json.dumps([run() for run in RUNS.values()]))"
+@cache
+def in_the_other_way(names):
+    """Runs by name, compiled where this process runs plain Python and the other way round."""
+    code = f"import json; from {__name__} import RUNS; print(json.dumps([RUNS[name]() for name in {names}]))"
     environment = os.environ | {"NUMBA_DISABLE_JIT": str(int(JIT))}
     root = Path(__file__).parents[2]
     result = subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
-    return dict(zip(RUNS, json.loads(result.stdout), strict=True))
+    return dict(zip(names, json.loads(result.stdout), strict=True))
 
 
-@pytest.fixture(scope="module")
-def others():
-    return in_the_other_way()
-
-
-@pytest.mark.parametrize("name", RUNS)
-def test_plain_python_and_compiled_kernels_agree(name, others):
+@CHOSEN
+def test_plain_python_and_compiled_kernels_agree(name):
+    others = in_the_other_way(LONG if name in LONG else USUAL)
     for ours, theirs in zip(RUNS[name](), others[name], strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", RUNS)
+@CHOSEN
 def test_kernels_compute_what_they_did(name):
     """Physics has tests of its own; this one notices each change of a result, wanted or not."""
     assert digest(RUNS[name]()) == pytest.approx(json.loads(STORED.read_text())[name], rel=1e-5)

@@ -201,7 +201,7 @@ def test_what_is_wrong_with_a_policy_s_file_is_said(own, name, message):
     [
         ("Own:gain=-1", r"Own:gain=-1' failed in act, at .*own.py:9: ValueError: the gain is negative"),
         ("Lost", r"Lost' failed in reset: The observation has no entry 'contact farce': did you mean"),
-        *((f"Odd:gain={kind}", "its action must be finite numbers") for kind in ("complex", "text", "word")),
+        ("Odd:gain=complex", "its action must be finite numbers"),
     ],
 )
 def test_a_policy_that_fails_is_named_alike_wherever_it_runs(own, name, message):
@@ -211,6 +211,12 @@ def test_a_policy_that_fails_is_named_alike_wherever_it_runs(own, name, message)
     given = {"policies": [f"{own}:{name}"], "lines": [line], "seeds": 1}
     with pytest.raises(InputError, match=message):
         benchmark.run(parse(BenchmarkSettings, given, "the benchmark"), workers=1)
+
+
+def test_text_is_no_action(own):
+    for kind in ("text", "word"):
+        with pytest.raises(InputError, match="its action must be finite numbers"):
+            simulate(**QUICK, policy=f"{own}:Odd:gain={kind}", distance=50.0)
 
 
 # --- commands ---------------------------------------------------------------------------------------

@@ -172,6 +172,9 @@ def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], wo
     with pytest.raises(InputError) as caught:
         benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
     assert words in str(caught.value)
+
+
+def test_no_workers_are_refused() -> None:
     with pytest.raises(InputError, match="workers must be 1 or more"):
         benchmark.run(settings(), workers=0)
 
@@ -369,7 +372,8 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> No
     ("source", "speeds_kmh", "spans"),
     [
         ("family:high-speed", (260.0, 350.0), (10, 19)),
-        ("section:main-line", (160.0,), (10, 28)),  # the shortest has 36, and its end is felt in 8 of them
+        # The shortest has 36 spans, and its end is felt in 8 of them.
+        pytest.param("section:main-line", (160.0,), (10, 28), marks=pytest.mark.slow),
     ],
 )
 def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, spans):

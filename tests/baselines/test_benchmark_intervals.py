@@ -118,7 +118,7 @@ def test_a_share_s_interval_covers_that_trainings_differ():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("seeds", "speeds"), [(8, 1), (16, 5)])
+@pytest.mark.parametrize(("seeds", "speeds"), [(8, 1), pytest.param(16, 5, marks=pytest.mark.slow)])
 def test_intervals_cover_the_truth_in_95_percent_of_draws(kind, seeds, speeds):
     assert 93 <= coverage("mean", kind, seeds, speeds, repetitions=2500 if speeds == 1 else 1200) <= 97
 
@@ -128,6 +128,7 @@ def test_intervals_of_shares_cover_the_truth_in_95_percent_of_draws(kind):
     assert 93 <= coverage("share of 0.7", kind, 8, 5, repetitions=2500) <= 98
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_method_covers_the_truth():
     assert 93 <= coverage("mean of 5 trainings", "normal", 16, 5, repetitions=500) <= 97
 

@@ -396,6 +396,7 @@ def test_without_minari_its_extra_is_named(monkeypatch, tmp_path):
         make_episodes.make_episodes(settings(), tmp_path, workers=1)
 
 
+@pytest.mark.slow
 def test_kept_parts_count_as_done_and_damaged_ones_are_made_again(tmp_path):
     told, path = [], tmp_path / "0.json"
     parts.make_parts({path: partial(_part, "whole")}, read_checked, workers=1)

@@ -32,6 +32,7 @@ from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.state import Row
 
 from ..finite_element.sections import line_of
+from ..marks import some_at_once
 from ..pages import check_page, tables_of
 
 SHORT: dict[str, Any] = {"line_condition": "smooth", "actuator": "realistic", "speed_kmh": 300.0}
@@ -112,14 +113,18 @@ def test_limits_are_those_of_the_real_actuator():
 # --- the response --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "given",
-    [SHORT | {"actuator": "ideal"}, OVERLAP, TRAILING | {"actuator": "ideal"}, LINEAR],
-    ids=["flexible", "overlap", "trailing", "massless"],
-)
-def test_response_is_the_difference_of_whole_runs(given: dict[str, Any], monkeypatch: pytest.MonkeyPatch):
+RESPONSES = {
+    "flexible": SHORT | {"actuator": "ideal"},
+    "overlap": OVERLAP,
+    "trailing": TRAILING | {"actuator": "ideal"},
+    "massless": LINEAR,
+}
+
+
+@pytest.mark.parametrize("name", some_at_once(RESPONSES, ["flexible"]))
+def test_response_is_the_difference_of_whole_runs(name: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(problem, "MEMORY", 100.0)
-    asked = Problem(given, seed=3, spans=SPANS)
+    asked = Problem(RESPONSES[name], seed=3, spans=SPANS)
     knots = asked.knots.within(noise(asked))
     response = asked.response(knots)
     some = [0, 1, asked.count // 2, asked.count - 2]
@@ -218,6 +223,7 @@ def test_an_oracle_is_found_where_wires_change():
     assert ((second > 0) & (second < total)).any()
 
 
+@pytest.mark.slow
 def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
     asked = Problem(TRAILING, seed=3, spans=SPANS)
     passive = simulate(**TRAILING, seed=3).train
@@ -361,7 +367,7 @@ def called(*arguments: str) -> Any:
 
 
 def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(search, "descend", partial(descend, iterations=3))
+    monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
     file, picture = tmp_path / "o.json", tmp_path / "o.png"
     result = called(
         "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
@@ -388,6 +394,7 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     assert stored.read(file)["cells"][0] == cell
 
 
+@pytest.mark.slow
 def test_a_line_of_each_seed_is_searched_by_itself(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
     """As built, under a pantograph of each seed, at a drifting speed: as a track of the benchmark is."""
     monkeypatch.setattr(search, "descend", partial(descend, iterations=2))

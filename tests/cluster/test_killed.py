@@ -129,6 +129,7 @@ def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
 
 
 class TestTrainings:
+    @pytest.mark.slow
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
         planned = {tmp_path / "one": settings(), tmp_path / "other": settings(seed=2)}
         train.train(settings(), tmp_path / "one", progress=False)

@@ -290,7 +290,7 @@ TRAIN = {
 }
 
 
-@pytest.mark.parametrize("device", [None, "cpu"])
+@pytest.mark.parametrize("device", [None, pytest.param("cpu", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("mask", [[False, True, False, False], [True, True, True, False]])
 def test_a_reset_mask_names_whole_trains(device, mask):
     """Parts of trains ended in IndexErrors, or moved one pantograph of two."""

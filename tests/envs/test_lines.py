@@ -24,7 +24,10 @@ FAMILY = {"catenary": "family:high-speed"} | SHORT
 SECTION = {"catenary": "section:main-line", "speed_kmh": (120, 160)} | SHORT | {"distance": 12.5}
 LIST = {"catenary": ["re250", "beijing-tianjin", "ln2"], "speed_kmh": (200, 300)} | SHORT
 
-drawn = pytest.mark.parametrize("settings", [FAMILY, SECTION], ids=["family", "section"])
+drawn = pytest.mark.parametrize(
+    "settings",
+    [pytest.param(FAMILY, id="family"), pytest.param(SECTION, id="section", marks=pytest.mark.slow)],
+)
 
 
 def make(**settings):
@@ -145,7 +148,7 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
 # --- lanes -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [FAMILY, SECTION, LIST])
+@pytest.mark.parametrize("settings", [FAMILY, SECTION, LIST], ids=["family", "section", "list"])
 def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     ran = check_lanes_are_singles("Pantograph-v0", settings, steps=70)
     assert ran.ends > 3

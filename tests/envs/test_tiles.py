@@ -40,7 +40,8 @@ def one_after_another(columns):
     return step
 
 
-@pytest.mark.parametrize("case", ["stiffness", pytest.param("train", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["stiffness", "train"])
 def test_tiles_give_what_arrays_give(case, monkeypatch):
     monkeypatch.setattr(on_device, "_tile", lambda lanes, device: TILE)
     monkeypatch.setattr(on_device, "_bound", one_after_another)

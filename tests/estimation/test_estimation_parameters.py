@@ -142,6 +142,7 @@ def test_unknown_parameters_are_refused(motion):
         estimate_parameters(motion, TRUE, PLAIN, ())
 
 
+@pytest.mark.slow
 def test_maximum_likelihood_finds_the_intensities_that_made_the_record():
     told = {"displacement_noise": 5e-5, "frame_intensity": 0.5}
     made = PLAIN.model_copy(update=told | {"force_model": RandomWalk(intensity=400.0)})

@@ -129,6 +129,7 @@ def test_two_coincident_half_lines_are_one_line():
     assert (whole.dropper_tension == 0).any()
 
 
+@pytest.mark.slow
 def test_a_wire_high_above_is_none_and_the_second_is_none_until_it_is_touched():
     line = load_catenary("re330")
     (rest,) = at_rest(line, 4, 1.0)
@@ -186,6 +187,7 @@ def test_a_slow_strip_is_shared_as_springs_in_equilibrium_share_it():
     assert shared(middle - 15.0) == pytest.approx(shared(middle + 15.0)[::-1], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_energy_is_balanced_through_an_overlap():
     section = sections()["overlap-330"]
     line = overlapping("re330", 6, 2, [0.1, 0.5])
@@ -198,9 +200,8 @@ def test_energy_is_balanced_through_an_overlap():
 OVERLAPS = [name for name, section in sections().items() if section.line.overlaps]
 
 
-@pytest.mark.parametrize(
-    "name", [OVERLAPS[0], *(pytest.param(name, marks=pytest.mark.slow) for name in OVERLAPS[1:])]
-)
+@pytest.mark.parametrize("name", OVERLAPS)
+@pytest.mark.slow
 def test_the_force_passes_from_one_wire_to_the_other_in_the_middle_span(name, capsys):
     section = sections()[name]
     (overlap,) = section.line.overlaps

@@ -6,7 +6,6 @@ import pytest
 from panto_env import simulate
 from panto_env.plant.state import Row
 
-from ..marks import some_in_proofs
 from .figures import figures
 from .sections import sections
 
@@ -46,7 +45,8 @@ def test_wires_are_touched_at_the_same_places_by_the_same_forces(name):
 ROWS = Row.STEP, Row.CONTACT_FORCE, Row.SECOND_FORCE
 
 
-@pytest.mark.parametrize("name", some_in_proofs(sections(), ["stitched-330"]))
+@pytest.mark.study
+@pytest.mark.parametrize("name", sections())
 def test_half_of_element_and_step_change_the_figures_little(name):
     """Extremes by a share of the mean force: the minimum converges last."""
     section = sections()[name]

@@ -128,6 +128,7 @@ def test_a_stitch_wire_alone_has_a_string_s_frequency_and_mass():
     assert upper.stiffness @ level == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_stitch_wire_of_no_tension_without_droppers_is_none():
     """At rest and in motion. Its clamps are at droppers, which then hang from the messenger."""
     usual = load_catenary("re330")

@@ -60,6 +60,7 @@ def test_unequal_parts_side_by_side_are_one_pantograph(system):
     assert (one.contact_force == 0).any()
 
 
+@pytest.mark.slow
 def test_a_collector_that_waits_is_at_rest_and_then_runs_as_if_it_had_been_the_first(system):
     """720 steps of 69 mm are 50 m."""
     first, later = ride(system, DSA, 250.0, 1e-3), ride_together(system, [Collector(DSA, 50.0)], 250.0, 1e-3)
@@ -73,6 +74,7 @@ def test_a_collector_that_waits_is_at_rest_and_then_runs_as_if_it_had_been_the_f
         np.testing.assert_allclose(getattr(later, key)[720:], getattr(first, key)[:steps], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_first_collector_feels_the_second_only_once_that_is_on_the_line(system):
     alone = ride(system, REFERENCE, 250.0, 1e-3)
     first, second = ride_together(system, [Collector(REFERENCE), Collector(DSA, 50.0)], 250.0, 1e-3)
@@ -102,7 +104,7 @@ def test_contact_force_and_uplift_of_two_pantographs_are_those_of_finite_element
     agrees(SHORT)
 
 
-@pytest.mark.parametrize("name", some_in_proofs(CASES, ["four-250", "unlike-330"]))
+@pytest.mark.parametrize("name", some_in_proofs(CASES, ["unlike-330"]))
 def test_every_train_agrees_with_finite_elements(name):
     agrees(CASES[name])
 
@@ -115,6 +117,7 @@ def test_half_of_element_and_step_change_the_figures_of_trains_little(name):
     near(coarse, fine, case, 0.01)
 
 
+@pytest.mark.slow
 def test_both_codes_are_printed_and_drawn_train_by_train(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(comparison, "cases", lambda: {"short": SHORT})
     monkeypatch.setenv("COLUMNS", "170")

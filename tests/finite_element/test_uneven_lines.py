@@ -5,6 +5,7 @@ import pytest
 
 from panto_env.catalog import load_catenary, load_pantograph
 
+from ..marks import some_at_once
 from .contacts import Collector
 from .energy import balance
 from .rest import at_rest
@@ -15,7 +16,10 @@ from .system import build
 SECTIONS = sections()
 
 
-@pytest.mark.parametrize("name", ["en50318-2002", "benchmark-2015", "re330, stitched"])
+EQUAL = ("en50318-2002", "benchmark-2015", "re330, stitched")
+
+
+@pytest.mark.parametrize("name", some_at_once(EQUAL, ["en50318-2002"]))
 def test_equal_spans_of_a_sequence_move_as_one_span_repeated(name):
     """The shape of a whole line, with half a stitch wire at its ends, and of a periodic span."""
     spans, changes, make, pantograph = 7, {}, line_of, name
@@ -106,12 +110,14 @@ def climbing():
 FORCE_AND_HEAD = ("contact_force", "head")
 
 
+@pytest.mark.slow
 def test_uphill_the_damping_to_ground_takes_c_v_g(climbing):
     """dsa380: 70 N s/m, hardly a spring."""
     force, _ = climbing(load_pantograph("dsa380"), 4, 5)
     assert force == pytest.approx(-70.0 * 250 / 3.6 * 0.12 / 60, rel=0.02)  # -9.7 N
 
 
+@pytest.mark.slow
 def test_high_up_the_spring_to_ground_takes_k_h(climbing):
     """en50318-2002: 50 N/m. With less force the head stands a little lower, and the frame nearer to it."""
     pantograph = load_pantograph("en50318-2002")

@@ -80,6 +80,7 @@ def test_it_settles(fitted, steps):
     assert steps[-1][1] < 1e-2 * steps[0][1]
 
 
+@pytest.mark.slow
 def test_it_goes_on_from_where_it_was(fitted, steps, record, design, pantograph):
     """From its end, no step is left to do."""
     begin, more = steps[-1][0], []
@@ -92,6 +93,7 @@ def test_it_goes_on_from_where_it_was(fitted, steps, record, design, pantograph)
     assert np.median(away / np.sqrt(np.diag(fitted.solution.covariance))) < 0.5
 
 
+@pytest.mark.slow
 def test_droppers_known_to_be_right_stay(record, design, pantograph):
     """A tolerance is a prior: with hardly any, droppers do not move, and what they did is left over."""
     rigid = fit([record], design, pantograph, free=("tensions", "droppers"), tolerances={"droppers": 1e-6})
@@ -116,6 +118,7 @@ def test_tables_and_picture(fitted):
 
 
 @pytest.mark.skipif(not CAN_CHOOSE_CORES, reason="a process cannot choose its cores here")
+@pytest.mark.slow
 def test_a_fit_does_not_depend_on_the_number_of_cores(record, design, pantograph, coarse):
     """Neither shares of the passes nor sums of the linear algebra do: steps would magnify their rounding."""
     with on_cores(1), threadpool_limits(1, "blas"):

@@ -93,6 +93,7 @@ def test_records_of_several_tension_lengths_are_noted(pantograph):
         assert any("2 tension lengths" in note for note in notes) is found
 
 
+@pytest.mark.slow
 def test_derivatives_of_all_droppers_add_up(exact, derivatives):
     """A smooth shift of all droppers, which a force hardly shows, is the sum of columns that nearly cancel.
 
@@ -115,6 +116,7 @@ def test_derivatives_of_all_droppers_add_up(exact, derivatives):
 @pytest.mark.parametrize(
     ("kind", "which", "size"), [("tensions", -1, 1e-5), ("supports", 10, 1e-6), ("unevenness", -2, 1e-6)]
 )
+@pytest.mark.slow
 def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
     """At the last unevenness, -1, a dropper is just about to slacken: there both sides differ by 6 %."""
     values, (part,) = exact.fitting.values, exact.fitting.parts
@@ -126,6 +128,7 @@ def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
 
 
 @pytest.mark.parametrize("which", [-2, -1])
+@pytest.mark.slow
 def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     """What is left falls by the derivative times either, with the static force that follows the mean."""
     fitting = ready.fitting

@@ -44,6 +44,7 @@ def test_no_dropper_jumps_where_that_makes_nothing_better(ready, true):
     assert ready.fitting._jumped(ended(ready.fitting, true), lambda doing: None) is None
 
 
+@pytest.mark.slow
 def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     """Its whole return, alone, would make it worse."""
     fitting = ready.fitting

@@ -103,6 +103,7 @@ def test_both_wires_together_carry_the_ice_between_droppers():
     assert (now - was)[0] - (now - was)[1] == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_under_a_train_it_is_the_finite_elements_line(monkeypatch):
     ice, mass = 0.4, load_catenary(EN50318).contact_wire.mass
 

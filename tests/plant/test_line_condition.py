@@ -129,6 +129,7 @@ def test_long_dropper_lowers_and_short_one_raises_the_wire():
     assert heights[0] == pytest.approx(-heights[1]) == pytest.approx(-8.6e-3, abs=0.2e-3)
 
 
+@pytest.mark.slow
 def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
     """Load the wire below it: the kernel comes to rest where finite elements put it."""
     data = load_catenary(BENCHMARK)
@@ -149,7 +150,7 @@ def test_dropper_that_is_slack_at_rest_pulls_once_its_gap_is_taken_up():
         load[4 * node + 2] = force
         change, tension = static_by_finite_elements(system, data, condition, load)
         plant.model.settle(0, DrawnLine(condition), 0.0)
-        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights)
+        travel(plant.model.line, plant.model.wire, at, 0.0, force, heights, np.zeros(3))
         static = float(system.static[node, 0] + change[4 * node + 2])
         assert heights[-1] == pytest.approx(static, abs=2e-4)
         line = plant.model.line
@@ -167,6 +168,7 @@ def test_dropper_far_too_long_is_as_good_as_broken():
     assert (broken.dropper_force[:, 3 * 9 + 4] == 0).all()
 
 
+@pytest.mark.slow
 def test_contact_force_over_a_broken_dropper_agrees_with_finite_elements(monkeypatch):
     """Its finite elements, less the dropper, about their own static state without it."""
     data, condition = load_catenary(EN50318), LineCondition(broken_droppers=[(4, 5)])

@@ -242,6 +242,7 @@ def test_elasticity_of_an_overlap_is_that_of_the_wire_in_use():
 
 
 @PULSES
+@pytest.mark.slow
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     """A pulse on all wires runs into the anchors, and comes back."""
     data = undamped(line_of([{"first_span": 4, "rises": RISES}], 10))

@@ -108,6 +108,7 @@ def agrees(line, seed, element, **condition):
     return a
 
 
+@pytest.mark.slow
 def test_finite_elements_agree_on_what_the_mean_wind_damps():
     damped = agrees(ALIKE, 0, 1.0, side_wind=WIND, turbulence=0.0)
     still = figures(

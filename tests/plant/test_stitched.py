@@ -147,6 +147,7 @@ def energy(line, wire, data, step):
 
 
 @PULSES
+@pytest.mark.slow
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     moved = []
 

@@ -3,6 +3,7 @@
 import ast
 import re
 import tomllib
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +28,7 @@ def test_every_room_is_in_the_contract():
     assert rooms == {layer for layer in layers() if layer.startswith("panto_env.")}
 
 
+@cache
 def imported(file):
     """Files of the package that a file imports, but for types, by names relative to ``panto_env``."""
     package, found = ROOT / "panto_env", set()

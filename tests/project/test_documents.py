@@ -18,6 +18,7 @@ from panto_env.identification import FREQUENCY_SWEEP, add_noise, clean_record, p
 
 from ..command import panto as run_panto
 from ..documents import ROOT, check, commands, pages, panto, python, targets
+from ..marks import some_at_once
 
 MINUTES = "takes minutes"
 SHELL = "<>|&;$*?`"
@@ -137,18 +138,23 @@ def run(page, folder):
         assert done.returncode == 0, f"{command.place}\nwas run as {line}\n{done.stdout}{done.stderr}"
 
 
-@pytest.mark.parametrize("command", shown(), ids=lambda command: command.place)
-def test_a_command_can_be_given(command):
-    check(command)
+@pytest.mark.parametrize("page", pages())
+def test_every_command_can_be_given(page):
+    for command in commands(page):
+        check(command)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in pages() if commands(page)])
+@pytest.mark.parametrize("page", pages())
 def test_commands_of_a_page_run(page, folder):
     run(page, folder)
 
 
-@pytest.mark.parametrize("page", [page for page in pages() if python(page)])
+WITH_PYTHON = [page for page in pages() if "```python" in (ROOT / page).read_text(encoding="utf-8")]
+LONG = ("docs/datasets.md", "docs/films.md", "docs/gpu.md")
+
+
+@pytest.mark.parametrize("page", some_at_once(WITH_PYTHON, set(WITH_PYTHON) - set(LONG)))
 def test_python_of_a_page_runs(page, folder, capsys):
     names = {"__name__": page}
     if page in PREPARED:

@@ -41,6 +41,7 @@ def run(monkeypatch, capsys):
     return of
 
 
+@pytest.mark.slow
 def test_a_rig_over_udp_feels_the_line_that_another_process_computes(monkeypatch):
     """Its pantograph and cylinder are written once more there: the force is that under the line itself."""
     example = load("rig_over_udp", monkeypatch)
@@ -63,6 +64,7 @@ def test_first_run_is_the_same_through_gymnasium(run, tmp_path):
     np.testing.assert_array_equal(again.contact_force, once.contact_force)
 
 
+@pytest.mark.slow
 def test_own_controller_is_ranked_and_pd_is_not(run):
     example, told, said = run("own_controller")
     assert told in said
@@ -84,6 +86,7 @@ def test_line_from_toml_keeps_the_standards(run, tmp_path):
     assert example.one_pass().catenary == "my_line"
 
 
+@pytest.mark.slow
 def test_design_sweep_finds_the_lightest_head_and_the_tightest_wire(run, tmp_path):
     example, told, said = run("design_sweep", "--plot", tmp_path / "design.png")
     assert len(told.splitlines()) == 13
@@ -104,6 +107,7 @@ def test_identify_from_csv_finds_the_truth(run, tmp_path):
         assert fit.parameters[name] == pytest.approx(example.TRUTH[name], rel=0.01)
 
 
+@pytest.mark.slow
 def test_sac_example_trains_and_acts(monkeypatch, tmp_path):
     """A second of it: the critics have learnt, and what it would do is a policy of the benchmark."""
     torch = pytest.importorskip("torch")
@@ -132,6 +136,7 @@ def test_sac_example_is_better_than_passive(monkeypatch, tmp_path):
     assert max(cell.change for cell in own) < 0
 
 
+@pytest.mark.slow
 def test_ppo_example_earns_more_than_at_first(monkeypatch):
     pytest.importorskip("torch")
     example = load("ppo_cleanrl", monkeypatch)
@@ -190,6 +195,7 @@ def test_ppo_example_is_better_than_passive(monkeypatch):
     assert abs(mean) < 1.5
 
 
+@pytest.mark.slow
 def test_notebook_shows_what_it_prints_now():
     """Without the part that learns, which a slow test runs."""
     stored = nbformat.read(LEARNING, as_version=4)
@@ -208,6 +214,7 @@ def test_notebook_learns_as_it_shows():
     )
 
 
+@pytest.mark.slow
 def test_notebook_films_an_agent_on_a_line_that_nobody_has_seen(tmp_path):
     stored = nbformat.read(UNSEEN_LINE, as_version=4)
     again = executed(UNSEEN_LINE, before="## The film", folder=tmp_path)

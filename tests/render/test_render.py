@@ -23,6 +23,8 @@ from panto_env.render.moment import Layout, force_axis, moment_of
 from panto_env.render.picture import Picture
 from panto_env.render.viewer import figures_so_far
 
+from ..marks import some_at_once
+
 SIZE = (640, 360)
 STIFFNESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 ROUND = [1, 2, 5, 10, 15, 20, 30, 50, 100, 200]
@@ -62,7 +64,7 @@ LINES = {
 }
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", some_at_once(LINES, set(LINES) - {"rig"}))
 def test_the_wire_that_is_drawn_is_the_one_that_the_pantograph_touches(name):
     task = driven(**LINES[name])
     view = moment(task).line
@@ -222,6 +224,7 @@ def test_a_window_shows_each_step_and_closes(monkeypatch):
     assert not pygame.display.get_init()
 
 
+@pytest.mark.slow
 def test_record_video_writes_an_episode(tmp_path):
     pytest.importorskip("moviepy")
     env = gymnasium.make(

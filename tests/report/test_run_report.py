@@ -146,6 +146,7 @@ def test_the_page_says_it_and_is_the_same_twice(found):
 
 
 @pytest.mark.skipif(BROWSER is None and "CI" not in os.environ, reason="no browser; CI has one")
+@pytest.mark.slow
 def test_a_browser_shows_the_values(file, found, tmp_path):
     path = tmp_path / "report.html"
     save([file], path)

@@ -33,6 +33,7 @@ def step_often(computer, force, count):
 # --- the computer --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_computer_computes_what_the_simulated_rig_does():
     """A simulated rig's readings, given to the program by itself: the same heights of the contact point."""
     data = load_catenary("rig-flexible")

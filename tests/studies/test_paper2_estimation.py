@@ -16,6 +16,7 @@ def trajectory():
     return estimation.run(250.0)
 
 
+@pytest.mark.slow
 def test_the_ways_rank_as_told(monkeypatch):
     """Errors at all frequencies, at equal noise: beliefs about the force pay, none at all costs most."""
     monkeypatch.setattr(estimation, "SEEDS", 1)
