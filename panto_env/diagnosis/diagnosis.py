@@ -132,7 +132,7 @@ def judge(
 ) -> Diagnosis:
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
     limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
-    evidence, levels = healthy.weigh(passes, limit)
+    evidence, levels = healthy.score(passes, limit)
     network = classifier or trained()
     found = [
         _finding(evidence, network.answer(evidence, region), float(evidence.score[region.peak]))
@@ -259,7 +259,7 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     x = evidence.position[shown]
     figure = Figure(figsize=(12, 6), layout="constrained")
     force, score = figure.subplots(2, 1, sharex=True)
-    force.plot(x, evidence.rest[shown], color=BLUE, linewidth=0.9)
+    force.plot(x, evidence.residual[shown], color=BLUE, linewidth=0.9)
     force.set(ylabel="force beside healthy passes (N)")
     score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
     words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"

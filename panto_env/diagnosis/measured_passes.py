@@ -29,7 +29,7 @@ from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
 HEALTHY = 24
 """Healthy passes that are simulated: enough to know how much they differ."""
 AWAY = 0.5
-"""Way (m) on each side of a record's rough place within which it is placed finely."""
+"""Distance (m) on each side of a record's rough place within which it is placed finely."""
 
 
 def measured_passes(

@@ -108,7 +108,7 @@ the noise of its estimate, at 250 km/h."""
 LEAD = 1
 """Spans before those that are judged: what is predicted from its past wants a past."""
 END = 10.0
-"""Way (m) before the end of a run that is not judged: a filter without delay does not know how it goes on."""
+"""Distance (m) before the end of a run that is not judged: a filter without delay needs what follows."""
 FEWEST = 3
 """Healthy passes: each is held against the mean of the others."""
 

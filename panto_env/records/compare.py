@@ -89,7 +89,7 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     moved = [replace(piece, position=piece.position + found.value) for piece in same.pieces]
     samples = Samples(replace(same, pieces=tuple(moved)))
     spans, own, other = _spans(samples, run, begin, end)
-    figures = {name: (call(own), call(other)) for name, call in _STATISTICS.items()}
+    figures = _statistics(own, other)
     uplift, where = _uplift(samples, run, begin, end)
     heights = np.array([each.height_range for each in spans if not math.isnan(each.height_range[0])])
     height = 1e3 * float((heights[:, 1] - heights[:, 0]).mean()) if len(heights) else math.nan
@@ -98,7 +98,8 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
             f"Record and run hardly resemble each other (correlation {found.correlation:.2f}): it may be "
             "of another line, the shift beyond the search, or columns may be swapped."
         )
-    values = {"uplift at a support": uplift, "range of the contact point's height": height}
+    range_of_height = "range of the contact point's height"
+    values = {"uplift at a support": uplift, range_of_height: height}
     missing = tuple(name for name, value in values.items() if math.isnan(value))
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
@@ -107,16 +108,7 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     criteria = (
         Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
-        Criterion(
-            "height",
-            "range of the contact point's height",
-            "mm",
-            height,
-            -HEIGHT,
-            HEIGHT,
-            SOURCE,
-            heights_note,
-        ),
+        Criterion("height", range_of_height, "mm", height, -HEIGHT, HEIGHT, SOURCE, heights_note),
         alike,
         *(
             Criterion(key, LABELS[key].name, "N", simulated - measured)
@@ -127,12 +119,12 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     return Comparison(samples, run, found, tuple(spans), figures, criteria, missing, tuple(notes))
 
 
-_STATISTICS = {
-    "mean": lambda force: float(force.mean()),
-    "std": lambda force: float(force.std()),
-    "max": lambda force: float(force.max()),
-    "min": lambda force: float(force.min()),
-}
+_STATISTICS = ("mean", "std", "max", "min")
+
+
+def _statistics(own: Array, other: Array) -> dict[str, tuple[float, float]]:
+    """Statistics of the forces of record and run (N)."""
+    return {name: (float(getattr(own, name)()), float(getattr(other, name)())) for name in _STATISTICS}
 
 
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
@@ -162,19 +154,16 @@ def _spans(
     compared = np.zeros(len(position), dtype=bool)
     for span in range(int(numbers[0]), int(numbers[1]) + 1):
         first, last = run.alignment.limits((span, span))
-        here, there = (
-            (position >= first) & (position < last) & settled,
-            run.alignment.within(run.position, (span, span)),
-        )
-        if samples.way(here) < COVERED * (last - first):
+        here = (position >= first) & (position < last) & settled
+        there = run.alignment.within(run.position, (span, span))
+        if samples.distance(here) < COVERED * (last - first):
             continue
         compared |= here
         a, b = samples.filtered[here], filtered[there]
         own.append(a)
         other.append(b)
         ranges = _range(measured, here), _range(heights, there)
-        each = {name: (call(a), call(b)) for name, call in _STATISTICS.items()}
-        found.append(SpanPair(span, first, last, **each, height_range=ranges))
+        found.append(SpanPair(span, first, last, **_statistics(a, b), height_range=ranges))
     if not found:
         raise InputError(
             "The record covers none of the run's evaluated spans without a gap; simulate a run along all "

@@ -34,7 +34,7 @@ SECTION = 1000.0
 COVERED = 0.9
 """Share of a span that must be recorded for its figures to be shown."""
 SLACK = 1.0
-"""Way (m) that a record may lie beyond the line without a word: odometers are not better. Own choice."""
+"""Distance (m) that a record may lie beyond the line without a word: odometers are not better. Own choice."""
 WINDOW = 8.0
 """Duration of the windows (s) whose spectra are averaged."""
 
@@ -156,7 +156,7 @@ def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -
         if begin < reach[0] - 1e-6 or end > reach[1] + 1e-6:
             continue
         words = f"{alignment.span_name(int(span))}: {begin:,.6g} to {end:,.6g} m"
-        if samples.way(numbers == span) >= COVERED * (end - begin):
+        if samples.distance(numbers == span) >= COVERED * (end - begin):
             found.append(_part(samples, "span", words, numbers == span))
     return found
 

@@ -51,8 +51,8 @@ def stability(rig: RigData, pantograph: PantographData, speed_kmh: float) -> Sta
     return Stability(
         linear,
         growth.bearable_delay(rig, pantograph, speed_kmh, SEARCHED * linear.delay),
-        loop.slowest_cylinder(),
-        growth.slowest_cylinder(rig, pantograph, speed_kmh),
+        growth.slowest_cylinder(rig, loop.stable),
+        growth.slowest_cylinder(rig, lambda slower: growth.grows_not(slower, pantograph, speed_kmh), 0.02),
     )
 
 

@@ -160,8 +160,8 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
         "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
     }
     rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
-    rows["settled"] = found.solution.settled
-    rows["left"] = [_short(left) for _, left in found.left]
+    rows["settled"] = found.solution.converged
+    rows["left"] = [_short(residual) for _, residual in found.std]
     rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
     for name, truth in truths.items():
         own = found.of_kind(name)

@@ -32,7 +32,7 @@ def main() -> None:
 
     found = fit(records, load_catenary(LINE), load_pantograph(PANTOGRAPH), working=working)
     whole, freed = perf_counter() - begin, len(found.problem.fitting.values)
-    print(f"{len(found.found)} values compared, {freed} freed, settled: {found.solution.settled}")
+    print(f"{len(found.found)} values compared, {freed} freed, settled: {found.solution.converged}")
     print(
         f"{whole:.0f} s on {cores()} cores, {whole / simulated:.0f} times as long as to simulate the passes"
     )

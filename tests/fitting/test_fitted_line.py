@@ -48,9 +48,8 @@ def made_up(ready, differences, shift=0.0, silent=()):
             deviation[k] *= 1.0 if value.name in silent else 0.1
     x[len(fitting.values) :][: len(fitting.parts)] = shift
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
-    random = np.random.default_rng(0)
-    left = tuple(random.standard_normal(len(part.measured.kept)) for part in fitting.parts)
-    return Fit(ready, Solution(state, np.diag(deviation**2), (), left, True))
+    residual = np.random.default_rng(0).standard_normal(len(fitting.band))
+    return Fit(ready, Solution(state, np.diag(deviation**2), np.empty((0, 0)), residual, True))
 
 
 @pytest.fixture(scope="module")

@@ -8,16 +8,15 @@ import pytest
 from panto_env.fitting.passes import BANDS
 from panto_env.fitting.solve import SURE, Solution, normal
 
-LEFT = 0.7
+NOISE = 0.7
 """Noise of a coefficient (N), as a record of these tests has it."""
 
 
 def ended(fitting, x):
     """A fit that has ended at some values."""
-    state = replace(fitting.start(), x=x, noise=np.full((1, BANDS), LEFT))
-    (left,), _ = fitting.tried(state, [x])
-    blocks = np.zeros((len(fitting.parts[0].measured.kept), len(x)))
-    return Solution(state, np.diag(fitting.prior**2), (blocks,), tuple(left), settled=True)
+    state = replace(fitting.start(), x=x, noise=np.full((1, BANDS), NOISE))
+    (residual,) = fitting.residuals(state, x[None])
+    return Solution(state, np.diag(fitting.prior**2), np.zeros((len(residual), len(x))), residual, True)
 
 
 @pytest.fixture(scope="module")
@@ -51,19 +50,19 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     state = ended(fitting, true + 0.01 * (np.arange(len(true)) == k)).state
     for _ in range(3):  # steps of all values but this one
         differences = np.diag(0.1 * fitting.values.tolerances)
-        state, blocks, left = fitting.derivatives(state, differences, "fine", lambda doing: None)
-        facts = blocks, left, fitting.weights(state.noise), fitting.prior, state.x
-        precision, pull = normal(*facts)
-        found = Solution(state, np.linalg.inv(precision), tuple(blocks), tuple(left), settled=True)
+        state, jacobian, residual = fitting.derivatives(state, differences, "fine", lambda doing: None)
+        precision, slope = normal(jacobian, residual, fitting.weights(state.noise), fitting.prior, state.x)
+        found = Solution(state, np.linalg.inv(precision), jacobian, residual, converged=True)
         others = np.delete(np.arange(len(state.x)), k)
         x = state.x.copy()
-        x[others] += np.linalg.solve(precision[np.ix_(others, others)], pull[others])
+        x[others] += np.linalg.solve(precision[np.ix_(others, others)], slope[others])
         state = replace(state, x=x, static_forces=fitting.static_forces(state, x))
     wrong = found.state.x
     jumped = fitting._jumped(found, lambda doing: None).x - wrong
     assert jumped[k] < -0.004
     alone = np.where(np.arange(len(wrong)) == k, wrong - 0.01, wrong)
-    _, (before, after) = fitting.tried(found.state, [wrong, alone])
+    tried = np.array([wrong, alone])
+    before, after = fitting.objective(fitting.residuals(found.state, tried), found.state.noise, tried)
     assert after > before
 
 
