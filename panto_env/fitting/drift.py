@@ -32,18 +32,11 @@ class Drift:
     earlier: Stored
     later: Stored
     found: tuple[Found, ...]  # changes, along what both fits compared
-    surely: tuple[bool, ...]  # whether each is named as changed
+    changed: tuple[Found, ...]  # those that are named, most surely first
 
     def of_kind(self, kind: str) -> list[Found]:
         """Changes of one kind of values."""
         return [each for each in self.found if each.value.kind == kind]
-
-    @property
-    def changed(self) -> list[Found]:
-        """Values that have changed, most surely first."""
-        pairs = zip(self.found, self.surely, strict=True)
-        named = [each for each, sure in pairs if sure]
-        return sorted(named, key=lambda each: -abs(each.difference) / each.deviation)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -76,7 +69,7 @@ def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None
         for value, tolerance, by, error in zip(values.values(), usual, change, deviation, strict=True)
         if value.name in both and (value.place is None or begin <= value.place <= end)
     ]
-    return Drift(earlier, later, tuple(found), tuple(_named(found)))
+    return Drift(earlier, later, tuple(found), _named(found))
 
 
 def _likelihood(known: Stored, names: Sequence[str]) -> tuple[Array, Array]:
@@ -90,16 +83,19 @@ def _likelihood(known: Stored, names: Sequence[str]) -> tuple[Array, Array]:
     return information, side
 
 
-def _named(found: Sequence[Found]) -> list[bool]:
-    """Which changes are named: of identifiable ones, so that few are false."""
+def _named(found: Sequence[Found]) -> tuple[Found, ...]:
+    """Changes that are named, most surely first: of identifiable ones, so that few are false."""
     from scipy.stats import false_discovery_control, norm  # slow to import
 
-    identifiable = np.array([each.identifiable for each in found], dtype=bool)
-    sizes = np.array([abs(each.difference) / each.deviation for each in found])[identifiable]
-    sure = np.zeros(len(found), dtype=bool)
-    if len(sizes):
-        sure[identifiable] = false_discovery_control(2 * norm.sf(sizes)) < FALSE
-    return sure.tolist()
+    known = sorted((each for each in found if each.identifiable), key=_sureness, reverse=True)
+    if not known:
+        return ()
+    shares = false_discovery_control(2 * norm.sf([_sureness(each) for each in known]))
+    return tuple(each for each, share in zip(known, shares, strict=True) if share < FALSE)
+
+
+def _sureness(each: Found) -> float:
+    return abs(each.difference) / each.deviation
 
 
 def _check_alike(earlier: Stored, later: Stored) -> None:

@@ -14,8 +14,8 @@ from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
 from .misfit import Part, State
-from .problem import Problem, problem
-from .solve import Solution
+from .problem import problem
+from .solve import Fitting, Solution
 from .values import USUAL, Value
 
 INTERVAL = 1.96
@@ -56,18 +56,18 @@ class Found:
 class Fit:
     """The end of a fit."""
 
-    problem: Problem
+    problem: Fitting
     solution: Solution
 
     @property
     def parts(self) -> Sequence[Part]:
         """Pieces of records that were compared."""
-        return self.problem.fitting.parts
+        return self.problem.parts
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
         """All values, of droppers and supports only those along what was compared."""
-        values = self.problem.fitting.values.all
+        values = self.problem.values.all
         deviations = np.sqrt(np.diag(self.solution.covariance))
         triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
         return tuple(Found(*each) for each in triples if self._compared(each[0]))
@@ -84,7 +84,7 @@ class Fit:
     @cached_property
     def correlated(self) -> list[tuple[Value, Value, float]]:
         """Pairs of identifiable values that the records hardly tell apart, strongest first."""
-        values = self.problem.fitting.values.all
+        values = self.problem.values.all
         names = {each.value.name for each in self.found if each.identifiable}
         which = [k for k, value in enumerate(values) if value.name in names]
         covariance = self.solution.covariance[np.ix_(which, which)]
@@ -97,28 +97,28 @@ class Fit:
     @cached_property
     def residual(self) -> list[Array]:
         """Coefficients of each part, (coefficients,): measured less simulated (N)."""
-        return self.problem.fitting.by_part(self.solution.residual)
+        return self.problem.by_part(self.solution.residual)
 
     @cached_property
     def whiteness(self) -> list[Whiteness]:
         """Of the residual of each part, over its noise: whether it is as random as noise."""
-        deviation = self.solution.state.noise.ravel()[self.problem.fitting.band]
-        parts = self.problem.fitting.by_part(self.solution.residual / deviation)
+        deviation = self.solution.state.noise.ravel()[self.problem.band]
+        parts = self.problem.by_part(self.solution.residual / deviation)
         return [whiteness(own[:, None]) for own in parts]
 
     @property
     def shifts(self) -> Array:
         """By how much positions of each part were short, beside its rough shift, (parts,) (m)."""
-        return np.asarray(self.problem.fitting.sensors(self.solution.state.x)[0])
+        return np.asarray(self.problem.sensors(self.solution.state.x)[0])
 
     @property
     def gains(self) -> Array:
         """By how much the gain of each part's sensors differs from 1, (parts,)."""
-        return np.asarray(self.problem.fitting.sensors(self.solution.state.x)[1])
+        return np.asarray(self.problem.sensors(self.solution.state.x)[1])
 
     def measured(self, k: int) -> Array:
         """Coefficients of a part's measured force (N), with its place and gain corrected."""
-        return self.parts[k].measured.coefficients(self.problem.fitting.measured(k, self.solution.state.x))
+        return self.parts[k].measured.coefficients(self.problem.measured(k, self.solution.state.x))
 
     @cached_property
     def std(self) -> list[tuple[float, float]]:
@@ -156,5 +156,4 @@ def fit(
     """
     with one_thread():
         ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
-        fitting = ready.fitting
-        return Fit(ready, fitting.run(fitting.start() if begin is None else begin, report, working))
+        return Fit(ready, ready.run(ready.start() if begin is None else begin, report, working))

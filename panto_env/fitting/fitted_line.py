@@ -112,14 +112,14 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
     """
     check_output(path, SUFFIXES)
     text = file_of(base).read_text(encoding="utf-8-sig")
-    design = fit.problem.fitting.values.design
+    design = fit.problem.values.design
     for each in fit.of_kind("damping"):
         if each.identifiable:
             name = each.value.index[0]
             value = damping_of(design.catenary, name, each.difference)
             text = with_value(text, f"damping.{name}", value, source([each], records), str(base))
     values, sources = as_found(fit, records)
-    needed = fit.problem.first_span + design.spans
+    needed = design.first_span + design.spans
     if not design.catenary.ends and needed > design.catenary.spans:
         text = with_value(text, "spans", needed, f"as long as {records}", str(base))
     text = with_table(text, "as_found", values, sources, str(base))
@@ -130,7 +130,7 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
     """Write the pantograph with its fitted values, as ``write_line`` does."""
     check_output(path, SUFFIXES)
     text = file_of(base, "pantograph").read_text(encoding="utf-8-sig")
-    design = fit.problem.fitting.values.design.pantograph
+    design = fit.problem.values.design.pantograph
     every = [each for each in fit.of_kind("pantograph") if each.identifiable]
     for name in CHAIN:
         found, values = [each for each in every if each.value.index[0] == name], list(getattr(design, name))
@@ -145,7 +145,8 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
 
 def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     """A line condition of the most likely values, and the source of each of its keys."""
-    design, before = fit.problem.fitting.values.design, fit.problem.first_span
+    design = fit.problem.values.design
+    before = design.first_span
     line = design.catenary
     known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
     sources = {key: line.sources.get(f"as_found.{key}", "not given") for key in known}

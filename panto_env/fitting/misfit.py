@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Index
 from ..base.machine import cores
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .passes import BANDS, Measured, Passes, Variant, between
@@ -54,17 +55,35 @@ class State:
     steps: int = 0
 
 
-class Misfit:
-    """Of some parts of records, over some values of the line.
+@dataclass(frozen=True)
+class Problem:
+    """Parts of records, and the values of the line that are to be fitted to them.
 
     Arrays of coefficients hold those of all parts, one part behind the other.
     """
 
-    def __init__(self, parts: Sequence[Part], values: Values) -> None:
-        self.parts, self.values = parts, values
-        self.prior = np.append(values.tolerances, np.repeat(list(OWN.values()), len(parts)))
-        self.band = np.concatenate([BANDS * k + part.measured.band for k, part in enumerate(parts)])
+    parts: Sequence[Part]
+    values: Values
+    stretch: tuple[float, float] = (0.0, 0.0)  # of the simulated line that is compared (m)
+    shifts: tuple[float, ...] = ()  # by how much positions of each record were short, roughly (m)
+    of_records: tuple[str, ...] = ()  # notes on the records: what was left out, corrected or assumed
+    notes: tuple[str, ...] = ()  # on what is fitted to them
+
+    @property
+    def before(self) -> float:
+        """Distance along the line before the simulated spans (m)."""
+        design = self.values.design
+        return 0.0 if design.catenary.ends else design.first_span * design.catenary.span_length
+
+    @cached_property
+    def prior(self) -> Array:
+        """(n,): standard deviations of the values, and of ``OWN`` for all parts, about 0."""
+        return np.append(self.values.tolerances, np.repeat(list(OWN.values()), len(self.parts)))
+
+    @cached_property
+    def band(self) -> Index:
         """(coefficients,): number of each one's band among those of all parts, as in ``State.noise``."""
+        return np.concatenate([BANDS * k + part.measured.band for k, part in enumerate(self.parts)])
 
     def start(self) -> State:
         """The line as designed."""

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from ..base.arrays import Array, Index
-from .misfit import Grid, Misfit, State
+from .misfit import Grid, Problem, State
 
 FREEDOM = 0.1
 """Minimum share of a band's coefficients that counts as not used up by the values."""
@@ -103,7 +103,7 @@ class Solution:
     converged: bool  # whether a further step would change little
 
 
-class Fitting(Misfit):
+class Fitting(Problem):
     """The iteration to the minimum of the objective."""
 
     def run(

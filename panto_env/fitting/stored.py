@@ -114,7 +114,7 @@ class Stored:
 
 def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
-    fitting, before = fit.problem.fitting, fit.before
+    fitting, before = fit.problem, fit.before
     design, count = fitting.values.design, len(fitting.values)
     values = tuple(
         value if value.place is None else replace(value, place=value.place + before)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from .drift import Drift
 
 
+NAMED = 20
+"""Values in a table at most."""
 NAMES = {
     "tensions": "tensions",
     "droppers": "lengths of droppers",
@@ -58,10 +60,10 @@ def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: st
     return Table("What the records tell", headings, rows)
 
 
-def values_table(differing: Sequence[Found], unlike: str, most: int = 20) -> Table:
+def values_table(differing: Sequence[Found], unlike: str) -> Table:
     """The values that most surely differ, waves of the running surface left out."""
     named = [each for each in differing if each.value.kind != "unevenness"]
-    found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:most]
+    found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:NAMED]
     rows = [
         (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
     ]
@@ -152,7 +154,7 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
         _draw_values(axes, fit.of_kind(kind), fit.before)
-    plan, before = fit.problem.fitting.values.design, fit.before
+    plan, before = fit.problem.values.design, fit.before
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
         marks.mark_supports(axes, [x + before for x in plan.supports.tolist() if low <= x + before <= high])

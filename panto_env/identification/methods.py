@@ -34,8 +34,8 @@ def three_points(values: Array, time_step: float) -> Array:
 def equations(record: Record, known: Parameters) -> tuple[Array, Array]:
     """A, (2, n - 4, 5), and Y, (2, n - 4), of Eqs 4 and 6: first the pan head's rows, then the frame's."""
     inner = slice(2, -2)
-    plate, head, support = record.plate[inner], record.head[inner], record.support[inner]
-    first = [three_points(y, record.time_step) for y in (record.plate, record.head, record.support)]
+    plate, head, support = (y[inner] for y in record.displacements.values())
+    first = [three_points(y, record.time_step) for y in record.displacements.values()]
     v1, v2, v3 = (v[1:-1] for v in first)
     a2, a3 = (three_points(v, record.time_step) for v in first[1:])
     zero = np.zeros_like(plate)
@@ -119,7 +119,7 @@ def _dependence(r: Array, names: tuple[str, ...]) -> float:
 OUTPUT_ERROR = "output error"
 MOST_EVALUATIONS = 100
 """Of the model in a pass; real records take about ten."""
-PASSES = 2  # the second weighs with the covariance that the first left
+PASSES = 2  # the second weights with the covariance that the first left
 SAMPLES_PER_PERIOD = 200
 """Of the band, to simulate with: a spline through them is good to 1e-9 of the motion."""
 
@@ -168,7 +168,7 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
                 max_nfev=MOST_EVALUATIONS,
             )
             solution = fitted.x
-            misfit.weigh(solution)
+            misfit.reweight(solution)
         except (ValueError, np.linalg.LinAlgError) as error:  # the model's motion is beyond all numbers
             raise InputError(f"The output-error fit diverges ({error}); check the record's units.") from error
     jacobian = misfit.jacobian(solution)
@@ -252,8 +252,8 @@ class Misfit:
                 columns.append((self.residuals(up) - here) / step)
         return np.column_stack(columns)
 
-    def weigh(self, solution: Array) -> None:
-        """Weigh with the covariance of the residuals that a solution leaves."""
+    def reweight(self, solution: Array) -> None:
+        """Weight with the covariance of the residuals that a solution leaves."""
         error = self.simulated(solution) - self.target
         used = self.share * len(solution) / 2  # rows' worth that each of two channels gives away
         covariance = error.T @ error / (len(error) - used)

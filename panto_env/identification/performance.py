@@ -218,7 +218,7 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
     inside = record.time <= record.start + seconds
     step = max(1, int(inside.sum()) // SHOWN)
     time = record.time[inside][::step]
-    series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
+    series = record.displacements
     if record.force is not None:
         series = {"force": record.force} | series
     figure = Figure(figsize=(7, 6.2), layout="constrained")

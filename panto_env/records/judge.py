@@ -281,26 +281,21 @@ def part_tables(found: Judgement) -> list[Table]:
     """Tables by run, speed, section and span, of those kinds that have more than one part, or are spans."""
     tables = []
     for kind, title in TITLES.items():
-        parts = found.of(kind)
+        parts, long = found.of(kind), [] if kind == "span" else ["distance (m)"]
+        rows = [
+            (
+                part.where,
+                *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
+                number(part.arcing, 2),
+                *(number(part.figures.distance, 0) for _ in long),
+                number(to_kmh(part.speed), 0),
+            )
+            for part in parts
+        ]
         if len(parts) > 1 or (kind == "span" and parts):
-            tables.append(_parts_table(parts, title))
+            short = [LABELS[key].short_heading for key in SHOWN]
+            tables.append(Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows))
     return tables
-
-
-def _parts_table(parts: list[Part], title: str) -> Table:
-    long = [] if parts[0].kind == "span" else ["distance (m)"]
-    short = [LABELS[key].short_heading for key in SHOWN]
-    rows = [
-        (
-            part.where,
-            *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
-            number(part.arcing, 2),
-            *(number(part.figures.distance, 0) for _ in long),
-            number(to_kmh(part.speed), 0),
-        )
-        for part in parts
-    ]
-    return Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
 
 
 def requirements_table(found: Judgement) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,6 +62,16 @@ class Record:
     def longest(self) -> Piece:
         """The piece that covers the longest distance."""
         return max(self.pieces, key=lambda piece: piece.length)
+
+
+def repeated(series: Iterable[tuple[str, Array]]) -> Iterator[tuple[str, str]]:
+    """Names of each two series that are the same, sample by sample."""
+    known: dict[bytes, str] = {}
+    for name, values in series:
+        content = values.tobytes()
+        if content in known:
+            yield known[content], name
+        known.setdefault(content, name)
 
 
 SETTLING = 0.2
@@ -233,7 +243,8 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
             f"record's positions: --shift {0.5 * (begin + end - first - last):.0f}."
         )
     correlations[(distances < ENOUGH * distances.max()) | ~np.isfinite(correlations)] = -1.0
-    peaks = _peaks(correlations)
+    edged = np.concatenate([[-math.inf], correlations, [-math.inf]])
+    peaks = np.flatnonzero((correlations >= edged[:-2]) & (correlations >= edged[2:])).tolist()
     best = max(peaks, key=lambda k: correlations[k])
     rest = [k for k in peaks if abs(lags[k] - lags[best]) > 0.25 * span]
     second = max(rest, key=lambda k: correlations[k], default=None)
@@ -251,11 +262,6 @@ def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, in
     if len(a) < 2 or a.std() == 0 or b.std() == 0:
         return math.nan, len(a)
     return float(np.corrcoef(a, b)[0, 1]), len(a)
-
-
-def _peaks(values: Array) -> list[int]:
-    padded = np.concatenate([[-math.inf], values, [-math.inf]])
-    return np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:])).tolist()
 
 
 def _vertex(lags: Array, values: Array, k: int) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from ..base.table import Sheet, write_table
 from ..metrics.trajectory import KEY
 from .axes import RUNS_BACK, Break, axes_of, cut
 from .plausibility import check_axes, check_force, check_motion, check_speed
-from .record import Piece, Record
+from .record import Piece, Record, repeated
 
 STRIPS = 4
 """Maximum number of force sensors, and of accelerometers, of a collector head."""
@@ -306,13 +306,11 @@ def _check(pieces: Sequence[Piece]) -> None:
             f"The runs have different rates, from {1 / max(steps):.4g} to {1 / min(steps):.4g} samples a "
             "second; give each a file of its own."
         )
-    seen: dict[bytes, str] = {}
-    for piece in pieces:
-        other = seen.setdefault(piece.force.tobytes(), piece.run)
-        if other != piece.run:
+    for one, other in repeated((piece.run, piece.force) for piece in pieces):
+        if one != other:
             raise InputError(
-                f"Runs {shortly(other)} and {shortly(piece.run)} have the same forces, sample by sample; "
-                "leave one of them out."
+                f"Runs {shortly(one)} and {shortly(other)} have the same forces, sample by sample; leave "
+                "one of them out."
             )
 
 

@@ -67,9 +67,9 @@ def test_tension_and_heights_of_a_changed_line_are_found():
     assert contact == pytest.approx(-LOST, abs=0.002)
     assert messenger == pytest.approx(0.0, abs=0.005)
     values, _ = as_found(found, "finite elements")
-    spans = found.problem.fitting.values.design.spans
+    spans = found.problem.values.design.spans
     line = DefectiveLine(design, spans, LineCondition.model_validate(values))
-    place = found.problem.fitting.values.design.droppers
+    place = found.problem.values.design.droppers
     height, true = line.rise(line.solve()).height(place), np.zeros(len(place))
     true[DROPPERS * CHANGED[0] : DROPPERS * CHANGED[0] + len(sag)] = -sag
     compared = (place > COMPARED[0]) & (place < COMPARED[1])

@@ -145,7 +145,7 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     """
     records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
-    first = found.problem.first_span
+    first = found.problem.values.design.first_span
     spans = line.spans if line.ends else BEFORE.get(kind, 0) + SPANS + BEYOND
     droppers = len(dropper_positions(line, spans))
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)

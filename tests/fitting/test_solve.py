@@ -22,30 +22,30 @@ def ended(fitting, x):
 @pytest.fixture(scope="module")
 def true(ready, truth):
     """The true values."""
-    return np.array([*(truth.of(value) for value in ready.fitting.values.all), 0.0, 0.0, 0.0])
+    return np.array([*(truth.of(value) for value in ready.values.all), 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("by", [0.009, -0.011])
 def test_droppers_that_are_far_off_jump_back(ready, true, by):
     """Both of two, by the distance of a jump each, and no other."""
-    values = ready.fitting.values
+    values = ready.values
     off = [values.of_kind("droppers")[k] for k in (90, 110)]
     assert all(ready.stretch[0] < values.all[k].place < ready.stretch[1] for k in off)
     wrong = true.copy()
     wrong[off] += by
-    jumped = ready.fitting._jumped(ended(ready.fitting, wrong), lambda doing: None)
+    jumped = ready._jumped(ended(ready, wrong), lambda doing: None)
     moved = jumped.x - wrong
     np.testing.assert_allclose(moved[off], -np.sign(by) * 0.01)
     assert np.flatnonzero(moved).tolist() == off
 
 
 def test_no_dropper_jumps_where_that_makes_nothing_better(ready, true):
-    assert ready.fitting._jumped(ended(ready.fitting, true), lambda doing: None) is None
+    assert ready._jumped(ended(ready, true), lambda doing: None) is None
 
 
 def test_a_dropper_jumps_for_which_others_make_up(ready, true):
     """Its whole return, alone, would make it worse."""
-    fitting = ready.fitting
+    fitting = ready
     k = fitting.values.of_kind("droppers")[100]
     state = ended(fitting, true + 0.01 * (np.arange(len(true)) == k)).state
     for _ in range(3):  # steps of all values but this one
@@ -68,7 +68,7 @@ def test_a_dropper_jumps_for_which_others_make_up(ready, true):
 
 def test_differences_never_become_so_small_that_rounding_is_all_that_is_left(ready):
     """Where two values together are known far too well, which rounding may make a negative variance, too."""
-    fitting = ready.fitting
+    fitting = ready
     count, scale = len(fitting.values), fitting.values.tolerances
     usual = np.diag(np.append(0.01 * scale**2, fitting.prior[count:] ** 2))
     found = fitting._uncertain(usual) / scale
