@@ -294,7 +294,7 @@ def check_displacement(name: str, values: Array, extent: tuple[float, float]) ->
     """
     farthest, moved = float(np.abs(values).max()), float(np.ptp(values))
     if farthest > FARTHEST or moved > extent[1]:
-        what = f"heights of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {moved:.3g} m"
+        what = f"displacements of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {moved:.3g} m"
         raise InputError(
             f"Column {name} holds {what}, which no pantograph makes: mm in a column of m, or µm in one of mm?"
         )

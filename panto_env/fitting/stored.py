@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError
 from ..base.arrays import Array
 from ..base.checksums import checksum, read_arrays, write_arrays
 from ..base.errors import InputError
-from ..base.settings import Settings, explain
+from ..base.settings import Settings
 from ..records.record import Record
 from .fit import WHITE, Fit
 from .misfit import OWN, State
@@ -155,7 +155,10 @@ def stored(path: str | Path) -> Stored:
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except ValueError as error:  # pydantic's among them
-        reason = explain(error, _Table) if isinstance(error, ValidationError) else error
+        reason = str(error)
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            reason = f"key '{'.'.join(map(str, first['loc']))}': {first['msg']}"
         raise InputError(
             f"{path} does not hold a whole fit: {reason}; give a file that `panto fit --keep` wrote."
         ) from error

@@ -69,8 +69,8 @@ def fit_equation_error(
     known = check_known(known)
     if band is None:
         return solve(record, known, 1, free_offset, PRINTED)
-    kept, stride = band_limited(record, band)
-    return solve(kept, known, stride, free_offset, FILTERED)
+    limited, stride = band_limited(record, band)
+    return solve(limited, known, stride, free_offset, FILTERED)
 
 
 def solve(record: Record, known: Parameters, stride: int, free_offset: bool, method: str) -> Fit:
@@ -144,8 +144,8 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     from scipy.optimize import least_squares  # slow to import
 
     known = check_known(known)
-    kept, stride = band_limited(record, band)
-    start = solve(kept, known, stride, free_offset, FILTERED)
+    limited, stride = band_limited(record, band)
+    start = solve(limited, known, stride, free_offset, FILTERED)
     if start.dependence > IDENTIFIABLE:
         raise InputError(
             f"The record does not determine {', '.join(start.names)} all at once: their columns nearly "
@@ -153,7 +153,7 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
             "frequencies, as a sweep does, or measure one of them and give it with --measured."
         )
     guess = {n: max(v, START[n]) for n, v in zip(start.names, start.values, strict=True)}
-    misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
+    misfit = Misfit(limited, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
     # No spring, damper or mass is below 0; a model that grows by itself would fit noise.
     lowest = np.where(np.arange(len(solution)) < len(start.names), 0.0, -np.inf)
