@@ -235,8 +235,8 @@ def figures_table(found: Comparison) -> Table:
 def acceptance_table(found: Comparison) -> Table:
     """Deviations with limits, and what was not measured."""
     table = criteria_table(found.criteria, "Deviations, run minus record")
-    told = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
-    return Table(table.title, ("deviation of", *table.headings[1:]), told)
+    rows = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
+    return Table(table.title, ("deviation of", *table.headings[1:]), rows)
 
 
 def spans_table(found: Comparison) -> Table:
