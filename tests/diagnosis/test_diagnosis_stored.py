@@ -44,7 +44,7 @@ def of_simulated(healthy):
 def in_numbers(found):
     """A diagnosis as plain data; of its curves some values."""
     evidence = found.evidence
-    curves = {name: getattr(evidence, name)[::97].tolist() for name in ("position", "rest", "score")}
+    curves = {name: getattr(evidence, name)[::97].tolist() for name in ("position", "residual", "score")}
     facts = {
         name: getattr(found, name) for name in ("changed", "level", "begin", "end", "false_alarms", "notes")
     }
