@@ -70,7 +70,9 @@ class Fit:
         values = self.problem.values.all
         deviations = np.sqrt(np.diag(self.solution.covariance))
         triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
-        return tuple(Found(*each) for each in triples if self._compared(each[0]))
+        every = (Found(*each) for each in triples)
+        begin, end = self.problem.stretch
+        return tuple(each for each in every if each.value.place is None or begin <= each.value.place <= end)
 
     def of_kind(self, kind: str) -> list[Found]:
         """Values of one kind."""
@@ -130,10 +132,6 @@ class Fit:
     def before(self) -> float:
         """Distance along the line before the simulated spans (m)."""
         return self.problem.before
-
-    def _compared(self, value: Value) -> bool:
-        begin, end = self.problem.stretch
-        return value.place is None or begin <= value.place <= end
 
 
 def fit(

@@ -64,9 +64,10 @@ def values_table(differing: Sequence[Found], unlike: str) -> Table:
     """The values that most surely differ, waves of the running surface left out."""
     named = [each for each in differing if each.value.kind != "unevenness"]
     found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:NAMED]
-    rows = [
-        (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
-    ]
+    rows = []
+    for each in found:
+        numbers = (f"{each.value.scale * value:+.2f}" for value in (each.difference, *each.interval))
+        rows.append((each.value.name, each.value.unit, *numbers))
     headings = ("value", "unit", "difference", "from", "to")
     title = f"Most surely unlike {unlike}, {len(rows)} of {len(named)}"
     return Table(title, headings, rows, text_columns=2)
@@ -123,10 +124,6 @@ def remarks(fit: Fit) -> list[str]:
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
     return [*found, *doubts(fit)]
-
-
-def _signed(each: Found, *values: float) -> list[str]:
-    return [f"{each.value.scale * value:+.2f}" for value in values]
 
 
 def plain(fit: Fit) -> dict[str, Any]:

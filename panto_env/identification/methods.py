@@ -95,17 +95,8 @@ def solve(record: Record, known: Parameters, stride: int, free_offset: bool, met
         raise InputError(f"The record holds no motion that {names[int(np.argmin(length))]} acts on.")
     # Columns of length 1: the same solution, without losing digits to units.
     q, r = np.linalg.qr(a / length)
-    dependence = _dependence(r, names)
-    values = np.linalg.solve(r, q.T @ y) / length
-    variance = float(np.sum((y - a @ values) ** 2)) / freedom
-    std = np.sqrt(variance * (np.linalg.inv(r) ** 2).sum(axis=1)) / length
-    return Fit(method, known, names, values, std, float(np.linalg.cond(r * length)), dependence)
-
-
-def _dependence(r: Array, names: tuple[str, ...]) -> float:
-    """Condition number of R, (p, p), columns of length 1. Raises InputError where they are dependent."""
     _, singular, rows = np.linalg.svd(r)
-    dependence = float(singular[0] / singular[-1]) if singular[-1] > 0 else float("inf")
+    dependence = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
     if dependence > DEPENDENT:
         involved = [name for name, share in zip(names, rows[-1], strict=True) if abs(share) > 0.1]
         raise InputError(
@@ -113,7 +104,10 @@ def _dependence(r: Array, names: tuple[str, ...]) -> float:
             f"(condition number {dependence:.2g}). Excite several frequencies, as a sweep does, "
             "or measure one of them and give it with --measured."
         )
-    return dependence
+    values = np.linalg.solve(r, q.T @ y) / length
+    variance = float(np.sum((y - a @ values) ** 2)) / freedom
+    std = np.sqrt(variance * (np.linalg.inv(r) ** 2).sum(axis=1)) / length
+    return Fit(method, known, names, values, std, float(np.linalg.cond(r * length)), dependence)
 
 
 OUTPUT_ERROR = "output error"
