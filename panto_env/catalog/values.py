@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, repeat
@@ -54,6 +55,11 @@ def by_value(entry: Any) -> dict[str, Any]:
     """A line or a pantograph as plain data; its sources also report which values are defaults."""
     sources = {each.key: each.source for each in values_of(entry) if each.source}
     return {**entry.model_dump(mode="json"), "sources": {**entry.sources, **sources}}
+
+
+def in_toml(key: str, value: Any, source: str) -> str:
+    """A line of a TOML file: a value with its source. JSON's escapes are TOML's."""
+    return f"{key} = {{ value = {json.dumps(value)}, source = {json.dumps(source, ensure_ascii=False)} }}"
 
 
 def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[tuple[str, Any, str, bool]]:

@@ -130,7 +130,7 @@ def judge(
 ) -> Diagnosis:
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
     limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
-    evidence, levels = healthy.weigh(passes, limit)
+    evidence, levels = healthy.score(passes, limit)
     network = classifier or trained()
     found = [
         _finding(evidence, network.answer(evidence, region), float(evidence.score[region.peak]))
@@ -254,7 +254,7 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     shown = (evidence.position >= diagnosis.begin) & (evidence.position <= diagnosis.end)
     x = evidence.position[shown]
     figure, (force, score) = stacked((12, 6), 2)
-    force.plot(x, evidence.rest[shown], color=BLUE, linewidth=0.9)
+    force.plot(x, evidence.residual[shown], color=BLUE, linewidth=0.9)
     force.set(ylabel="force beside healthy passes (N)")
     score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
     words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"

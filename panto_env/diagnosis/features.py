@@ -33,14 +33,14 @@ class Evidence:
     """What one pass shows, or the mean of several, held against healthy ones."""
 
     position: Array  # (places,): m
-    rest: Array  # (places,): force beside what healthy passes would have (N)
+    residual: Array  # (places,): force beside what healthy passes would have (N)
     score: Array  # (places,): 0 where the line is not judged
     threshold: float  # of the score
     alignment: Alignment  # of the line
     droppers: Array  # (droppers,): positions (m)
     speed: float  # m/s
     wave_speed: float  # m/s
-    level: float  # of the rest where the passes are quiet (N)
+    level: float  # of the residual where the passes are quiet (N)
 
 
 class Region(NamedTuple):
@@ -73,13 +73,13 @@ def _echo(region: Region, greater: Region, evidence: Evidence) -> bool:
 
 
 AHEAD = 27.0
-"""Way (m) either side of the greatest score within which a defect may be that causes it."""
+"""Distance (m) either side of the greatest score within which a defect may be that causes it."""
 SUPPORTS = 35.0
 """Likewise of supports: two of them at least on lines of usual spans."""
 OFFSETS = np.arange(-24.0, 33.0, 1.5)
 """Places (m) about a candidate at which force and score are shown."""
 SCALE = 30.0
-"""Way (m) either side of the greatest score over which the rest has its scale."""
+"""Distance (m) either side of the greatest score over which the residual has its scale."""
 
 
 class Sort(IntEnum):
@@ -113,10 +113,10 @@ def candidates(evidence: Evidence, region: Region) -> list[Candidate]:
 
 
 def features(evidence: Evidence, region: Region, places: list[Candidate]) -> Array:
-    """(candidates, features): shape of rest and score about each, then how strong, where and how fast."""
-    x, score, rest = evidence.position, evidence.score, evidence.rest
+    """(candidates, features): shape of residual and score about each, then how strong, where and how fast."""
+    x, score, residual = evidence.position, evidence.score, evidence.residual
     peak = region.peak
-    scale = float(np.sqrt((rest[np.abs(x - x[peak]) < SCALE] ** 2).mean()))
+    scale = float(np.sqrt((residual[np.abs(x - x[peak]) < SCALE] ** 2).mean()))
     at = np.array([place.position for place in places])
     seen = at[:, None] + OFFSETS
     angle = 2 * np.pi * evidence.alignment.in_spans(at)
@@ -131,7 +131,7 @@ def features(evidence: Evidence, region: Region, places: list[Candidate]) -> Arr
     sorts = [[place.sort == sort for place in places] for sort in (Sort.DROPPER, Sort.SUPPORT)]
     return np.concatenate(
         [
-            np.interp(seen, x, rest) / scale,
+            np.interp(seen, x, residual) / scale,
             np.sqrt(np.interp(seen, x, score) / score[peak]),
             np.tile(common, (len(places), 1)),
             np.array(where).T,
@@ -175,8 +175,8 @@ def cautious_threshold(
     exceeded = _in_a_span(false_alarms, span)
     longer = t.isf(exceeded, passes - 1) / norm.isf(exceeded) * math.sqrt(1 + 1 / passes)
     between = min(1.0, float(maxima.mean(axis=1).var(ddof=1) / maxima.var()))
-    way = math.log(threshold(scores, per_span, span, false_alarms)) - middle
-    return math.exp(middle + way * math.sqrt(1 + between * (max(1.0, longer) ** 2 - 1)))
+    above = math.log(threshold(scores, per_span, span, false_alarms)) - middle
+    return math.exp(middle + above * math.sqrt(1 + between * (max(1.0, longer) ** 2 - 1)))
 
 
 def _in_a_span(false_alarms: float, span: float) -> float:

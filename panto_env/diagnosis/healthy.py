@@ -1,7 +1,7 @@
 """What healthy passes of a line have in common, place by place, and how far a pass is from it.
 
 A pass is the mean of the healthy ones, plus a few patterns along the whole line by which passes differ (speed
-and pantograph: principal components), plus a remainder. The remainder, over its usual size there and whitened
+and pantograph: principal components), plus a residual. The residual, over its usual size there and whitened
 along the line, is of size 1 where the line is healthy. Its energy in a window is the score.
 """
 
@@ -17,20 +17,20 @@ from .features import Evidence
 from .passes import Passes
 
 WINDOW = 8.0
-"""Length (m) over which the energy of the whitened remainder is taken: about a dropper interval."""
+"""Length (m) over which the energy of the whitened residual is taken: about a dropper interval."""
 MEMORY = 10.0
-"""Way (m) back along which the remainder is predicted, to whiten it."""
+"""Distance (m) back along which the residual is predicted, to whiten it."""
 SMOOTHED = 1.0
-"""Way (m) over which the remainder's usual size is smoothed."""
+"""Distance (m) over which the residual's usual size is smoothed."""
 MOST_PATTERNS = 4
 SPANS_COUNT_AS = 4
-"""Passes that the same place in other spans counts as, for the usual size of a remainder."""
+"""Passes that the same place in other spans counts as, for the usual size of a residual."""
 FLOOR = 0.1
 """Share of white noise that whitening reckons with: without, it would amplify what the 20 Hz filter left."""
 QUIET = 0.25
 """Quantile of a pass' windows by which its level is taken: a defect disturbs its surroundings, not this."""
 ROUNDS, FAR = 8, 2.0
-"""Of robust regression on the patterns; remainders beyond so many standard deviations count less."""
+"""Of robust regression on the patterns; residuals beyond so many standard deviations count less."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Healthy:
 
     mean: Array  # (places,): force (N)
     patterns: Array  # (patterns, places): by which passes differ (N)
-    size: Array  # (places,): usual size of the remainder, for a level of 1 (N)
-    predictor: Array  # (memory,): of the remainder by its past
+    size: Array  # (places,): usual size of the residual, for a level of 1 (N)
+    predictor: Array  # (memory,): of the residual by its past
     white: float  # rms of what the predictor leaves
     levels: Array  # (passes,): of healthy passes, each against the others (N)
     scores: Array  # (passes, judged): likewise
@@ -52,13 +52,13 @@ class Healthy:
         """Learn from passes; each is also held against the others alone, to see what healthy ones score."""
         force, window = passes.force, max(1, round(WINDOW / passes.step))
         one_out = [np.delete(np.arange(len(force)), k) for k in range(len(force))]
-        rest = np.array([_against(force[k], force[others]) for k, others in enumerate(one_out)])
-        levels = np.array([_level(each, window) for each in rest])
-        size = _usual_size(rest / levels[:, None], passes)
-        unit = np.zeros_like(rest)
+        residual = np.array([_against(force[k], force[others]) for k, others in enumerate(one_out)])
+        levels = np.array([_level(each, window) for each in residual])
+        size = _usual_size(residual / levels[:, None], passes)
+        unit = np.zeros_like(residual)
         for k, others in enumerate(one_out):
-            own = _usual_size(rest[others] / levels[others, None], passes)
-            unit[k] = rest[k] / own / _level(rest[k] / own, window)
+            own = _usual_size(residual[others] / levels[others, None], passes)
+            unit[k] = residual[k] / own / _level(residual[k] / own, window)
         predictor = _predictor(unit, round(MEMORY / passes.step))
         left = _whiten(unit, predictor)
         return cls(
@@ -67,27 +67,27 @@ class Healthy:
             size=size,
             predictor=predictor,
             white=float(left.std()),
-            levels=np.array([_level(each / size, window) for each in rest]),
+            levels=np.array([_level(each / size, window) for each in residual]),
             scores=_windowed(left / left.std(), window)[:, passes.lead :],
             lead=passes.lead,
             window=window,
         )
 
-    def weigh(self, passes: Passes, threshold: float) -> tuple[Evidence, Array]:
+    def score(self, passes: Passes, threshold: float) -> tuple[Evidence, Array]:
         """What passes show in the mean, and the level of each, (passes,) (N).
 
         What passes have in common that is not the line's, the error of the healthy mean, keeps its size in
         the mean of several: that is why the mean is levelled anew.
         """
-        rest = np.array([_remainder(each - self.mean, self.patterns, self.size) for each in passes.force])
-        levels = np.array([_level(each / self.size, self.window) for each in rest])
-        unit = (rest / levels[:, None]).mean(axis=0) / self.size
+        residual = np.array([_residual(each - self.mean, self.patterns, self.size) for each in passes.force])
+        levels = np.array([_level(each / self.size, self.window) for each in residual])
+        unit = (residual / levels[:, None]).mean(axis=0) / self.size
         left = _whiten(unit / _level(unit, self.window), self.predictor) / self.white
         score = _windowed(left, self.window)
         score[: self.lead] = 0.0
         evidence = Evidence(
             position=passes.position,
-            rest=rest.mean(axis=0),
+            residual=residual.mean(axis=0),
             score=score,
             threshold=threshold,
             alignment=passes.alignment,
@@ -102,8 +102,8 @@ class Healthy:
 def _against(force: Array, others: Array) -> Array:
     """Remainder of a healthy pass against others, as much as that of a pass that is none of all."""
     count = len(others)
-    rest = _remainder(force - others.mean(axis=0), _patterns(others), np.ones(len(force)))
-    return np.asarray(rest * np.sqrt((1 + 1 / (count + 1)) / (1 + 1 / count)))
+    residual = _residual(force - others.mean(axis=0), _patterns(others), np.ones(len(force)))
+    return np.asarray(residual * np.sqrt((1 + 1 / (count + 1)) / (1 + 1 / count)))
 
 
 def _patterns(force: Array) -> Array:
@@ -112,33 +112,33 @@ def _patterns(force: Array) -> Array:
     return np.asarray(along[: min(MOST_PATTERNS, len(force) // 2)])
 
 
-def _remainder(deviation: Array, patterns: Array, size: Array) -> Array:
+def _residual(deviation: Array, patterns: Array, size: Array) -> Array:
     """A deviation (N) less what patterns explain of it; places far off hardly count (Huber's weights)."""
-    weight, rest = np.ones(len(deviation)), deviation
+    weight, residual = np.ones(len(deviation)), deviation
     for _ in range(ROUNDS):
         weighted = patterns * weight / size**2
         share = np.linalg.lstsq(weighted @ patterns.T, weighted @ deviation, rcond=None)[0]
-        rest = deviation - share @ patterns
-        off = np.abs(rest) / size
+        residual = deviation - share @ patterns
+        off = np.abs(residual) / size
         weight = np.minimum(1.0, FAR * 1.48 * np.median(off) / np.maximum(off, 1e-12))
-    return rest
+    return residual
 
 
-def _usual_size(rest: Array, passes: Passes) -> Array:
-    """Rms of remainders, (passes, places), by place: here, weighted by the number of passes, and at the
+def _usual_size(residual: Array, passes: Passes) -> Array:
+    """Rms of residuals, (passes, places), by place: here, weighted by the number of passes, and at the
     same place of all spans.
     """
     from scipy.ndimage import gaussian_filter1d  # slow to import
 
-    energy, smooth = (rest**2).mean(axis=0), SMOOTHED / passes.step
+    energy, smooth = (residual**2).mean(axis=0), SMOOTHED / passes.step
     alike = gaussian_filter1d(energy.reshape(-1, passes.per_span).mean(axis=0), smooth, mode="wrap")
     here = gaussian_filter1d(energy, smooth, mode="nearest")
-    share = len(rest) / (len(rest) + SPANS_COUNT_AS)
+    share = len(residual) / (len(residual) + SPANS_COUNT_AS)
     return np.asarray(np.sqrt(share * here + (1 - share) * np.tile(alike, len(here) // passes.per_span)))
 
 
 def _predictor(unit: Array, memory: int) -> Array:
-    """Linear predictor of remainders, (passes, places), by their past: Yule-Walker's equations."""
+    """Linear predictor of residuals, (passes, places), by their past: Yule-Walker's equations."""
     from scipy.linalg import solve_toeplitz  # slow to import
 
     places = unit.shape[1]
@@ -161,5 +161,5 @@ def _windowed(values: Array, window: int) -> Array:
     return np.asarray(uniform_filter1d(values**2, window, mode="nearest"))
 
 
-def _level(rest: Array, window: int) -> float:
-    return float(np.sqrt(np.quantile(_windowed(rest, window), QUIET)))
+def _level(residual: Array, window: int) -> float:
+    return float(np.sqrt(np.quantile(_windowed(residual, window), QUIET)))

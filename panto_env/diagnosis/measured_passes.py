@@ -17,7 +17,8 @@ from pydantic import ValidationError
 from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
 from ..fitting.misfit import OWN, Part
-from ..fitting.problem import Problem, problem
+from ..fitting.problem import problem
+from ..fitting.solve import Fitting
 from ..fitting.stored import Stored, turned
 from ..fitting.values import FREE
 from ..plant.alignment import Alignment
@@ -29,7 +30,7 @@ from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
 HEALTHY = 24
 """Healthy passes that are simulated: enough to know how much they differ."""
 AWAY = 0.5
-"""Way (m) on each side of a record's rough place within which it is placed finely."""
+"""Distance (m) on each side of a record's rough place within which it is placed finely."""
 
 
 def measured_passes(
@@ -51,14 +52,14 @@ def measured_passes(
     tolerances = {value.kind: value.tolerance for value in known.values if value.kind != "unevenness"}
     single, notes = _one_piece_each(records, known.compared)
     ready = problem(single, line, pantograph, free=kinds, tolerances=tolerances)
-    parts, plan = ready.fitting.parts, ready.fitting.values.design
+    parts, plan = ready.parts, ready.values.design
     speeds = np.array([part.measured.piece.speed_kmh for part in parts])
     if np.ptp(speeds) > SPEEDS * speeds.min():
         raise InputError(
             f"Records at {speeds.min():.4g} and {speeds.max():.4g} km/h cannot be judged together: speeds "
             f"may differ by {100 * SPEEDS:g} %."
         )
-    before, alignment = ready.before, line.alignment(ready.first_span + plan.spans)
+    before, alignment = ready.before, line.alignment(plan.first_span + plan.spans)
     first, per_span, position = _places(alignment, before, parts, known, float(speeds.mean()))
     random = np.random.default_rng(seed)
     mean, covariance = _values(ready, known)
@@ -69,8 +70,8 @@ def measured_passes(
         seen = _finely(part, usual)
         if number == 0:
             gain, zero = (OWN[name] * random.standard_normal(HEALTHY) for name in ("gain", "zero"))
-            variants = [ready.fitting.values.variant(x, static + z) for x, z in zip(drawn, zero, strict=True)]
-            forces = part.measured.coefficients(ready.fitting.sampled(part, variants)) * (1 + gain[:, None])
+            variants = [ready.values.variant(x, static + z) for x, z in zip(drawn, zero, strict=True)]
+            forces = part.measured.coefficients(ready.sampled(part, variants)) * (1 + gain[:, None])
             forces += known.noise[part.measured.band] * random.standard_normal(forces.shape)
             for own, force in zip(healthy, forces, strict=True):
                 own[:] = np.interp(position - before, part.measured.place, part.measured.back(force))
@@ -119,16 +120,16 @@ def _places(
     return first, per_span, places_of(alignment, first, per_span, (last - first) * per_span)
 
 
-def _values(ready: Problem, known: Stored) -> tuple[Array, Array]:
+def _values(ready: Fitting, known: Stored) -> tuple[Array, Array]:
     """What a fit knows of the values of another one: means, (values,), and covariance.
 
     Of values that are not in it only the tolerance is known.
     """
     numbers = {value.name: number for number, value in enumerate(known.values)}
-    values = ready.fitting.values.all
+    values = ready.values.all
     own = np.array([numbers.get(value.name, -1) for value in values])
     there = np.flatnonzero(own >= 0)
-    mean, covariance = np.zeros(len(own)), np.diag(ready.fitting.values.tolerances**2)
+    mean, covariance = np.zeros(len(own)), np.diag(ready.values.tolerances**2)
     mean[there] = known.difference[own[there]]
     covariance[np.ix_(there, there)] = known.covariance[np.ix_(own[there], own[there])]
     if ready.before:
@@ -137,13 +138,13 @@ def _values(ready: Problem, known: Stored) -> tuple[Array, Array]:
     return mean, covariance
 
 
-def _usual(ready: Problem, part: Part, mean: Array) -> tuple[float, Array]:
+def _usual(ready: Fitting, part: Part, mean: Array) -> tuple[float, Array]:
     """Static force (N) with which a simulated pass has the record's mean force, and its coefficients."""
-    values = ready.fitting.values
+    values = ready.values
     static = values.design.pantograph.static_force
-    force = ready.fitting.sampled(part, [values.variant(mean, static)])[0]
+    force = ready.sampled(part, [values.variant(mean, static)])[0]
     static += float(part.measured.force().mean() - force.mean())
-    force = ready.fitting.sampled(part, [values.variant(mean, static)])[0]
+    force = ready.sampled(part, [values.variant(mean, static)])[0]
     return static, part.measured.coefficients(force)
 
 

@@ -13,8 +13,7 @@ from pydantic import ValidationError
 from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
-from ..estimation.estimate import filter_motion, gains_of, model_of
-from ..estimation.kalman import smooth_force
+from ..estimation.estimate import estimate
 from ..estimation.model import EstimatorSettings
 from ..estimation.motion import Motion, check_motion, measure, on_frame, warn_of_wind
 from ..metrics.figures import FIRST_SETTLED
@@ -22,6 +21,7 @@ from ..metrics.low_pass import CUTOFF, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Alignment
 from ..plant.pantograph.schema import PantographData
+from ..records.record import repeated
 
 RATE = 500.0
 """Samples of a sensor per second, own choice: as many as a fast simulation has, to look at 20 Hz."""
@@ -92,9 +92,7 @@ def estimated_force(run: Trajectory, seed: int, pantograph: PantographData | Non
     none = np.zeros(len(run.time))  # of what is not looked at, and need not have been recorded
     seen = replace(run, head_velocity=none, frame_velocity=none, contact_force=none)
     motion = replace(measure(seen, rate=RATE, seed=seed), head_velocity=None, frame_velocity=None)
-    model = model_of(motion, known, ESTIMATOR)
-    filtered = filter_motion(model, gains_of(model, ESTIMATOR, len(motion.head)), motion)
-    force = smooth_force(model, filtered, round(ESTIMATOR.lag * RATE))
+    force = estimate(motion, known, ESTIMATOR).force
     return zero_phase_low_pass(np.interp(run.time, motion.time, force), run.time_step)
 
 
@@ -108,7 +106,7 @@ the noise of its estimate, at 250 km/h."""
 LEAD = 1
 """Spans before those that are judged: what is predicted from its past wants a past."""
 END = 10.0
-"""Way (m) before the end of a run that is not judged: a filter without delay does not know how it goes on."""
+"""Distance (m) before the end of a run that is not judged: a filter without delay needs what follows."""
 FEWEST = 3
 """Healthy passes: each is held against the mean of the others."""
 
@@ -193,9 +191,8 @@ def side_by_side(
     first, speed = everything[0], float(np.mean([run.speed_kmh for run in healthy]))
     for run in everything:
         _check_alike(run, first, speed)
-    for k, run in enumerate(everything):
-        if any(np.array_equal(run.head, other.head) for other in everything[:k]):
-            raise InputError("One run stands there twice, which says nothing new; give each once.")
+    for _ in repeated((run.catenary, run.head) for run in everything):
+        raise InputError("One run stands there twice, which says nothing new; give each once.")
     alignment, span = first.alignment, first.alignment.mean_length
     last = min(alignment.last_whole_span(run.distance - END) for run in everything)
     if last < FIRST_SETTLED:
@@ -211,8 +208,8 @@ def side_by_side(
     random = np.random.default_rng(seed)
     for own, name, run in zip(force, names, everything, strict=True):
         with _named(name):
-            estimate = estimated_force(run, int(random.integers(2**63)), pantograph)
-        own[:] = np.interp(places, run.position, estimate)
+            force_of_run = estimated_force(run, int(random.integers(2**63)), pantograph)
+        own[:] = np.interp(places, run.position, force_of_run)
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
     if not len(droppers):
         raise InputError(

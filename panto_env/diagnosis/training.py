@@ -186,7 +186,7 @@ def examples(track: Track) -> tuple[Array, Index]:
     level = threshold(model.scores, passes.per_span, passes.span)
     shown, classes = [], []
     for k, (defect, _) in enumerate(whole):
-        evidence, _ = model.weigh(passes.only(k), level)
+        evidence, _ = model.score(passes.only(k), level)
         for region in regions(evidence):
             if defect.kind in KINDS and abs(
                 evidence.position[region.peak] - defect.position

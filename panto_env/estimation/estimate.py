@@ -66,7 +66,8 @@ def estimate(
     settings = EstimatorSettings() if settings is None else settings
     check_motion(motion, pantograph)
     model = model_of(motion, pantograph, settings)
-    gains = gains_of(model, settings, len(motion.head))
+    steady = settings.gain == "steady"
+    gains = steady_gains(model) if steady else time_varying_gains(model, len(motion.head))
     filtered = filter_motion(model, gains, motion)
     lag = round(settings.lag / motion.time_step)
     force = smooth_force(model, filtered, lag) if lag else filtered.state @ model.force
@@ -96,11 +97,6 @@ def model_of(motion: Motion, pantograph: PantographData, settings: EstimatorSett
         raise InputError("The motion has no velocities; take the observation 'displacements'.")
     process = settings.force_model.process(motion.speed, motion.span)
     return build_model(pantograph, process, settings, motion.time_step)
-
-
-def gains_of(model: Model, settings: EstimatorSettings, samples: int) -> Gains:
-    """Gains of the kind that the settings name. Raises InputError where there is no steady one."""
-    return steady_gains(model) if settings.gain == "steady" else time_varying_gains(model, samples)
 
 
 def filter_motion(model: Model, gains: Gains, motion: Motion) -> Filtered:
@@ -216,6 +212,8 @@ BANDS = (2.0, 5.0, 20.0)
 """Highest frequencies (Hz) of the bands 0-2, 0-5 and 0-20 Hz."""
 ORDER = 4
 """Of the Butterworth low-pass that cuts a band out, run forward and backward, so that it delays nothing."""
+ENDS = 1.0
+"""Time (s) at each end of a record that is not scored."""
 MAXIMUM_DELAY = 0.1
 """Either way, that is looked for (s)."""
 COHERENT = 0.5
@@ -235,12 +233,12 @@ class Score:
     phase_delay: float  # mean over the band's coherent frequencies, by power (s); nan: none is coherent
 
 
-def score(true: Array, estimated: Array, time_step: float, band: float, ends: float = 1.0) -> Score:
-    """Compare two records of a force (N), (n,), in 0 to ``band`` (Hz); ``ends`` (s) are left out at each end.
+def score(true: Array, estimated: Array, time_step: float, band: float) -> Score:
+    """Compare two records of a force (N), (n,), in 0 to ``band`` (Hz), without ``ENDS`` at each end.
 
     Raises InputError where they are too short, or too coarse for the band.
     """
-    left_out = round(ends / time_step)
+    left_out = round(ENDS / time_step)
     if len(true) < 2 * left_out + round(4 / (band * time_step)) or not band < 0.5 / time_step:
         raise InputError(
             f"{len(true)} samples {1e3 * time_step:g} ms apart are too short or too coarse a record for "

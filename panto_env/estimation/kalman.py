@@ -15,8 +15,8 @@ from ..base.arrays import Array, Index, one_thread
 from ..base.errors import InputError
 from .model import Model
 
-SETTLED = 1e-10
-"""Change of the predicted covariance in a step, relative, below which it counts as settled."""
+CONVERGED = 1e-10
+"""Relative change of the predicted covariance in a step below which it has converged."""
 BLOCK = 4096
 """Samples that are computed together: it bounds the memory."""
 
@@ -26,9 +26,7 @@ class Gains(NamedTuple):
 
     gain: Array  # (j, N, m)
     innovation: Array  # (j, m, m): covariance of the innovation
-    force: (
-        Array  # (j, N): covariance of the predicted state with the predicted contact force (N times its unit)
-    )
+    force: Array  # (j, N): covariance of the predicted state with the contact force (N times its unit)
 
     def of(self, samples: Index) -> Gains:
         """Gains of the samples with these numbers, (n,)."""
@@ -49,7 +47,7 @@ class Filtered:
 def steady_covariance(
     transition: Array, observed: Array, process_noise: Array, measurement_noise: Array
 ) -> Array:
-    """Covariance of the predicted state, (N, N), that a Kalman filter settles at; arguments as in ``Model``.
+    """Covariance of the predicted state, (N, N), that a filter converges to; arguments as in ``Model``.
 
     Raises InputError where there is none, as when a part of the state can neither be seen nor fades away.
     """
@@ -60,9 +58,9 @@ def steady_covariance(
             found = solve_discrete_are(transition.T, observed.T, process_noise, measurement_noise)
             covariance = np.asarray((found + found.T) / 2)
             gain, _ = correction(covariance, observed, measurement_noise)
-            kept = transition @ (np.eye(len(transition)) - gain @ observed)
+            closed = transition @ (np.eye(len(transition)) - gain @ observed)
             # SciPy may find a solution that rounding alone has made: of a part that nothing shows.
-            if not np.abs(np.linalg.eigvals(kept)).max() < 1 - SETTLED:
+            if not np.abs(np.linalg.eigvals(closed)).max() < 1 - CONVERGED:
                 raise np.linalg.LinAlgError("a part of the state is never forgotten")
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
@@ -73,7 +71,7 @@ def steady_covariance(
 
 
 def steady_gain(transition: Array, observed: Array, process_noise: Array, measurement_noise: Array) -> Array:
-    """Gain, (N, m), that a Kalman filter settles at: z <- z + gain (y - observed z).
+    """Gain, (N, m), that a Kalman filter converges to: z <- z + gain (y - observed z).
 
     Arguments are as in ``Model``. Raises InputError where there is none.
     """
@@ -88,7 +86,7 @@ def steady_gains(model: Model) -> Gains:
 
 
 def time_varying_gains(model: Model, samples: int) -> Gains:
-    """Gains from the start of a record on, for so many samples, or until they have settled."""
+    """Gains from the start of a record on, for so many samples, or until they have converged."""
     covariance, kept = model.start_covariance, []
     for _ in range(samples):
         kept.append(_gains(model, covariance))
@@ -96,9 +94,9 @@ def time_varying_gains(model: Model, samples: int) -> Gains:
         after = corrected(covariance, gain, model.observed, model.measurement_noise)
         following = model.transition @ after @ model.transition.T + model.process_noise
         deviation = np.sqrt(np.diag(following))
-        settled = (np.abs(following - covariance) <= SETTLED * np.outer(deviation, deviation)).all()
+        converged = (np.abs(following - covariance) <= CONVERGED * np.outer(deviation, deviation)).all()
         covariance = following
-        if settled:
+        if converged:
             break
     return Gains(*(np.array(each) for each in zip(*kept, strict=True)))
 
@@ -107,18 +105,18 @@ def run_filter(model: Model, gains: Gains, measured: Array, inputs: Array, start
     """Filter n samples. measured: (n, m); inputs: (n, 2), from each to the next (N); start: (N,)."""
     n = len(measured)
     predicted = np.empty((n, len(start)))
-    pushed = inputs @ model.inputs.T
+    forced = inputs @ model.inputs.T
     transition, observed, last = model.transition, model.observed, len(gains.gain) - 1
     z = start
     for k in range(min(n, last)):
         predicted[k] = z
-        z = transition @ (z + gains.gain[k] @ (measured[k] - observed @ z)) + pushed[k]
+        z = transition @ (z + gains.gain[k] @ (measured[k] - observed @ z)) + forced[k]
     # With the last gain the filter is one matrix: half as much to do.
-    kept = transition @ (np.eye(len(start)) - gains.gain[-1] @ observed)
-    driven = pushed + measured @ (transition @ gains.gain[-1]).T
+    closed = transition @ (np.eye(len(start)) - gains.gain[-1] @ observed)
+    driven = forced + measured @ (transition @ gains.gain[-1]).T
     for k in range(min(n, last), n):
         predicted[k] = z
-        z = kept @ z + driven[k]
+        z = closed @ z + driven[k]
     innovations = measured - predicted @ observed.T
     state = predicted.copy()
     for begin in range(0, n, BLOCK):
@@ -163,21 +161,21 @@ def corrected(covariance: Array, gain: Array, observed: Array, measurement_noise
 
     Joseph's form: it stays symmetric and positive whatever is rounded.
     """
-    kept = np.eye(len(covariance)) - gain @ observed
-    return np.asarray(kept @ covariance @ kept.T + gain @ measurement_noise @ gain.T)
+    remaining = np.eye(len(covariance)) - gain @ observed
+    return np.asarray(remaining @ covariance @ remaining.T + gain @ measurement_noise @ gain.T)
 
 
 def smooth_force(model: Model, filtered: Filtered, lag: int) -> Array:
     """Contact force (N), (n,), at each sample from that and ``lag`` later ones, or as many as there are.
 
     Bryson and Frazier's form of the smoother (recalled): the prediction is corrected by later innovations,
-    each through what is left of the error when it is measured. Once gains have settled, that is the same sum
-    at every sample.
+    each through what is left of the error when it is measured. Once gains have converged, that is one sum at
+    every sample.
     """
-    n, settled = len(filtered.innovations), len(filtered.gains.gain) - 1
+    n, converged = len(filtered.innovations), len(filtered.gains.gain) - 1
     force = filtered.predicted @ model.force
-    for begin in range(0, min(n, settled), BLOCK):
-        block = np.arange(begin, min(begin + BLOCK, n, settled))
+    for begin in range(0, min(n, converged), BLOCK):
+        block = np.arange(begin, min(begin + BLOCK, n, converged))
         adjoint = np.zeros((len(block), len(model.force)))
         for later in range(lag, -1, -1):
             samples = block + later
@@ -189,12 +187,12 @@ def smooth_force(model: Model, filtered: Filtered, lag: int) -> Array:
             news = np.linalg.solve(gains.innovation, innovation[:, :, None])[:, :, 0]
             adjoint = back + (news - np.einsum("ki,kij->kj", back, gains.gain)) @ model.observed
         force[block] += np.einsum("ki,ki->k", filtered.gains.of(block).force, adjoint)
-    if n > settled:
-        news = np.vstack([filtered.innovations[settled:], np.zeros((lag, len(model.observed)))])
+    if n > converged:
+        news = np.vstack([filtered.innovations[converged:], np.zeros((lag, len(model.observed)))])
         innovation, seen = filtered.gains.innovation[-1], _seen_later(model, filtered.gains, lag)
         each_weight = np.array([np.linalg.solve(innovation, each) for each in seen])  # of an innovation (N)
         for own, weights in zip(news.T, each_weight.T, strict=True):
-            force[settled:] += np.correlate(own, weights, "valid")
+            force[converged:] += np.correlate(own, weights, "valid")
     return np.asarray(force)
 
 

@@ -210,12 +210,27 @@ def check_motion(motion: Motion, pantograph: PantographData) -> None:
                 "without gaps."
             )
     for name, values in named.items():
-        _check_size(name, values, motion)
+        if np.ptp(values) > 0:  # else the sensor is dead
+            check_displacement(name, values, MOTION)
+            quickest = int(np.abs(np.diff(values)).argmax())
+            jump = values[quickest + 1] - values[quickest]
+            if abs(jump) > FASTEST * motion.time_step:
+                raise InputError(
+                    f"Column {name} jumps by {1e3 * jump:.3g} mm at {motion.time[quickest + 1]:.6g} s, "
+                    "faster than any pantograph moves; give a part of the record without such jumps."
+                )
     for name, values in (named | measured).items():
         _check_alive(name, values, motion)
     for name, values in measured.items():
         _check_velocity(name, values, named[name.removesuffix("_velocity")], motion.time_step)
-    _check_zero(motion, pantograph)
+    offset = suspension_offset(motion, pantograph)
+    if abs(offset) > MOST_OFFSET:
+        raise InputError(
+            f"The head's suspension would carry {offset:+.0f} N more in the mean than the lift of "
+            f"{motion.lift:.0f} N leaves: heights seem to count from another zero than where the springs "
+            "carry nothing, or up and down, pantograph or lift are not as said; where only motion counts, "
+            "take the zero as free."
+        )
 
 
 def suspension_offset(motion: Motion, pantograph: PantographData) -> float:
@@ -252,8 +267,7 @@ def _check_time(motion: Motion) -> None:
             f"The record has {rate:,.4g} samples a second; {SAMPLING[0]:g} to {SAMPLING[1]:,g} are required: "
             "is its time in the unit that is said?"
         )
-    if samples > MOST_SAMPLES:
-        raise InputError(f"The record has {samples:,} samples; give a part of {MOST_SAMPLES:,} at most.")
+    check_count(samples)
     if duration < MINIMUM:
         raise InputError(
             f"The record is {beside(duration, MINIMUM, '.3g')} s long; give {MINIMUM:g} s at least."
@@ -265,19 +279,29 @@ def _check_time(motion: Motion) -> None:
         )
 
 
-def _check_size(name: str, values: Array, motion: Motion) -> None:
-    farthest, moved = float(np.abs(values).max()), float(np.ptp(values))
-    if farthest > FARTHEST or moved > MOTION[1]:
-        what = f"heights of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {moved:.3g} m"
-        raise InputError(f"Column {name} holds {what}, which no pantograph makes: mm in a column of m?")
-    if 0 < moved < MOTION[0]:
-        raise InputError(f"Column {name} moves by {1e6 * moved:.3g} µm only: metres in a column of mm?")
-    quickest = int(np.abs(np.diff(values)).argmax())
-    if abs(values[quickest + 1] - values[quickest]) > FASTEST * motion.time_step:
+def check_count(samples: int) -> None:
+    """Raise InputError for a record of more samples than can be worked on."""
+    if samples > MOST_SAMPLES:
         raise InputError(
-            f"Column {name} jumps by {1e3 * (values[quickest + 1] - values[quickest]):.3g} mm at "
-            f"{motion.time[quickest + 1]:.6g} s, faster than any pantograph moves; give a part of the record "
-            "without such jumps."
+            f"The record has {samples:,} samples; give a part of {MOST_SAMPLES:,} at most, or resample it to "
+            "some thousand a second."
+        )
+
+
+def check_displacement(name: str, values: Array, extent: tuple[float, float]) -> None:
+    """Raise InputError for a displacement (m), (n,), that no pantograph makes.
+
+    name: of its column. extent: minimum and maximum from end to end (m).
+    """
+    farthest, moved = float(np.abs(values).max()), float(np.ptp(values))
+    if farthest > FARTHEST or moved > extent[1]:
+        what = f"displacements of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {moved:.3g} m"
+        raise InputError(
+            f"Column {name} holds {what}, which no pantograph makes: mm in a column of m, or µm in one of mm?"
+        )
+    if moved < extent[0]:
+        raise InputError(
+            f"Column {name} moves by {1e6 * moved:.3g} µm only: metres in a column of mm, or mm in one of µm?"
         )
 
 
@@ -308,15 +332,4 @@ def _check_velocity(name: str, velocity: Array, height: Array, step: float) -> N
         raise InputError(
             f"Column {name} is {slope:.3g} times the rate at which its height changes: are their units and "
             "signs as said (up is positive)?"
-        )
-
-
-def _check_zero(motion: Motion, pantograph: PantographData) -> None:
-    offset = suspension_offset(motion, pantograph)
-    if abs(offset) > MOST_OFFSET:
-        raise InputError(
-            f"The head's suspension would carry {offset:+.0f} N more in the mean than the lift of "
-            f"{motion.lift:.0f} N leaves: heights seem to count from another zero than where the springs "
-            "carry nothing, or up and down, pantograph or lift are not as said; where only motion counts, "
-            "take the zero as free."
         )

@@ -81,8 +81,20 @@ def estimate_parameters(
     if not names:
         raise InputError("Name at least one parameter.")
     _check(names, pantograph)
-    linear = _Linearised(motion, pantograph, settings, names)
-    model, p = linear.model, len(names)
+    known, p = np.array([_get(pantograph, name) for name in names]), len(names)
+
+    def model_at(logarithms: Array) -> Model:
+        values = dict(zip(names, known * np.exp(logarithms), strict=True))
+        return model_of(motion, changed(pantograph, values), settings)
+
+    def linearised(about: Array) -> tuple[Model, Array, Array]:
+        """The model, and derivatives of its transition, (p, N, N), and inputs, (p, N, 2), by logarithms."""
+        sides = [[model_at(about + sign * STEP * row) for sign in (1, -1)] for row in np.eye(p)]
+        transitions = np.array([(a.transition - b.transition) / (2 * STEP) for a, b in sides])
+        return model_at(about), transitions, np.array([(a.inputs - b.inputs) / (2 * STEP) for a, b in sides])
+
+    about = np.zeros(p)
+    model, transitions, gains = linearised(about)
     measured, inputs = motion.measured(len(model.observed)), motion.inputs
     size = len(model.force)
     observed = np.hstack([model.observed, np.zeros((len(model.observed), p))])
@@ -95,12 +107,17 @@ def estimate_parameters(
         state = state + gain @ (sample - observed @ state)
         covariance = corrected(covariance, gain, observed, model.measurement_noise)
         history[k], force[k] = state[size:], model.force @ state[:size]
-        moved, slope = linear.move(state[:size], state[size:], inputs[k])
+        z, logarithms = state[:size], state[size:]
+        if np.abs(logarithms - about).max() > MOVED:
+            about = logarithms.copy()
+            model, transitions, gains = linearised(about)
+        transition = model.transition + np.tensordot(logarithms - about, transitions, 1)
+        driven = model.inputs + np.tensordot(logarithms - about, gains, 1)
         jacobian = np.eye(size + p)
-        jacobian[:size] = slope
-        state[:size] = moved
+        jacobian[:size, :size] = transition
+        jacobian[:size, size:] = (transitions @ z + gains @ inputs[k]).T
+        state[:size] = transition @ z + driven @ inputs[k]
         covariance = jacobian @ covariance @ jacobian.T + noise
-    known = np.array([_get(pantograph, name) for name in names])
     values = known * np.exp(history)
     return Parameters(
         names=names,
@@ -153,41 +170,6 @@ def changed(pantograph: PantographData, values: dict[str, float]) -> PantographD
         chain[int(place) - 1] = float(value)
         update[key] = tuple(chain)
     return pantograph.model_copy(update=update)
-
-
-class _Linearised:
-    """One step of the state, to first order in the parameters about those at which it was last built."""
-
-    def __init__(
-        self,
-        motion: Motion,
-        pantograph: PantographData,
-        settings: EstimatorSettings,
-        names: Sequence[str],
-    ) -> None:
-        self._motion, self._pantograph, self._settings, self._names = motion, pantograph, settings, names
-        self._known = np.array([_get(pantograph, name) for name in names])
-        self._build(np.zeros(len(names)))
-
-    def move(self, state: Array, logarithms: Array, inputs: Array) -> tuple[Array, Array]:
-        """The state a step later, (N,), and its slope over state and logarithms, (N, N + p)."""
-        if np.abs(logarithms - self._about).max(initial=0.0) > MOVED:
-            self._build(logarithms)
-        transition = self.model.transition + np.tensordot(logarithms - self._about, self._transitions, 1)
-        pushed = self.model.inputs + np.tensordot(logarithms - self._about, self._inputs, 1)
-        slope = (self._transitions @ state + self._inputs @ inputs).T
-        return transition @ state + pushed @ inputs, np.hstack([transition, slope])
-
-    def _build(self, about: Array) -> None:
-        self._about = about.copy()
-        self.model = self._model(about)
-        sides = [[self._model(about + sign * STEP * row) for sign in (1, -1)] for row in np.eye(len(about))]
-        self._transitions = np.array([(a.transition - b.transition) / (2 * STEP) for a, b in sides])
-        self._inputs = np.array([(a.inputs - b.inputs) / (2 * STEP) for a, b in sides])
-
-    def _model(self, logarithms: Array) -> Model:
-        values = dict(zip(self._names, self._known * np.exp(logarithms), strict=True))
-        return model_of(self._motion, changed(self._pantograph, values), self._settings)
 
 
 def _check(names: Sequence[str], pantograph: PantographData) -> None:

@@ -7,8 +7,6 @@ over the step before each sample is what least squares needs to explain it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..base.arrays import Array
@@ -17,7 +15,7 @@ from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData
 from .estimate import model_of
 from .force import RandomWalk
-from .kalman import corrected, correction
+from .kalman import CONVERGED, corrected, correction
 from .model import EstimatorSettings, Model
 from .motion import Motion, check_motion
 
@@ -61,8 +59,6 @@ def _difference(values: Array, time_step: float) -> Array:
     return np.diff(values, prepend=values[:1]) / time_step
 
 
-SETTLED = 1e-10
-"""Relative change of the covariance in a step below which it counts as settled."""
 _HELD = RandomWalk(intensity=0.01)  # hardly moves: what the force does over a step is no noise of the state
 
 
@@ -79,16 +75,17 @@ def unknown_input(
     """
     settings = EstimatorSettings() if settings is None else settings
     check_motion(motion, pantograph)
-    system = _system(model_of(motion, pantograph, settings.model_copy(update={"force_model": _HELD})))
+    settings = settings.model_copy(update={"force_model": _HELD})
+    system, contact = _system(model_of(motion, pantograph, settings))
     measured, known = motion.measured(len(system.observed)), motion.inputs @ system.inputs.T
     state, covariance = system.observed.T @ measured[0], system.start_covariance
-    settled = False
+    converged = False
     raw = np.empty(len(measured))
     for k, sample in enumerate(measured):
-        if not settled:
-            gain, of_force, after = _gain(system, covariance)
+        if not converged:
+            gain, of_force, after = _gain(system, contact, covariance)
             following = system.transition @ after @ system.transition.T + system.process_noise
-            settled = bool(np.abs(following - covariance).max() <= SETTLED * np.abs(covariance).max())
+            converged = bool(np.abs(following - covariance).max() <= CONVERGED * np.abs(covariance).max())
             covariance = following
         innovation = sample - system.observed @ state
         raw[k] = of_force @ innovation
@@ -97,35 +94,27 @@ def unknown_input(
     return raw if cutoff is None else low_pass(raw, motion.time_step, cutoff, ORDER)
 
 
-class _System(NamedTuple):
-    """As ``Model``, but that the contact force is no state: it is held over a step, and unknown."""
+def _system(model: Model) -> tuple[Model, Array]:
+    """The model whose contact force is no state, but held over a step, and unknown; and what 1 N changes.
 
-    transition: Array  # (N, N)
-    inputs: Array  # (N, 2)
-    contact: Array  # (N,): change of the state by 1 N of contact force
-    process_noise: Array  # (N, N)
-    observed: Array  # (m, N)
-    measurement_noise: Array  # (m, m)
-    start_covariance: Array  # (N, N)
-
-
-def _system(model: Model) -> _System:
-    kept, force = np.flatnonzero(model.force == 0), np.flatnonzero(model.force)
-    square = np.ix_(kept, kept)
-    return _System(
+    The latter is the change of the state, (N,).
+    """
+    states, force = np.flatnonzero(model.force == 0), np.flatnonzero(model.force)
+    square = np.ix_(states, states)
+    system = model._replace(
         transition=model.transition[square],
-        inputs=model.inputs[kept],
-        contact=model.transition[kept, force],
+        inputs=model.inputs[states],
         process_noise=model.process_noise[square],
-        observed=model.observed[:, kept],
-        measurement_noise=model.measurement_noise,
+        observed=model.observed[:, states],
+        force=model.force[states],
         start_covariance=model.start_covariance[square],
     )
+    return system, model.transition[states, force]
 
 
-def _gain(system: _System, covariance: Array) -> tuple[Array, Array, Array]:
+def _gain(system: Model, contact: Array, covariance: Array) -> tuple[Array, Array, Array]:
     """Gains of state, (N, m), and force, (m,); covariance of the corrected state, by the predicted one's."""
-    observed, contact = system.observed, system.contact
+    observed = system.observed
     known, innovation = correction(covariance, observed, system.measurement_noise)
     through = observed @ contact
     weight = np.linalg.solve(innovation, through)

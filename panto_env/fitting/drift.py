@@ -2,8 +2,8 @@
 
 With x the values at the earlier fit and d their changes since, fits to the earlier and later records are
 Gaussian likelihoods of x and of x + d; x has the fits' tolerances as prior, d has tolerances of its own. What
-records hardly tell of a line, such as a smooth shift of all droppers, is in both fits and falls out: changes
-are known better than the line is.
+records hardly determine, such as a smooth shift of all droppers, is in both fits and falls out: changes are
+known better than the line is.
 """
 
 from __future__ import annotations
@@ -32,18 +32,11 @@ class Drift:
     earlier: Stored
     later: Stored
     found: tuple[Found, ...]  # changes, along what both fits compared
-    surely: tuple[bool, ...]  # whether each is named as changed
+    changed: tuple[Found, ...]  # those that are named, most surely first
 
     def of_kind(self, kind: str) -> list[Found]:
         """Changes of one kind of values."""
         return [each for each in self.found if each.value.kind == kind]
-
-    @property
-    def changed(self) -> list[Found]:
-        """Values that have changed, most surely first."""
-        pairs = zip(self.found, self.surely, strict=True)
-        named = [each for each, sure in pairs if sure]
-        return sorted(named, key=lambda each: -abs(each.difference) / each.deviation)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -62,12 +55,12 @@ def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None
     names, given = list(values), dict(tolerances or {})
     prior = np.array([value.tolerance for value in values.values()])
     usual = np.array([given.get(each.kind, SMALLER * each.tolerance) for each in values.values()])
-    (first, first_pull), (second, second_pull) = (_likelihood(known, names) for known in (earlier, later))
+    (first, first_side), (second, second_side) = (_likelihood(known, names) for known in (earlier, later))
     count = len(names)
     line, changes = np.diag(prior**-2) + first + second, np.diag(usual**-2) + second
     precision = np.block([[line, second], [second, changes]])
     covariance = np.linalg.inv(precision)
-    change = (covariance @ np.concatenate([first_pull + second_pull, second_pull]))[count:]
+    change = (covariance @ np.concatenate([first_side + second_side, second_side]))[count:]
     deviation = np.sqrt(np.diag(covariance)[count:])
     begin, end = _common(earlier, later)
     both = {value.name for value in earlier.values} & {value.name for value in later.values}
@@ -76,31 +69,33 @@ def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None
         for value, tolerance, by, error in zip(values.values(), usual, change, deviation, strict=True)
         if value.name in both and (value.place is None or begin <= value.place <= end)
     ]
-    return Drift(earlier, later, tuple(found), tuple(_named(found)))
+    return Drift(earlier, later, tuple(found), _named(found))
 
 
 def _likelihood(known: Stored, names: Sequence[str]) -> tuple[Array, Array]:
     """Information matrix, (n, n), and right side, (n,), of a fit's records alone, of values by name."""
     where = np.array([names.index(value.name) for value in known.values])
     inverse = np.linalg.inv(known.covariance)
-    information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
+    information, side = np.zeros((len(names), len(names))), np.zeros(len(names))
     own = 0.5 * (inverse + inverse.T) - np.diag([value.tolerance**-2 for value in known.values])
     information[np.ix_(where, where)] = own
-    pull[where] = inverse @ known.difference
-    return information, pull
+    side[where] = inverse @ known.difference
+    return information, side
 
 
-def _named(found: Sequence[Found]) -> list[bool]:
-    """Which changes are named: of those that the records tell, so that few are false."""
+def _named(found: Sequence[Found]) -> tuple[Found, ...]:
+    """Changes that are named, most surely first: of identifiable ones, so that few are false."""
     from scipy.stats import false_discovery_control, norm  # slow to import
 
-    told = [number for number, each in enumerate(found) if each.told]
-    sure = [False] * len(found)
-    if told:
-        sizes = np.array([abs(found[number].difference) / found[number].deviation for number in told])
-        for number, share in zip(told, false_discovery_control(2 * norm.sf(sizes)), strict=True):
-            sure[number] = bool(share < FALSE)
-    return sure
+    known = sorted((each for each in found if each.identifiable), key=_sureness, reverse=True)
+    if not known:
+        return ()
+    shares = false_discovery_control(2 * norm.sf([_sureness(each) for each in known]))
+    return tuple(each for each, share in zip(known, shares, strict=True) if share < FALSE)
+
+
+def _sureness(each: Found) -> float:
+    return abs(each.difference) / each.deviation
 
 
 def _check_alike(earlier: Stored, later: Stored) -> None:

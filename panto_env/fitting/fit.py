@@ -1,4 +1,4 @@
-"""What a fit found: each value with its interval, whether the records tell it, and what they leave over."""
+"""What a fit found: each value with its interval, whether it is identifiable, and the residual."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Array, one_thread
-from ..estimation.innovations import Whiteness
+from ..estimation.innovations import Whiteness, whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
 from .misfit import Part, State
-from .problem import Problem, problem
-from .solve import Solution
+from .problem import problem
+from .solve import Fitting, Solution
 from .values import USUAL, Value
 
 INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
-TELLS = 0.6
-"""Share of its tolerance below which the standard deviation of a value must have fallen for the records to
-tell it."""
+IDENTIFIABLE = 0.6
+"""Share of its tolerance below which the standard deviation of an identifiable value has fallen."""
 CORRELATED = 0.9
 """Correlation from which on two values are named: the records know their sum or difference better."""
 WHITE = 0.01
-"""Probability below which what is left is called unlike noise."""
+"""Probability below which a residual is called unlike noise."""
 
 
 @dataclass(frozen=True)
@@ -43,35 +42,37 @@ class Found:
         return self.difference - INTERVAL * self.deviation, self.difference + INTERVAL * self.deviation
 
     @property
-    def told(self) -> bool:
-        """Whether the records tell it."""
-        return self.deviation < TELLS * self.value.tolerance
+    def identifiable(self) -> bool:
+        """Whether the records determine it better than its tolerance."""
+        return self.deviation < IDENTIFIABLE * self.value.tolerance
 
     @property
     def differs(self) -> bool:
         """Whether the design's value lies outside the interval."""
-        return self.told and abs(self.difference) > INTERVAL * self.deviation
+        return self.identifiable and abs(self.difference) > INTERVAL * self.deviation
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """The end of a fit."""
 
-    problem: Problem
+    problem: Fitting
     solution: Solution
 
     @property
     def parts(self) -> Sequence[Part]:
         """Pieces of records that were compared."""
-        return self.problem.fitting.parts
+        return self.problem.parts
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
         """All values, of droppers and supports only those along what was compared."""
-        values = self.problem.fitting.values.all
+        values = self.problem.values.all
         deviations = np.sqrt(np.diag(self.solution.covariance))
         triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
-        return tuple(Found(*each) for each in triples if self._compared(each[0]))
+        every = (Found(*each) for each in triples)
+        begin, end = self.problem.stretch
+        return tuple(each for each in every if each.value.place is None or begin <= each.value.place <= end)
 
     def of_kind(self, kind: str) -> list[Found]:
         """Values of one kind."""
@@ -84,10 +85,10 @@ class Fit:
 
     @cached_property
     def correlated(self) -> list[tuple[Value, Value, float]]:
-        """Pairs of told values that the records hardly tell apart, strongest first."""
-        values = self.problem.fitting.values.all
-        told = {each.value.name for each in self.found if each.told}
-        which = [k for k, value in enumerate(values) if value.name in told]
+        """Pairs of identifiable values that the records hardly tell apart, strongest first."""
+        values = self.problem.values.all
+        names = {each.value.name for each in self.found if each.identifiable}
+        which = [k for k, value in enumerate(values) if value.name in names]
         covariance = self.solution.covariance[np.ix_(which, which)]
         scale = np.sqrt(np.diag(covariance))
         matrix = np.triu(covariance / np.outer(scale, scale), 1)
@@ -96,38 +97,41 @@ class Fit:
         return sorted(found, key=lambda pair: -abs(pair[2]))
 
     @cached_property
+    def residual(self) -> list[Array]:
+        """Coefficients of each part, (coefficients,): measured less simulated (N)."""
+        return self.problem.by_part(self.solution.residual)
+
+    @cached_property
     def whiteness(self) -> list[Whiteness]:
-        """Of what is left of each part, over its noise: whether it is as random as noise."""
-        return self.solution.whiteness([part.measured.band for part in self.parts])
+        """Of the residual of each part, over its noise: whether it is as random as noise."""
+        deviation = self.solution.state.noise.ravel()[self.problem.band]
+        parts = self.problem.by_part(self.solution.residual / deviation)
+        return [whiteness(own[:, None]) for own in parts]
 
     @property
     def shifts(self) -> Array:
         """By how much positions of each part were short, beside its rough shift, (parts,) (m)."""
-        return self.problem.fitting.shifts(self.solution.state.x)
+        return np.asarray(self.problem.sensors(self.solution.state.x)[0])
 
     @property
     def gains(self) -> Array:
         """By how much the gain of each part's sensors differs from 1, (parts,)."""
-        return self.problem.fitting.gains(self.solution.state.x)
+        return np.asarray(self.problem.sensors(self.solution.state.x)[1])
 
     def measured(self, k: int) -> Array:
-        """Coefficients of a part's measured force (N), with its place and gain put right."""
-        return self.parts[k].measured.coefficients(self.problem.fitting.measured(k, self.solution.state.x))
+        """Coefficients of a part's measured force (N), with its place and gain corrected."""
+        return self.parts[k].measured.coefficients(self.problem.measured(k, self.solution.state.x))
 
     @cached_property
-    def left(self) -> list[tuple[float, float]]:
-        """Standard deviation (N) of what is compared of each part, and of what is left of it."""
+    def std(self) -> list[tuple[float, float]]:
+        """Standard deviation (N) of what is compared of each part, and of its residual."""
         std = [part.measured.std for part in self.parts]
-        return [(std[k](self.measured(k)), std[k](left)) for k, left in enumerate(self.solution.left)]
+        return [(std[k](self.measured(k)), std[k](residual)) for k, residual in enumerate(self.residual)]
 
     @property
     def before(self) -> float:
-        """Way along the line before the simulated spans (m)."""
+        """Distance along the line before the simulated spans (m)."""
         return self.problem.before
-
-    def _compared(self, value: Value) -> bool:
-        begin, end = self.problem.stretch
-        return value.place is None or begin <= value.place <= end
 
 
 def fit(
@@ -150,5 +154,4 @@ def fit(
     """
     with one_thread():
         ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
-        fitting = ready.fitting
-        return Fit(ready, fitting.run(fitting.start() if begin is None else begin, report, working))
+        return Fit(ready, ready.run(ready.start() if begin is None else begin, report, working))

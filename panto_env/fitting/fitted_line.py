@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -12,10 +11,11 @@ from typing import Any
 from ..base.errors import InputError
 from ..base.files import check_output, write_text
 from ..catalog.loader import file_of, parse_catenary, parse_pantograph
+from ..catalog.values import in_toml
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
 from .fit import INTERVAL, Fit, Found
-from .values import damping_of
+from .values import CHAIN, damping_of
 
 
 def with_value(text: str, key: str, value: Any, source: str, name: str) -> str:
@@ -25,7 +25,7 @@ def with_value(text: str, key: str, value: Any, source: str, name: str) -> str:
     """
     section, _, last = key.rpartition(".")
     begin, end = _section(text, section)
-    entry = f"{last} = {{ value = {json.dumps(value)}, source = {json.dumps(source, ensure_ascii=False)} }}"
+    entry = in_toml(last, value, source)
     line = re.compile(rf"^[ \t]*{re.escape(last)}[ \t]*=.*$", re.MULTILINE)
     changed, count = line.subn(lambda _: entry, text[begin:end])
     made = text[:begin] + changed + text[end:]
@@ -46,10 +46,7 @@ def with_table(
     if begin < len(text):
         text = text[: text.rfind("\n", 0, begin) + 1] + text[end:]
     rest = _read(text)
-    lines = [
-        f"{key} = {{ value = {json.dumps(value)}, source = {json.dumps(sources[key], ensure_ascii=False)} }}"
-        for key, value in values.items()
-    ]
+    lines = [in_toml(key, value, sources[key]) for key, value in values.items()]
     made = "\n".join([text.rstrip(), "", f"[{section}]", *lines]) + "\n"
     if _read(made) != rest | {f"{section}.{key}": value for key, value in values.items()}:
         raise InputError(f"{section} of {name} cannot be replaced: write it as a table [{section}].")
@@ -109,20 +106,20 @@ def write_line(fit: Fit, base: str | Path, path: str | Path, records: str) -> No
 
     base: the design, a name of the catalogue or a TOML file, whose text is kept. The table ``as_found`` holds
     by how much droppers, supports and tensions differ: together the most likely values, also where the
-    records hardly tell one alone, which sources count. records: their names, for the sources. Raises
+    records hardly determine one alone, which sources count. records: their names, for the sources. Raises
     InputError for another suffix, for a design whose values cannot be replaced, for values that no line may
     have, or where it cannot be written.
     """
     check_output(path, SUFFIXES)
     text = file_of(base).read_text(encoding="utf-8-sig")
-    design = fit.problem.fitting.values.design
+    design = fit.problem.values.design
     for each in fit.of_kind("damping"):
-        if each.told:
+        if each.identifiable:
             name = each.value.index[0]
             value = damping_of(design.catenary, name, each.difference)
             text = with_value(text, f"damping.{name}", value, source([each], records), str(base))
     values, sources = as_found(fit, records)
-    needed = fit.problem.first_span + design.spans
+    needed = design.first_span + design.spans
     if not design.catenary.ends and needed > design.catenary.spans:
         text = with_value(text, "spans", needed, f"as long as {records}", str(base))
     text = with_table(text, "as_found", values, sources, str(base))
@@ -133,13 +130,12 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
     """Write the pantograph with its fitted values, as ``write_line`` does."""
     check_output(path, SUFFIXES)
     text = file_of(base, "pantograph").read_text(encoding="utf-8-sig")
-    design = fit.problem.fitting.values.design.pantograph
-    chains: dict[str, list[Found]] = {}
-    for each in fit.of_kind("pantograph"):
-        if each.told:
-            chains.setdefault(each.value.index[0], []).append(each)
-    for name, found in chains.items():
-        values = list(getattr(design, name))
+    design = fit.problem.values.design.pantograph
+    every = [each for each in fit.of_kind("pantograph") if each.identifiable]
+    for name in CHAIN:
+        found, values = [each for each in every if each.value.index[0] == name], list(getattr(design, name))
+        if not found:
+            continue
         for each in found:
             values[each.value.index[1]] *= 1 + each.difference
         numbers = ", ".join(str(each.value.index[1] + 1) for each in found)
@@ -149,13 +145,14 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
 
 def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     """A line condition of the most likely values, and the source of each of its keys."""
-    design, before = fit.problem.fitting.values.design, fit.problem.first_span
+    design = fit.problem.values.design
+    before = design.first_span
     line = design.catenary
     known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
     sources = {key: line.sources.get(f"as_found.{key}", "not given") for key in known}
     cut = {(span, number): wrong for span, number, wrong in known.get("miscut_droppers", ())}
     raised = dict(known.get("raised_supports", ()))
-    # All of them, also those that the records hardly tell: droppers were found together with these.
+    # All of them, also those that the records hardly determine: droppers were found together with these.
     found = {kind: fit.of_kind(kind) for kind in ("droppers", "supports", "tensions")}
     for each in found["droppers"]:
         place = design.place(each.value.index[0])
@@ -190,7 +187,7 @@ def source(found: list[Found], records: str) -> str:
     """Source of values that were fitted, with the size of their 95 % intervals."""
     sizes = sorted(INTERVAL * each.value.scale * each.deviation for each in found)
     size = f"{sizes[0]:.2g}" if len(sizes) == 1 else f"{sizes[0]:.2g} to {sizes[-1]:.2g}"
-    silent = sum(not each.told for each in found)
+    silent = sum(not each.identifiable for each in found)
     more = f"; {silent} of {len(found)} hardly told by the records" if silent else ""
     return f"fitted to {records}; 95 % intervals of ±{size} {found[0].value.unit}{more}"
 

@@ -1,4 +1,4 @@
-"""How far the forces of a line are from those of records: what a fit minimises, and its derivatives.
+"""The objective of a fit: how far the forces of a line are from those of records; and its derivatives.
 
 It is a sum over values x that count from the design,
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -55,19 +56,34 @@ class State:
 
 
 @dataclass(frozen=True)
-class Near:
-    """What is known of the first of some values x, so that passes on a coarser grid do for the others."""
+class Problem:
+    """Parts of records, and the values of the line that are to be fitted to them.
 
-    left: Sequence[Array]  # of each part
-    begins: Array  # as ``Passes.forces`` takes them
+    Arrays of coefficients hold those of all parts, one part behind the other.
+    """
 
+    parts: Sequence[Part]
+    values: Values
+    stretch: tuple[float, float] = (0.0, 0.0)  # of the simulated line that is compared (m)
+    shifts: tuple[float, ...] = ()  # by how much positions of each record were short, roughly (m)
+    of_records: tuple[str, ...] = ()  # notes on the records: what was left out, corrected or assumed
+    notes: tuple[str, ...] = ()  # on what is fitted to them
 
-class Misfit:
-    """Of some parts of records, over some values of the line."""
+    @property
+    def before(self) -> float:
+        """Distance along the line before the simulated spans (m)."""
+        design = self.values.design
+        return 0.0 if design.catenary.ends else design.first_span * design.catenary.span_length
 
-    def __init__(self, parts: Sequence[Part], values: Values) -> None:
-        self.parts, self.values = parts, values
-        self.prior = np.append(values.tolerances, np.repeat(list(OWN.values()), len(parts)))
+    @cached_property
+    def prior(self) -> Array:
+        """(n,): standard deviations of the values, and of ``OWN`` for all parts, about 0."""
+        return np.append(self.values.tolerances, np.repeat(list(OWN.values()), len(self.parts)))
+
+    @cached_property
+    def band(self) -> Index:
+        """(coefficients,): number of each one's band among those of all parts, as in ``State.noise``."""
+        return np.concatenate([BANDS * k + part.measured.band for k, part in enumerate(self.parts)])
 
     def start(self) -> State:
         """The line as designed."""
@@ -83,13 +99,14 @@ class Misfit:
 
     def derivatives(
         self, state: State, differences: Array, grid: Grid, working: Callable[[str], None]
-    ) -> tuple[State, list[Array], list[Array]]:
-        """Coefficients' derivatives, (coefficients, n), and what is left, of each part.
+    ) -> tuple[State, Array, Array]:
+        """Jacobian of the simulated coefficients, (coefficients, n), and the residual, (coefficients,).
 
-        differences: from which they are taken, (values, values), a row each. grid: of the passes from which.
-        working: told what is being computed. The state's static forces give the records' means then.
+        differences: from which derivatives are taken, (values, values), a row each. grid: of the passes from
+        which. working: is called with what is being computed. The state's static forces give the records'
+        means then.
         """
-        blocks, left = [], []
+        jacobian, residual = [], []
         static, count = state.static_forces.copy(), len(self.values)
         now = state.x[:count]
         changed = [now, *(now + each for each in differences)]
@@ -104,53 +121,52 @@ class Misfit:
             sample = part.measured.piece.speed * part.measured.piece.time_step
             target, *near = (self.measured(k, state.x, by) for by in (0.0, -sample, sample))
             static[k] += target.mean() - force.mean()
-            by_static, gain = (heavier - first) / FURTHER, 1 + self.gains(state.x)[k]
+            by_static, gain = (heavier - first) / FURTHER, 1 + self.sensors(state.x)[1, k]
             # A larger shift, gain or zero takes this off the target, or adds it to the simulated force, whose
             # mean follows the target's.
             by_own = np.zeros((len(OWN), len(self.parts), len(target)))
             by_own[0, k] = (near[0] - near[1]) / (2 * sample)
             by_own[1, k] = (target - target.mean() * by_static) / gain
             by_own[2, k] = -by_static / gain
-            every = np.vstack([by_value, *by_own])
-            blocks.append(part.measured.coefficients(every).T)
-            left.append(part.measured.coefficients(target - force))
-        return replace(state, static_forces=static), blocks, left
+            jacobian.append(part.measured.coefficients(np.vstack([by_value, *by_own])).T)
+            residual.append(part.measured.coefficients(target - force))
+        return replace(state, static_forces=static), np.concatenate(jacobian), np.concatenate(residual)
 
-    def tried(
-        self, state: State, tried: Sequence[Array] | Array, near: Near | None = None
-    ) -> tuple[list[list[Array]], list[float]]:
-        """What is left of each part, and the sum, for some values of x; near: what is known of the first."""
-        count = len(self.values)
-        left: list[list[Array]] = [[] for _ in tried]
+    def residuals(self, state: State, tried: Array, begins: Array | None = None) -> Array:
+        """Measured less simulated coefficients (N), (tried, coefficients), for some values x, (tried, n).
+
+        begins: as ``Passes.forces`` takes them; with them, the grid is the fair one.
+        """
+        count, found = len(self.values), []
+        grid: Grid = "fine" if begins is None else "fair"
         static = [self.static_forces(state, x) for x in tried]
         for k, part in enumerate(self.parts):
             rows = zip(tried, static, strict=True)
             variants = [self.values.variant(x[:count], float(own[k])) for x, own in rows]
-            forces = (
-                self.sampled(part, variants, near.begins, "fair") if near else self.sampled(part, variants)
-            )
-            pairs = zip(tried, forces, strict=True)
-            found = [part.measured.coefficients(self.measured(k, x) - force) for x, force in pairs]
-            away = near.left[k] - found[0] if near else 0.0
-            for own, coefficients in zip(left, found, strict=True):
-                own.append(coefficients + away)
-        return left, [self.sum_of(own, state.noise, x) for own, x in zip(left, tried, strict=True)]
+            pairs = zip(tried, self.sampled(part, variants, begins, grid), strict=True)
+            found.append([part.measured.coefficients(self.measured(k, x) - force) for x, force in pairs])
+        return np.concatenate(found, axis=1)
 
-    def shifts(self, x: Array) -> Array:
-        """By how much positions of each part are short, (parts,) (m), of all values x."""
-        return np.asarray(self._own(x)[0])
+    def objective(self, residual: Array, noise: Array, x: Array) -> Array:
+        """What a fit minimises, (...,); residual: (..., coefficients); noise: (parts, bands); x: (..., n)."""
+        misfit = np.sum((residual / noise.ravel()[self.band]) ** 2, axis=-1)
+        return np.asarray(misfit + np.sum((x / self.prior) ** 2, axis=-1))
 
-    def gains(self, x: Array) -> Array:
-        """By how much the sensors' gain differs from 1, (parts,), of all values x."""
-        return np.asarray(self._own(x)[1])
+    def weights(self, noise: Array) -> Array:
+        """1 / variance of each coefficient, (coefficients,); noise: (parts, bands) (N)."""
+        return np.asarray(1 / noise.ravel()[self.band] ** 2)
 
-    def _own(self, x: Array) -> Array:
-        """Of all values x, those of ``OWN``, (3, parts)."""
-        return x[len(self.values) :].reshape(len(OWN), len(self.parts))
+    def by_part(self, values: Array) -> list[Array]:
+        """Values of coefficients, (coefficients,), part by part."""
+        return np.split(values, np.cumsum([len(part.measured.band) for part in self.parts])[:-1])
+
+    def sensors(self, x: Array) -> Array:
+        """Of all values x, those of ``OWN``, (3, parts): how much positions are short (m), gain, zero (N)."""
+        return np.asarray(x[len(self.values) :].reshape(len(OWN), len(self.parts)))
 
     def measured(self, k: int, x: Array, further: float = 0.0) -> Array:
-        """Force of a part, (places,) (N), with place, gain and zero put right; further: its shift (m)."""
-        shift, gain, zero = self._own(x)[:, k]
+        """Force of a part, (places,) (N), with place, gain and zero corrected; further: its shift (m)."""
+        shift, gain, zero = self.sensors(x)[:, k]
         force = self.parts[k].measured.force(float(shift) + further)
         return np.asarray((force - zero) / (1 + gain))
 
@@ -159,12 +175,6 @@ class Misfit:
         parts = range(len(self.parts))
         more = [self.measured(k, x).mean() - self.measured(k, state.x).mean() for k in parts]
         return np.asarray(state.static_forces + np.array(more))
-
-    def sum_of(self, left: Sequence[Array], noise: Array, x: Array) -> float:
-        """What is minimised, of what is left of each part, with a noise of (parts, bands) (N)."""
-        parts = zip(left, noise, self.bands, strict=True)
-        misfit = sum(float(np.sum((own / s[band]) ** 2)) for own, s, band in parts)
-        return misfit + float(np.sum((x / self.prior) ** 2))
 
     def sampled(
         self, part: Part, variants: Sequence[Variant], begins: Array | None = None, grid: Grid = "fine"
@@ -175,15 +185,6 @@ class Misfit:
         """
         passes: Passes = getattr(part, grid)
         return forces_at(passes, variants, part.measured.place, part.low_passed, begins)
-
-    @property
-    def bands(self) -> list[Index]:
-        """Band of each coefficient, (coefficients,), of each part."""
-        return [part.measured.band for part in self.parts]
-
-    def weights(self, noise: Array) -> list[Array]:
-        """1 / variance of each coefficient, (coefficients,), of each part; noise: (parts, bands) (N)."""
-        return [1 / own[band] ** 2 for own, band in zip(noise, self.bands, strict=True)]
 
 
 def forces_at(

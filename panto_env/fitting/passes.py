@@ -62,7 +62,7 @@ class Measured:
         return between(self.smooth, np.interp(self.place, position, np.arange(len(position))))
 
     @cached_property
-    def kept(self) -> Index:
+    def compared(self) -> Index:
         """Numbers of the coefficients that are compared."""
         frequency = np.arange(len(self.place)) * PER_SECOND / (2 * len(self.place))
         return np.flatnonzero((frequency >= self.lowest) & (frequency <= HIGHEST))
@@ -70,13 +70,13 @@ class Measured:
     @cached_property
     def band(self) -> Index:
         """Band of each coefficient that is compared, (coefficients,)."""
-        return np.arange(len(self.kept)) * BANDS // len(self.kept)
+        return np.arange(len(self.compared)) * BANDS // len(self.compared)
 
     def coefficients(self, force: Array) -> Array:
         """Cosine coefficients that are compared, (..., coefficients), of forces, (..., places) (N)."""
         from scipy.fft import dct  # slow to import
 
-        return np.asarray(dct(force, norm="ortho", axis=-1)[..., self.kept])
+        return np.asarray(dct(force, norm="ortho", axis=-1)[..., self.compared])
 
     def std(self, coefficients: Array) -> float:
         """Standard deviation (N) of the force that has these coefficients, (coefficients,)."""
@@ -87,7 +87,7 @@ class Measured:
         from scipy.fft import idct  # slow to import
 
         whole = np.zeros(len(self.place))
-        whole[self.kept] = coefficients
+        whole[self.compared] = coefficients
         return np.asarray(idct(whole, norm="ortho"))
 
 

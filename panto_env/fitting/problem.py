@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ..plant.catenary.schema import CLEAR, MOST_SPANS, CatenaryData
 from ..plant.line_condition import DrawnLine, LineCondition, together
 from ..plant.numerics import Numerics
 from ..plant.pantograph.schema import PantographData
-from ..records.record import Piece, Record, is_low_passed
+from ..records.record import Piece, Record, is_low_passed, repeated
 from .misfit import Part, forces_at
 from .passes import Measured, Passes, Variant, measured
 from .solve import Fitting
@@ -145,24 +145,6 @@ SEARCH = 0.5
 """Spans on each side within which a record's place is searched."""
 
 
-@dataclass(frozen=True)
-class Problem:
-    """What a fit begins with."""
-
-    fitting: Fitting
-    first_span: int  # spans of the line before the simulated ones; below 0: these begin before it
-    stretch: tuple[float, float]  # of the simulated line that is compared (m)
-    shifts: tuple[float, ...]  # by how much positions of each record were short, roughly (m)
-    of_records: tuple[str, ...]  # notes on the records: what was left out, corrected or assumed
-    notes: tuple[str, ...]  # on what is fitted to them
-
-    @property
-    def before(self) -> float:
-        """Way along the line before the simulated spans (m)."""
-        line = self.fitting.values.design.catenary
-        return 0.0 if line.ends else self.first_span * line.span_length
-
-
 def problem(
     records: Sequence[Record],
     line: CatenaryData,
@@ -170,7 +152,7 @@ def problem(
     *,
     free: Sequence[str] = USUAL,
     tolerances: Mapping[str, float] | None = None,
-) -> Problem:
+) -> Fitting:
     """Prepare a fit of ``free`` values to all pieces of some records.
 
     tolerances: standard deviations before any record is seen, instead of those of ``TOLERANCES``. Raises
@@ -179,7 +161,10 @@ def problem(
     """
     if not isinstance(line, FlexibleCatenaryData):
         raise InputError(f"Only flexible lines can be fitted, and '{line.name}' is none; name another line.")
-    _refuse_twice(records)
+    for one, other in repeated((record.name, piece.force) for record in records for piece in record.pieces):
+        raise InputError(
+            f"{one} and {other} hold the same forces; give each pass once, or intervals would be too narrow."
+        )
     pieces = [piece for record in records for piece in record.pieces]
     first_span, spans, distance = _spans(pieces, line, pantograph)
     alignment = line.alignment(spans)
@@ -213,10 +198,10 @@ def problem(
     span = alignment.mean_length
     freed = begin - (FIRST_SETTLED - 1) * span - 1.0, end + BEYOND * span
     values = Values(design, free, freed, dict(tolerances or {}))
-    told = sum(len(part.measured.kept) for part in parts)
-    if told < ENOUGH * len(values):
+    count = sum(len(part.measured.compared) for part in parts)
+    if count < ENOUGH * len(values):
         notes.append(
-            f"The records have {told} coefficients for {len(values)} values, so noise is hardly known, and "
+            f"The records have {count} coefficients for {len(values)} values, so noise is hardly known, and "
             f"intervals may be too narrow; give more passes, or free less, for {ENOUGH:g} times as many."
         )
     crossed = sum(begin < part.in_use[1] and part.in_use[0] < end for part in design.layout.tension_lengths)
@@ -225,27 +210,12 @@ def problem(
             f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; "
             "where theirs differ, cut the records at the overlaps and fit each part."
         )
-    fitting = Fitting(parts, values)
     shifted = []
-    for part, force in zip(parts, fitting.as_designed(), strict=True):
+    for part, force in zip(parts, Fitting(parts, values).as_designed(), strict=True):
         shift, _ = rough_shift(part.measured, force, SEARCH * span)
         shifts.append(shift)
         shifted.append(replace(part, measured=_moved(part.measured, shift, stretch, span)))
-    said = tuple(of_records), tuple(notes)
-    return Problem(Fitting(shifted, values), first_span, (begin, end), tuple(shifts), *said)
-
-
-def _refuse_twice(records: Sequence[Record]) -> None:
-    known: dict[bytes, str] = {}
-    for record in records:
-        for piece in record.pieces:
-            force = piece.force.tobytes()
-            if force in known:
-                raise InputError(
-                    f"{known[force]} and {record.name} hold the same forces; give each pass once, or "
-                    "intervals would be too narrow."
-                )
-            known[force] = record.name
+    return Fitting(shifted, values, (begin, end), tuple(shifts), tuple(of_records), tuple(notes))
 
 
 def _inner(piece: Piece, offset: float, stretch: tuple[float, float]) -> tuple[float, float]:

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from ..base.arrays import Array
-from ..base.checksums import read_arrays, write_arrays
+from ..base.checksums import checksum, read_arrays, write_arrays
 from ..base.errors import InputError
-from ..base.settings import Between, Settings, explain
+from ..base.settings import Settings
 from ..records.record import Record
 from .fit import WHITE, Fit
 from .misfit import OWN, State
 from .passes import BANDS
-from .values import FREE, WAVES, Value
+from .values import WAVES, Place, Value
 
 STRANGE = 0.3
-"""Share of a force that is left, by standard deviation, from which on the fit is called wrong. Own choice."""
+"""Residual over the force, by standard deviation, from which on the fit is called wrong. Own choice."""
 
 
 def doubts(fit: Fit) -> list[str]:
@@ -31,7 +30,7 @@ def doubts(fit: Fit) -> list[str]:
     found = [*fit.problem.of_records, *fit.problem.notes]
     strange = [
         part.name
-        for part, (before, after) in zip(fit.parts, fit.left, strict=True)
+        for part, (before, after) in zip(fit.parts, fit.std, strict=True)
         if after > STRANGE * before
     ]
     if strange:
@@ -47,29 +46,30 @@ def doubts(fit: Fit) -> list[str]:
             f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
             "intervals are too narrow."
         )
-    if not fit.solution.settled:
+    if not fit.solution.converged:
         found.append("The fit has not settled; intervals are not to be relied on.")
     return found
 
 
-KEPT_ARRAYS = ("x", "static_forces", "noise")
+STATE = ("x", "static_forces", "noise")
+"""Arrays of a state."""
 SUFFIX = ".fit"
 """Of the file, behind the name of the output."""
 
 
 def identity_of(records: Sequence[Record], settings: dict[str, Any]) -> dict[str, Any]:
-    """What a fit is of: records by their samples, and settings as plain data."""
-    digest = hashlib.sha256()
-    for record in records:
-        for piece in record.pieces:
-            for series in (piece.position, piece.force):
-                digest.update(np.ascontiguousarray(series).tobytes())
-    return {"records": digest.hexdigest(), "own": list(OWN), **settings}
+    """What a fit is of: checksum of the records' samples and of settings, which are plain data."""
+    pieces = [piece for record in records for piece in record.pieces]
+    arrays = {f"{name} {k}": getattr(each, name) for k, each in enumerate(pieces) for name in SERIES}
+    return {"checksum": checksum(settings | {"own": list(OWN)}, arrays)}
+
+
+SERIES = ("position", "force")
 
 
 def keep(path: Path, state: State, identity: dict[str, Any]) -> None:
     """Write where a fit is. Raises InputError where that cannot be written."""
-    arrays = {name: np.ascontiguousarray(getattr(state, name)) for name in KEPT_ARRAYS}
+    arrays = {name: np.ascontiguousarray(getattr(state, name)) for name in STATE}
     write_arrays(path, identity | {"steps": state.steps}, arrays)
 
 
@@ -80,30 +80,19 @@ def kept(path: Path, identity: dict[str, Any]) -> State | None:
     except (OSError, ValueError):
         return None
     steps = table.pop("steps", None)
-    if table != identity or set(arrays) != set(KEPT_ARRAYS) or not isinstance(steps, int):
+    if table != identity or set(arrays) != set(STATE) or not isinstance(steps, int):
         return None
     return State(**arrays, steps=steps)
 
 
 ARRAYS = ("difference", "covariance", "noise")
-Place = Annotated[float, Between(-1e7, 1e7, "m")]
-
-
-class _Value(Settings):
-    kind: Literal[FREE]  # type: ignore[valid-type]
-    name: str
-    unit: str
-    scale: Annotated[float, Between(1e-3, 1e6)]
-    tolerance: Annotated[float, Between(1e-9, 1e3)]
-    place: Place | None
-    index: tuple[int | str, ...] = Field(min_length=1, max_length=2)
 
 
 class _Table(Settings):
     name: str
     line: str
     pantograph: str
-    values: tuple[_Value, ...] = Field(min_length=1)
+    values: tuple[Value, ...] = Field(min_length=1)
     compared: tuple[Place, Place]
     notes: tuple[str, ...]
 
@@ -125,7 +114,7 @@ class Stored:
 
 def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
-    fitting, before = fit.problem.fitting, fit.before
+    fitting, before = fit.problem, fit.before
     design, count = fitting.values.design, len(fitting.values)
     values = tuple(
         value if value.place is None else replace(value, place=value.place + before)
@@ -166,16 +155,18 @@ def stored(path: str | Path) -> Stored:
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except ValueError as error:  # pydantic's among them
-        reason = explain(error, _Table) if isinstance(error, ValidationError) else error
+        reason = str(error)
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            reason = f"key '{'.'.join(map(str, first['loc']))}': {first['msg']}"
         raise InputError(
             f"{path} does not hold a whole fit: {reason}; give a file that `panto fit --keep` wrote."
         ) from error
-    values = tuple(Value(**dict(value)) for value in table.values)
-    found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS} | {"values": values}
+    found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS}
     return Stored(**found)
 
 
-def _check(values: Sequence[_Value], arrays: dict[str, NDArray[Any]]) -> None:
+def _check(values: Sequence[Value], arrays: dict[str, NDArray[Any]]) -> None:
     count, tolerances = len(values), np.array([value.tolerance for value in values])
     if len({value.name for value in values}) < count:
         raise ValueError("two values have one name")

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from .drift import Drift
 
 
+NAMED = 20
+"""Values in a table at most."""
 NAMES = {
     "tensions": "tensions",
     "droppers": "lengths of droppers",
@@ -32,7 +34,7 @@ NAMES = {
 
 
 def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: str) -> Table:
-    """A row for each kind of value: how many there are, are told and differ, and how well they are known.
+    """A row for each kind of value: how many there are, are identifiable and differ, and how well known.
 
     unlike: what values that differ are unlike.
     """
@@ -47,7 +49,7 @@ def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: st
             (
                 f"{NAMES[kind]} ({unit})",
                 f"{len(own)}",
-                f"{sum(each.told for each in own)}",
+                f"{sum(each.identifiable for each in own)}",
                 f"{sum(each.value.kind == kind for each in differing)}",
                 number(float(np.sqrt(np.mean([(scale * each.difference) ** 2 for each in own]))), 2),
                 number(float(np.median(size)), 2),
@@ -57,21 +59,22 @@ def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: st
     return Table("What the records tell", headings, rows)
 
 
-def values_table(differing: Sequence[Found], unlike: str, most: int = 20) -> Table:
+def values_table(differing: Sequence[Found], unlike: str) -> Table:
     """The values that most surely differ, waves of the running surface left out."""
     named = [each for each in differing if each.value.kind != "unevenness"]
-    found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:most]
-    rows = [
-        (each.value.name, each.value.unit, *_signed(each, each.difference, *each.interval)) for each in found
-    ]
+    found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:NAMED]
+    rows = []
+    for each in found:
+        numbers = (f"{each.value.scale * value:+.2f}" for value in (each.difference, *each.interval))
+        rows.append((each.value.name, each.value.unit, *numbers))
     headings = ("value", "unit", "difference", "from", "to")
     title = f"Most surely unlike {unlike}, {len(rows)} of {len(named)}"
     return Table(title, headings, rows, text_columns=2)
 
 
 def parts_table(fit: Fit) -> Table:
-    """A row for each piece of a record: what the fit explains of it, and whether the rest is noise."""
-    shifts, gains, left = fit.shifts + np.array(fit.problem.shifts), fit.gains, fit.left
+    """A row for each piece of a record: what the fit explains of it, and whether the residual is noise."""
+    shifts, gains, std = fit.shifts + np.array(fit.problem.shifts), fit.gains, fit.std
 
     def as_noise(k: int) -> str:
         probability = fit.whiteness[k].probability
@@ -82,9 +85,9 @@ def parts_table(fit: Fit) -> Table:
         "speed (km/h)": lambda k: f"{fit.parts[k].measured.piece.speed_kmh:.1f}",
         "shift (m)": lambda k: f"{shifts[k] + 0.0:+.2f}",
         "gain (%)": lambda k: f"{100 * gains[k] + 0.0:+.2f}",
-        "σ compared (N)": lambda k: number(left[k][0], 2),
-        "σ left (N)": lambda k: number(left[k][1], 2),
-        "explained (%)": lambda k: f"{100 * (1 - (left[k][1] / left[k][0]) ** 2):.1f}",
+        "σ compared (N)": lambda k: number(std[k][0], 2),
+        "σ left (N)": lambda k: number(std[k][1], 2),
+        "explained (%)": lambda k: f"{100 * (1 - (std[k][1] / std[k][0]) ** 2):.1f}",
         "as noise, p": as_noise,
     }
     return Table.of("What is left of each record", range(len(fit.parts)), columns)
@@ -102,35 +105,31 @@ def rows_of(found: Sequence[Found], before: float = 0.0) -> list[dict[str, Any]]
             "low": each.value.scale * each.interval[0],
             "high": each.value.scale * each.interval[1],
             "tolerance": each.value.scale * each.value.tolerance,
-            "told": each.told,
+            "told": each.identifiable,
         }
         for each in found
     ]
 
 
 def remarks(fit: Fit) -> list[str]:
-    """Sentences on what the records cannot tell, or tell only together, and why the fit is less sure."""
+    """Sentences on what the records do not determine, or only together, and why the fit is less sure."""
     found = []
     for kind in FREE:
         own = fit.of_kind(kind)
-        silent = [each for each in own if not each.told]
+        silent = [each for each in own if not each.identifiable]
         if silent:
-            what, told = f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}", len(own) - len(silent)
-            found.append(f"{what}: the records tell {told or 'none'} of {len(own)}.")
+            what, known = f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}", len(own) - len(silent)
+            found.append(f"{what}: the records tell {known or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
     return [*found, *doubts(fit)]
 
 
-def _signed(each: Found, *values: float) -> list[str]:
-    return [f"{each.value.scale * value:+.2f}" for value in values]
-
-
 def plain(fit: Fit) -> dict[str, Any]:
     """All that was found, as plain data."""
-    triples = zip(fit.parts, fit.left, fit.whiteness, strict=True)
+    triples = zip(fit.parts, fit.std, fit.whiteness, strict=True)
     return {
-        "settled": fit.solution.settled,
+        "settled": fit.solution.converged,
         "records": [
             {"name": part.name, "compared": before, "left": after, "as_noise": white.probability}
             for part, (before, after), white in triples
@@ -141,14 +140,14 @@ def plain(fit: Fit) -> dict[str, Any]:
 
 
 def plot_fit(fit: Fit, title: str) -> Figure:
-    """The record with the most left over beside the fitted force, and values along the line."""
+    """The record with the largest residual beside the fitted force, and values along the line."""
     kinds = [kind for kind in ("droppers", "supports") if fit.of_kind(kind)]
     figure, (force, *others) = stacked((11, 3.2 + 2.6 * len(kinds)), 1 + len(kinds))
     figure.suptitle(title)
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
         _draw_values(axes, fit.of_kind(kind), fit.before)
-    supports = fit.before + np.array(fit.problem.fitting.values.design.layout.supports[1:-1])
+    supports = fit.before + np.array(fit.problem.values.design.layout.supports[1:-1])
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
         mark_supports(axes, supports[(supports >= low) & (supports <= high)].tolist())
@@ -157,13 +156,13 @@ def plot_fit(fit: Fit, title: str) -> Figure:
 
 
 def _draw_force(axes: Axes, fit: Fit) -> None:
-    worst = int(np.argmax([after / before for before, after in fit.left]))
+    worst = int(np.argmax([after / before for before, after in fit.std]))
     part = fit.parts[worst]
     own = part.measured
     seen = fit.measured(worst)
     place = own.place + fit.before
     axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
-    fitted = own.back(seen - fit.solution.left[worst])
+    fitted = own.back(seen - fit.residual[worst])
     axes.plot(place, fitted, color=series_colour(0), linewidth=0.9, label="fitted")
     axes.set_ylabel("contact force without\nits slow part, to 18 Hz (N)")
     axes.set_xlim(place[0], place[-1])
@@ -187,8 +186,8 @@ def plot_drift(drift: Drift, title: str) -> Figure:
 
 def _draw_values(axes: Axes, found: list[Found], before: float, named: Sequence[Found] = ()) -> None:
     value = found[0].value
-    for told, colour, words in ((True, series_colour(0), "told"), (False, "0.7", "not told")):
-        own = [each for each in found if each.told is told]
+    for identifiable, colour, words in ((True, series_colour(0), "told"), (False, "0.7", "not told")):
+        own = [each for each in found if each.identifiable is identifiable]
         if own:
             axes.errorbar(
                 [(each.value.place or 0.0) + before for each in own],

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
 from ..base.arrays import Array, Index
 from ..base.errors import InputError, suggest
+from ..base.settings import Between
+from ..estimation.parameters import changed
 from ..plant.catenary.flexible.layout import Layout
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import IRREGULARITY, LINE_CONDITIONS, DrawnLine, LineCondition
@@ -41,17 +44,26 @@ LEAD = {"droppers": 3, "supports": 6}
 CHAIN = ("masses", "stiffnesses", "dampings")
 
 
+Place = Annotated[float, Between(-1e7, 1e7, "m")]
+if TYPE_CHECKING:
+    Which = Any  # pydantic checks them, where they are read
+else:
+    Which = int | str
+
+
 @dataclass(frozen=True)
 class Value:
     """One value, as its difference from the design's."""
 
-    kind: str  # of ``FREE``
+    __pydantic_config__ = ConfigDict(extra="forbid", allow_inf_nan=False)  # of those read from a file
+
+    kind: Literal[FREE]  # type: ignore[valid-type]
     name: str
     unit: str  # for people; "" for a relative one
-    scale: float  # from the value to this unit
-    tolerance: float  # standard deviation before any record is seen
-    place: float | None  # along the line (m); None where it acts everywhere
-    index: tuple[Any, ...]  # of what it is
+    scale: Annotated[float, Between(1e-3, 1e6)]  # from the value to this unit
+    tolerance: Annotated[float, Between(1e-9, 1e3)]  # standard deviation before any record is seen
+    place: Place | None  # along the line (m); None where it acts everywhere
+    index: Annotated[tuple[Which, ...], Field(min_length=1, max_length=2)]  # of what it is
 
 
 @dataclass(frozen=True)
@@ -83,7 +95,7 @@ class Values:
         design: Design,
         free: Sequence[str],
         stretch: tuple[float, float],
-        tolerances: dict[str, float] | None = None,
+        tolerances: Mapping[str, float] | None = None,
     ) -> None:
         """stretch: of the simulated line in which droppers and supports are freed (m).
 
@@ -94,10 +106,9 @@ class Values:
         if unknown or not free:
             name = unknown[0] if unknown else ""
             raise InputError(f"'{name}' cannot be freed: {suggest(name, FREE)}.")
-        self.design, self._tolerances = design, TOLERANCES | (tolerances or {})
-        self.all: tuple[Value, ...] = tuple(
-            value for name in FREE if name in free for value in getattr(self, f"_{name}")(stretch)
-        )
+        self.design = design
+        every = _every(design, stretch, TOLERANCES | dict(tolerances or {}))
+        self.all: tuple[Value, ...] = tuple(value for value in every if value.kind in free)
         if not self.all:
             raise InputError(
                 f"Line '{design.catenary.name}' has nothing to free of {', '.join(free)}; free other values."
@@ -133,7 +144,7 @@ class Values:
         scatter, heights = np.zeros(len(design.layout.droppers)), np.zeros(design.spans - 1)
         tensions, waves = [1.0, 1.0], np.zeros((len(WAVES), 2))
         damping: dict[str, float] = {}
-        chain = {name: list(getattr(design.pantograph, name)) for name in CHAIN}
+        chain: dict[str, float] = {}
         for value, difference in zip(self.all, differences.tolist(), strict=True):
             (*which, last) = value.index
             match value.kind:
@@ -148,66 +159,49 @@ class Values:
                 case "damping":
                     damping[last] = damping_of(design.catenary, last, difference)
                 case "pantograph":
-                    chain[which[0]][last] *= 1 + difference
-        catenary, pantograph = design.catenary, design.pantograph
+                    known = getattr(design.pantograph, which[0])[last]
+                    chain[f"{which[0]}.{last + 1}"] = known * (1 + difference)
+        catenary = design.catenary
         if any(value != getattr(catenary.damping, name) for name, value in damping.items()):
             catenary = catenary.model_copy(update={"damping": catenary.damping.model_copy(update=damping)})
-        if self.of_kind("pantograph"):
-            pantograph = pantograph.model_copy(update={name: tuple(own) for name, own in chain.items()})
         contact, messenger = tensions
         line = DrawnLine(design.condition, _rows(waves), scatter, heights, (contact, messenger))
-        return Variant(catenary, line, pantograph, static_force)
+        return Variant(catenary, line, changed(design.pantograph, chain), static_force)
 
-    def _tensions(self, stretch: tuple[float, float]) -> list[Value]:
-        names = ("tension of the contact wire", "tension of the messenger wire")
-        return [self._value("tensions", name, "%", 100.0, None, k) for k, name in enumerate(names)]
 
-    def _droppers(self, stretch: tuple[float, float]) -> list[Value]:
-        name, found = self.design.layout.alignment.span_name, []
-        for k, dropper in enumerate(self.design.layout.droppers):
-            if stretch[0] < dropper.position < stretch[1]:
-                span, number = self.design.place(k)
-                words = f"dropper {number} of span {name(span)}"
-                found.append(self._value("droppers", words, "mm", 1e3, dropper.position, k))
-        return found
+def _every(design: Design, stretch: tuple[float, float], tolerances: Mapping[str, float]) -> Iterator[Value]:
+    """All values that may be freed, in the order of ``FREE``; arguments as of ``Values``."""
 
-    def _supports(self, stretch: tuple[float, float]) -> list[Value]:
-        name = self.design.catenary.alignment().support_name
-        return [
-            self._value("supports", f"support {name(k + 1 + self.design.first_span)}", "mm", 1e3, x, k)
-            for k, x in enumerate(self.design.layout.supports[1:-1])
-            if stretch[0] < x < stretch[1]
-        ]
-
-    def _damping(self, stretch: tuple[float, float]) -> list[Value]:
-        return [
-            self._value("damping", f"damping {name}", "%", 100.0, None, name)
-            for name, value in self.design.catenary.damping
-            if value > 0
-        ]
-
-    def _pantograph(self, stretch: tuple[float, float]) -> list[Value]:
-        return [
-            self._value("pantograph", f"{name} {k + 1} of the pantograph", "%", 100.0, None, name, k)
-            for name in CHAIN
-            for k, value in enumerate(getattr(self.design.pantograph, name))
-            if value > 0
-        ]
-
-    def _unevenness(self, stretch: tuple[float, float]) -> list[Value]:
-        found = []
-        for k, (length, amplitude) in enumerate(WAVES):
-            for part, name in enumerate(("cosine", "sine")):
-                words = f"{name} of waves of {length:g} m"
-                value = self._value("unevenness", words, "mm", 1e3, None, k, part)
-                rms = amplitude / np.sqrt(2)  # of either part, where the phase is drawn
-                found.append(replace(value, tolerance=value.tolerance * rms))
-        return found
-
-    def _value(
-        self, kind: str, name: str, unit: str, scale: float, place: float | None, *index: Any
+    def value(
+        kind: str, name: str, unit: str, scale: float, *index: Any, place: float | None = None
     ) -> Value:
-        return Value(kind, name, unit, scale, self._tolerances[kind], place, index)
+        return Value(kind, name, unit, scale, tolerances[kind], place, index)
+
+    line = design.catenary
+    for k, wire in enumerate(("contact", "messenger")):
+        yield value("tensions", f"tension of the {wire} wire", "%", 100.0, k)
+    span_name = design.layout.alignment.span_name
+    for k, dropper in enumerate(design.layout.droppers):
+        if stretch[0] < dropper.position < stretch[1]:
+            span, number = design.place(k)
+            words = f"dropper {number} of span {span_name(span)}"
+            yield value("droppers", words, "mm", 1e3, k, place=dropper.position)
+    for k, x in enumerate(design.layout.supports[1:-1]):
+        if stretch[0] < x < stretch[1]:
+            support = line.alignment().support_name(k + 1 + design.first_span)
+            yield value("supports", f"support {support}", "mm", 1e3, k, place=x)
+    for name, damping in line.damping:
+        if damping > 0:
+            yield value("damping", f"damping {name}", "%", 100.0, name)
+    for name in CHAIN:
+        for k, own in enumerate(getattr(design.pantograph, name)):
+            if own > 0:
+                yield value("pantograph", f"{name} {k + 1} of the pantograph", "%", 100.0, name, k)
+    for k, (length, amplitude) in enumerate(WAVES):
+        for part, name in enumerate(("cosine", "sine")):
+            wave = value("unevenness", f"{name} of waves of {length:g} m", "mm", 1e3, k, part)
+            rms = amplitude / np.sqrt(2)  # of either part, where the phase is drawn
+            yield replace(wave, tolerance=wave.tolerance * rms)
 
 
 def damping_of(line: FlexibleCatenaryData, name: str, difference: float) -> float:

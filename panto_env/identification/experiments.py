@@ -88,7 +88,7 @@ def add_noise(
 ) -> Record:
     """The record with white noise on every sensor: of displacements (rms, m), and FORCE_NOISE."""
     noise = displacement * generator.standard_normal((3, len(record.plate)))
-    plate, head, support = np.array([record.plate, record.head, record.support]) + noise
+    plate, head, support = np.array(list(record.displacements.values())) + noise
     force = record.force
     if force is not None:
         force = force + FORCE_NOISE * generator.standard_normal(len(force))

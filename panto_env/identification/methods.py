@@ -34,8 +34,8 @@ def three_points(values: Array, time_step: float) -> Array:
 def equations(record: Record, known: Parameters) -> tuple[Array, Array]:
     """A, (2, n - 4, 5), and Y, (2, n - 4), of Eqs 4 and 6: first the pan head's rows, then the frame's."""
     inner = slice(2, -2)
-    plate, head, support = record.plate[inner], record.head[inner], record.support[inner]
-    first = [three_points(y, record.time_step) for y in (record.plate, record.head, record.support)]
+    plate, head, support = (y[inner] for y in record.displacements.values())
+    first = [three_points(y, record.time_step) for y in record.displacements.values()]
     v1, v2, v3 = (v[1:-1] for v in first)
     a2, a3 = (three_points(v, record.time_step) for v in first[1:])
     zero = np.zeros_like(plate)
@@ -69,8 +69,8 @@ def fit_equation_error(
     known = check_known(known)
     if band is None:
         return solve(record, known, 1, free_offset, PRINTED)
-    kept, stride = band_limited(record, band)
-    return solve(kept, known, stride, free_offset, FILTERED)
+    limited, stride = band_limited(record, band)
+    return solve(limited, known, stride, free_offset, FILTERED)
 
 
 def solve(record: Record, known: Parameters, stride: int, free_offset: bool, method: str) -> Fit:
@@ -95,17 +95,8 @@ def solve(record: Record, known: Parameters, stride: int, free_offset: bool, met
         raise InputError(f"The record holds no motion that {names[int(np.argmin(length))]} acts on.")
     # Columns of length 1: the same solution, without losing digits to units.
     q, r = np.linalg.qr(a / length)
-    dependence = _dependence(r, names)
-    values = np.linalg.solve(r, q.T @ y) / length
-    variance = float(np.sum((y - a @ values) ** 2)) / freedom
-    std = np.sqrt(variance * (np.linalg.inv(r) ** 2).sum(axis=1)) / length
-    return Fit(method, known, names, values, std, float(np.linalg.cond(r * length)), dependence)
-
-
-def _dependence(r: Array, names: tuple[str, ...]) -> float:
-    """Condition number of R, (p, p), columns of length 1. Raises InputError where they are dependent."""
     _, singular, rows = np.linalg.svd(r)
-    dependence = float(singular[0] / singular[-1]) if singular[-1] > 0 else float("inf")
+    dependence = float(singular[0] / singular[-1]) if singular[-1] > 0 else math.inf
     if dependence > DEPENDENT:
         involved = [name for name, share in zip(names, rows[-1], strict=True) if abs(share) > 0.1]
         raise InputError(
@@ -113,13 +104,16 @@ def _dependence(r: Array, names: tuple[str, ...]) -> float:
             f"(condition number {dependence:.2g}). Excite several frequencies, as a sweep does, "
             "or measure one of them and give it with --measured."
         )
-    return dependence
+    values = np.linalg.solve(r, q.T @ y) / length
+    variance = float(np.sum((y - a @ values) ** 2)) / freedom
+    std = np.sqrt(variance * (np.linalg.inv(r) ** 2).sum(axis=1)) / length
+    return Fit(method, known, names, values, std, float(np.linalg.cond(r * length)), dependence)
 
 
 OUTPUT_ERROR = "output error"
 MOST_EVALUATIONS = 100
 """Of the model in a pass; real records take about ten."""
-PASSES = 2  # the second weighs with the covariance that the first left
+PASSES = 2  # the second weights with the covariance that the first left
 SAMPLES_PER_PERIOD = 200
 """Of the band, to simulate with: a spline through them is good to 1e-9 of the motion."""
 
@@ -144,8 +138,8 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     from scipy.optimize import least_squares  # slow to import
 
     known = check_known(known)
-    kept, stride = band_limited(record, band)
-    start = solve(kept, known, stride, free_offset, FILTERED)
+    limited, stride = band_limited(record, band)
+    start = solve(limited, known, stride, free_offset, FILTERED)
     if start.dependence > IDENTIFIABLE:
         raise InputError(
             f"The record does not determine {', '.join(start.names)} all at once: their columns nearly "
@@ -153,7 +147,7 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
             "frequencies, as a sweep does, or measure one of them and give it with --measured."
         )
     guess = {n: max(v, START[n]) for n, v in zip(start.names, start.values, strict=True)}
-    misfit = Misfit(kept, known, guess, stride * record.time_step, band, free_offset)
+    misfit = Misfit(limited, known, guess, stride * record.time_step, band, free_offset)
     solution = misfit.start(guess)
     # No spring, damper or mass is below 0; a model that grows by itself would fit noise.
     lowest = np.where(np.arange(len(solution)) < len(start.names), 0.0, -np.inf)
@@ -168,7 +162,7 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
                 max_nfev=MOST_EVALUATIONS,
             )
             solution = fitted.x
-            misfit.weigh(solution)
+            misfit.reweight(solution)
         except (ValueError, np.linalg.LinAlgError) as error:  # the model's motion is beyond all numbers
             raise InputError(f"The output-error fit diverges ({error}); check the record's units.") from error
     jacobian = misfit.jacobian(solution)
@@ -252,8 +246,8 @@ class Misfit:
                 columns.append((self.residuals(up) - here) / step)
         return np.column_stack(columns)
 
-    def weigh(self, solution: Array) -> None:
-        """Weigh with the covariance of the residuals that a solution leaves."""
+    def reweight(self, solution: Array) -> None:
+        """Weight with the covariance of the residuals that a solution leaves."""
         error = self.simulated(solution) - self.target
         used = self.share * len(solution) / 2  # rows' worth that each of two channels gives away
         covariance = error.T @ error / (len(error) - used)

@@ -16,6 +16,7 @@ from ..base.files import check_output, write_text
 from ..base.plotting import BLUE, ORANGE, stacked
 from ..base.settings import ranges_of
 from ..base.table import Alarm, Table
+from ..catalog.values import in_toml
 from ..plant.pantograph.schema import PantographData
 from ..terminal import number
 from .model import HEAD, PLATE, SUPPORT, UNITS, Fit, Parameters, matrices
@@ -182,7 +183,6 @@ def write_pantograph(
         )
 
     p = fit.parameters
-
     rsd = dict(zip(fit.names, fit.rsd, strict=True))
 
     def source(*names: str) -> str:
@@ -194,25 +194,16 @@ def write_pantograph(
     description = f"Identified from {record} by {fit.method}; two masses, no aerodynamic uplift."
     lines = [
         'kind = "pantograph"',
-        f"description = {_text(description)}",
-        _entry("masses", [p["m2"], p["m3"]], source("m2", "m3")),
-        _entry("stiffnesses", [p["k2"], p["k3"]], source("k2", "k3")),
-        _entry("dampings", [p["c2"], p["c3"]], source("c2", "c3")),
-        _entry("static_force", static_force, force_source),
-        _entry("aerodynamic_coefficient", 0.0, "own choice: a rig in a laboratory has no wind"),
-        _entry("contact_stiffness", p["k1T"], source("k1T")),
-        _entry("contact_damping", p["c1T"], source("c1T")),
+        f"description = {json.dumps(description, ensure_ascii=False)}",
+        in_toml("masses", [p["m2"], p["m3"]], source("m2", "m3")),
+        in_toml("stiffnesses", [p["k2"], p["k3"]], source("k2", "k3")),
+        in_toml("dampings", [p["c2"], p["c3"]], source("c2", "c3")),
+        in_toml("static_force", static_force, force_source),
+        in_toml("aerodynamic_coefficient", 0.0, "own choice: a rig in a laboratory has no wind"),
+        in_toml("contact_stiffness", p["k1T"], source("k1T")),
+        in_toml("contact_damping", p["c1T"], source("c1T")),
     ]
     write_text(path, "\n".join(lines) + "\n")
-
-
-def _entry(key: str, value: float | list[float], source: str) -> str:
-    return f"{key} = {{ value = {json.dumps(value)}, source = {_text(source)} }}"
-
-
-def _text(text: str) -> str:
-    """A TOML string: JSON's escapes are TOML's."""
-    return json.dumps(text, ensure_ascii=False)
 
 
 SHOWN = 2000
@@ -224,7 +215,7 @@ def plot_record(record: Record, title: str, seconds: float) -> Figure:
     inside = record.time <= record.start + seconds
     step = max(1, int(inside.sum()) // SHOWN)
     time = record.time[inside][::step]
-    series = {"y_p1": record.plate, "y_p2": record.head, "y_p3": record.support}
+    series = record.displacements
     if record.force is not None:
         series = {"force": record.force} | series
     figure, axes = stacked((7, 6.2), len(series))

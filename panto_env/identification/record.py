@@ -17,6 +17,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.record_columns import LENGTHS, TIME, Column, read_series, write_series
+from ..estimation.motion import check_count, check_displacement
 from .model import Parameters
 
 SHORTEST = 20
@@ -39,6 +40,11 @@ class Record:
         """(n,): s."""
         return self.start + self.time_step * np.arange(len(self.plate))
 
+    @property
+    def displacements(self) -> dict[str, Array]:
+        """Plate, head and support by the names of their columns, (n,) each (m)."""
+        return {"y_p1": self.plate, "y_p2": self.head, "y_p3": self.support}
+
 
 COLUMNS = {
     "time": TIME,
@@ -56,11 +62,12 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     Raises InputError, naming the line and the column, for anything missing or not a number.
     """
     step, values = read_series(path, COLUMNS, units, SHORTEST, "to identify anything")
-    for name in DISPLACEMENTS:
-        if np.ptp(values[name]) == 0:
+    plate, head, support = values["y_p1"], values["y_p2"], values["y_p3"]
+    record = Record(step, plate, head, support, values.get("force"), float(values["time"][0]))
+    for name, each in record.displacements.items():
+        if np.ptp(each) == 0:
             raise InputError(f"{path}: column {name} never changes; check the sensor and its wiring.")
-    plate, head, support = (values[name] for name in DISPLACEMENTS)
-    return Record(step, plate, head, support, values.get("force"), float(values["time"][0]))
+    return record
 
 
 def write_record(record: Record, path: str | Path) -> None:
@@ -68,22 +75,18 @@ def write_record(record: Record, path: str | Path) -> None:
     columns = {"time (s)": record.time}
     if record.force is not None:
         columns["force (N)"] = record.force
-    for name, values in (("y_p1", record.plate), ("y_p2", record.head), ("y_p3", record.support)):
-        columns[f"{name} (mm)"] = 1e3 * values
+    columns |= {f"{name} (mm)": 1e3 * values for name, values in record.displacements.items()}
     write_series(path, columns)
 
 
 SAMPLING = (10.0, 50e3)  # 1/s
 DURATION = (0.5, 3600.0)  # s
-MOST_SAMPLES = 2_000_000
-FARTHEST = 3.0  # m, of any displacement from the rest: no pantograph reaches higher
 MOTION = (20e-6, 0.5)  # m from end to end, of plate and head; laser sensors see some µm
 FORCE = (0.01, 3000.0)  # N: minimum from end to end, maximum of any
 ALIKE = 30.0
 """How many times as far one may move as another, or as large a force be as the spring makes it."""
 HEAVIEST = 50.0  # kg, of a frame: it follows the head up to its own frequency on k2
 TOGETHER = 0.5  # correlation from which two series count as moving together, or against each other
-DISPLACEMENTS = ("y_p1", "y_p2", "y_p3")
 PUSH = (
     "displacements count in the direction in which the plate pushes the head, which is down under a wire, "
     "and the force is positive where it pushes"
@@ -109,48 +112,26 @@ def _check_time(record: Record) -> None:
             f"The record has {samples:,} samples in {duration:.4g} s, {rate:,.6g} a second, which is no "
             f"record of a rig: {units}?"
         )
-    if samples > MOST_SAMPLES:
-        raise InputError(
-            f"The record has {samples:,} samples; {MOST_SAMPLES:,} at most can be identified: give a part of "
-            "it, or resample it to some thousand a second."
-        )
+    check_count(samples)
 
 
 def _check_sizes(record: Record) -> None:
-    for name, values in zip(DISPLACEMENTS, (record.plate, record.head, record.support), strict=True):
-        farthest, motion = float(np.abs(values).max()), float(np.ptp(values))
-        if farthest > FARTHEST or motion > MOTION[1]:
-            what = (
-                f"displacements of {farthest:.3g} m" if farthest > FARTHEST else f"a motion of {motion:.3g} m"
-            )
-            raise InputError(
-                f"Column {name} holds {what}, which no pantograph makes on a rig: mm in a column of m, or µm "
-                "in a column of mm?"
-            )
-        if motion < MOTION[0] and name != DISPLACEMENTS[2]:
-            raise InputError(
-                f"Column {name} moves by {1e6 * motion:.3g} µm only, too little to identify anything: metres "
-                "in a column of mm, or mm in a column of µm?"
-            )
-    plate = float(record.plate.std())
-    for name, values, minimum in (
-        (DISPLACEMENTS[1], record.head, 1 / ALIKE),
-        (DISPLACEMENTS[2], record.support, 1 / ALIKE**1.5),  # it stays behind where the plate is quick
-    ):
-        ratio = float(values.std()) / plate
+    for name, values in record.displacements.items():
+        check_displacement(name, values, MOTION if name != "y_p3" else (0.0, MOTION[1]))
+    # The support stays behind where the plate is quick.
+    for name, minimum in (("y_p2", 1 / ALIKE), ("y_p3", 1 / ALIKE**1.5)):
+        ratio = float(record.displacements[name].std()) / float(record.plate.std())
         if not minimum <= ratio <= ALIKE:
             far = f"{ratio:,.3g} times as far" if ratio > 1 else f"1/{1 / ratio:,.3g} as far"
-            raise InputError(
-                f"Column {name} moves {far} as {DISPLACEMENTS[0]}: are both in the units that are said?"
-            )
+            raise InputError(f"Column {name} moves {far} as y_p1: are both in the units that are said?")
 
 
 def _check_signs(record: Record, known: Parameters) -> None:
-    pairs = [(DISPLACEMENTS[1], record.head, DISPLACEMENTS[0], record.plate)]
+    pairs, values = [("y_p2", "y_p1")], record.displacements
     if frequency_below(record, 0.5) < math.sqrt(known["k2"] / HEAVIEST) / (2 * math.pi):
-        pairs.append((DISPLACEMENTS[2], record.support, DISPLACEMENTS[1], record.head))
-    for name, values, other, reference in pairs:
-        if _correlation(values, reference) < -TOGETHER:
+        pairs.append(("y_p3", "y_p2"))
+    for name, other in pairs:
+        if _correlation(values[name], values[other]) < -TOGETHER:
             raise InputError(
                 f"Column {name} falls as {other} rises, though they hang together: one of them seems to "
                 f"point the other way; {PUSH}."

@@ -66,7 +66,7 @@ def band_limited(record: Record, band: float) -> tuple[Record, int]:
         return np.asarray(mean + oaconvolve(values - mean, window, mode="valid"))
 
     force = None if record.force is None else smooth(record.force)
-    plate, head, support = (smooth(each) for each in (record.plate, record.head, record.support))
+    plate, head, support = map(smooth, record.displacements.values())
     start = record.start + taps // 2 * record.time_step
     return Record(record.time_step, plate, head, support, force, start), stride
 

@@ -15,8 +15,8 @@ from ..base.record_columns import equal_step
 from .record import Piece
 
 BACK = 1.0
-"""Way (m) up to which a position that falls is noise of the odometer. Beyond, the train runs back, or the
-odometer was reset if that is the way of a single step."""
+"""Distance (m) up to which a position that falls is noise of the odometer. Beyond, the train runs back, or
+the odometer was reset if that is the distance of a single step."""
 AHEAD = 3.0
 """How many times as far as the speed explains a position may step forward, beside ``BACK``."""
 STANDING = 1.0
@@ -39,10 +39,12 @@ def resets(time: Array, position: Array, step: float, gap: NDArray[np.bool_]) ->
 
     time (s) and position (m), (n,); step, the usual one of time (s), and gap as in ``Axes``.
     """
-    ways, steps = np.diff(position), np.diff(time)
-    usual = float(np.median(ways[ways > 0] / steps[ways > 0])) if (ways > 0).any() else 0.0
-    coarse = float(np.median(ways[ways > 0])) if (ways > 0).any() else 0.0  # steps of the odometer itself
-    return np.asarray((ways < -BACK) | (ways > AHEAD * max(usual * step, coarse) + BACK) & ~gap)
+    distances, steps = np.diff(position), np.diff(time)
+    usual = coarse = 0.0
+    if (ahead := distances > 0).any():
+        usual = float(np.median(distances[ahead] / steps[ahead]))
+        coarse = float(np.median(distances[ahead]))  # steps of the odometer itself
+    return np.asarray((distances < -BACK) | (distances > AHEAD * max(usual * step, coarse) + BACK) & ~gap)
 
 
 def runs_back(position: Array, apart: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -88,7 +90,7 @@ def rising(position: Array) -> Array:
     return np.asarray(even)
 
 
-def even_ways(position: Array, apart: NDArray[np.bool_], still: NDArray[np.bool_]) -> Array:
+def evened(position: Array, apart: NDArray[np.bool_], still: NDArray[np.bool_]) -> Array:
     """Positions (m), (n,), as ``rising`` between those apart, falling as evenly where the train runs back.
 
     apart: as in ``runs_back``; still: where the train stands, (n,), which stays one position.
@@ -125,7 +127,7 @@ class Axes:
 def axes_of(run: str, values: Mapping[str, Array]) -> Axes:
     """Axes of a run from two of time (s), position (m) and speed (m/s), (n,) each; n > 1.
 
-    run: words for messages. Positions that give the time are those of ``even_ways``. Raises InputError where
+    run: words for messages. Positions that give the time are those of ``evened``. Raises InputError where
     two are missing, time does not increase, the speed is 0 where it has to give the time, or most speeds are
     below 0 where they have to give the position.
     """
@@ -155,13 +157,13 @@ def axes_of(run: str, values: Mapping[str, Array]) -> Axes:
     assert speed is not None
     if np.median(speed) < 0:
         raise InputError(f"Most speeds{run} are below 0; turn the sign of column speed.")
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * steps)])
+    distance = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * steps)])
     note = "Positions are the integral of the speed, from 0 m."
-    return Axes(time, way, step, steps > GAP * step, note=note)
+    return Axes(time, distance, step, steps > GAP * step, note=note)
 
 
 def _over_place(run: str, position: Array, speed: Array) -> Axes:
-    """Axes of samples by place: time is the integral of the way over the speed."""
+    """Axes of samples by place: time is the integral of the distance over the speed."""
     if (speed <= 0).any():
         place = int(np.argmax(speed <= 0)) + 1
         raise InputError(
@@ -169,20 +171,20 @@ def _over_place(run: str, position: Array, speed: Array) -> Axes:
             "samples where the train stands, or add a column time (s)."
         )
     mean = 0.5 * (speed[1:] + speed[:-1])
-    ways = np.diff(position)
+    distances = np.diff(position)
     # Steps of time vary with the speed and those of place do not, or the reverse: a gap is long in both.
-    gap = _long(ways) & _long(ways / mean)
-    apart = gap | (ways < -BACK)
-    usual = _usual(np.abs(ways) / mean)
+    gap = _long(distances) & _long(distances / mean)
+    apart = gap | (distances < -BACK)
+    usual = _usual(np.abs(distances) / mean)
     still = standing(usual * np.arange(len(position)), position, gap)
-    even = even_ways(position, apart, still)
+    even = evened(position, apart, still)
     steps = np.abs(np.diff(even)) / mean
-    # Where the train stands, or its odometer was reset, the way tells nothing of the time.
+    # Where the train stands, or its odometer was reset, the distance tells nothing of the time.
     steps = np.where((steps > 0) & (gap | ~apart), steps, usual)
     step = _usual(steps)
     time = np.concatenate([[0.0], np.cumsum(steps)])
     note = f"Times are the integral of the way over the speed, brought to equal steps of {1e3 * step:.3g} ms"
-    repeated = int(np.sum((ways == 0) & ~still[1:]))
+    repeated = int(np.sum((distances == 0) & ~still[1:]))
     if repeated:
         note += f"; positions that repeat the one before ({repeated:,}) are taken to rise evenly"
     return Axes(time, even, step, gap, over_place=True, note=f"{note}.")
@@ -268,10 +270,8 @@ def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part
 
         equal = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
         forces = np.asarray(PchipInterpolator(time, forces)(equal))
-        position, own = (
-            np.interp(equal, time, position),
-            {k: np.interp(equal, time, v) for k, v in own.items()},
-        )
+        position = np.interp(equal, time, position)
+        own = {name: np.interp(equal, time, values) for name, values in own.items()}
     return Piece(run, step, float(time[0]), position, forces, own.get("height"), own.get("uplift"))
 
 

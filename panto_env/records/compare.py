@@ -98,7 +98,8 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
             f"Record and run hardly resemble each other (correlation {found.correlation:.2f}): it may be "
             "of another line, the shift beyond the search, or columns may be swapped."
         )
-    values = {"uplift at a support": uplift, "range of the contact point's height": height}
+    range_of_height = "range of the contact point's height"
+    values = {"uplift at a support": uplift, range_of_height: height}
     missing = tuple(name for name, value in values.items() if math.isnan(value))
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
@@ -107,16 +108,7 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     criteria = (
         Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
-        Criterion(
-            "height",
-            "range of the contact point's height",
-            "mm",
-            height,
-            -HEIGHT,
-            HEIGHT,
-            SOURCE,
-            heights_note,
-        ),
+        Criterion("height", range_of_height, "mm", height, -HEIGHT, HEIGHT, SOURCE, heights_note),
         alike,
         *(
             Criterion(key, LABELS[key].name, "N", simulated - measured)
@@ -159,11 +151,9 @@ def _spans(
     compared = np.zeros(len(position), dtype=bool)
     for span in range(int(numbers[0]), int(numbers[1]) + 1):
         first, last = run.alignment.limits((span, span))
-        here, there = (
-            (position >= first) & (position < last) & settled,
-            run.alignment.within(run.position, (span, span)),
-        )
-        if samples.way(here) < COVERED * (last - first):
+        here = (position >= first) & (position < last) & settled
+        there = run.alignment.within(run.position, (span, span))
+        if samples.distance(here) < COVERED * (last - first):
             continue
         compared |= here
         a, b = samples.filtered[here], filtered[there]
@@ -242,8 +232,8 @@ def figures_table(found: Comparison) -> Table:
 def acceptance_table(found: Comparison) -> Table:
     """Deviations with limits, and what was not measured."""
     table = criteria_table(found.criteria, "Deviations, run minus record")
-    told = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
-    return Table(table.title, ("deviation of", *table.headings[1:]), told)
+    rows = [(row[0], "not measured", *row[2:]) if "not judged" in row else row for row in table.rows]
+    return Table(table.title, ("deviation of", *table.headings[1:]), rows)
 
 
 def spans_table(found: Comparison) -> Table:

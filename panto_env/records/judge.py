@@ -34,7 +34,7 @@ SECTION = 1000.0
 COVERED = 0.9
 """Share of a span that must be recorded for its figures to be shown."""
 SLACK = 1.0
-"""Way (m) that a record may lie beyond the line without a word: odometers are not better. Own choice."""
+"""Distance (m) that a record may lie beyond the line without a word: odometers are not better. Own choice."""
 WINDOW = 8.0
 """Duration of the windows (s) whose spectra are averaged."""
 
@@ -153,7 +153,7 @@ def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -
         if begin < reach[0] - 1e-6 or end > reach[1] + 1e-6:
             continue
         words = f"{alignment.span_name(int(span))}: {begin:,.6g} to {end:,.6g} m"
-        if samples.way(numbers == span) >= COVERED * (end - begin):
+        if samples.distance(numbers == span) >= COVERED * (end - begin):
             found.append(_part(samples, "span", words, numbers == span))
     return found
 
@@ -278,26 +278,21 @@ def part_tables(found: Judgement) -> list[Table]:
     """Tables by run, speed, section and span, of those kinds that have more than one part, or are spans."""
     tables = []
     for kind, title in TITLES.items():
-        parts = found.of(kind)
+        parts, long = found.of(kind), [] if kind == "span" else ["distance (m)"]
+        rows = [
+            (
+                part.where,
+                *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
+                number(part.arcing, 2),
+                *(number(part.figures.distance, 0) for _ in long),
+                number(to_kmh(part.speed), 0),
+            )
+            for part in parts
+        ]
         if len(parts) > 1 or (kind == "span" and parts):
-            tables.append(_parts_table(parts, title))
+            short = [LABELS[key].short_heading for key in SHOWN]
+            tables.append(Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows))
     return tables
-
-
-def _parts_table(parts: list[Part], title: str) -> Table:
-    long = [] if parts[0].kind == "span" else ["distance (m)"]
-    short = [LABELS[key].short_heading for key in SHOWN]
-    rows = [
-        (
-            part.where,
-            *(number(getattr(part.figures, key), digits) for key, digits in SHOWN.items()),
-            number(part.arcing, 2),
-            *(number(part.figures.distance, 0) for _ in long),
-            number(to_kmh(part.speed), 0),
-        )
-        for part in parts
-    ]
-    return Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
 
 
 def requirements_table(found: Judgement) -> Table:

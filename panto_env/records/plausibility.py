@@ -86,7 +86,13 @@ def check_axes(run: str, time: Array | None, position: Array | None) -> None:
             f"The rows{run} run backwards in time, from {time[0]:.6g} to {time[-1]:.6g} s; sort them by time."
         )
     if time is not None and position is not None and rises and ahead:
-        _check_order(run, abs(float(np.ptp(position) / np.ptp(time))))
+        speed, (low, high) = abs(float(np.ptp(position) / np.ptp(time))), SPEED_KMH
+        if to_kmh(speed) < low <= to_kmh(1 / max(speed, 1e-9)) <= high:
+            raise InputError(
+                f"By time and position the train{run} runs at {to_kmh(speed):.3g} km/h; with the two "
+                f"columns swapped it would be {to_kmh(1 / speed):.4g} km/h, so check whether they are, and "
+                "their units."
+            )
     if position is not None:
         _check_way(run, position, timed=time is not None)
 
@@ -144,16 +150,6 @@ def _check_way(run: str, position: Array, *, timed: bool) -> None:
             f"The position{run} falls {how}, as the train runs against the chainage; write the position as "
             "that of a support minus each, best of the last support before the record begins, so that it "
             "rises and supports stay in place."
-        )
-
-
-def _check_order(run: str, speed: float) -> None:
-    """Raise InputError where a speed (m/s) is none of a train, but would be with its two columns swapped."""
-    low, high = SPEED_KMH
-    if to_kmh(speed) < low and low <= to_kmh(1 / max(speed, 1e-9)) <= high:
-        raise InputError(
-            f"By time and position the train{run} runs at {to_kmh(speed):.3g} km/h; with the two columns "
-            f"swapped it would be {to_kmh(1 / speed):.4g} km/h, so check whether they are, and their units."
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,7 +46,7 @@ class Piece:
 
     @property
     def length(self) -> float:
-        """Way that the piece covers (m)."""
+        """Distance that the piece covers (m)."""
         return float(self.position[-1] - self.position[0])
 
 
@@ -59,8 +60,18 @@ class Record:
 
     @property
     def longest(self) -> Piece:
-        """The piece that covers the longest way."""
+        """The piece that covers the longest distance."""
         return max(self.pieces, key=lambda piece: piece.length)
+
+
+def repeated(series: Iterable[tuple[str, Array]]) -> Iterator[tuple[str, str]]:
+    """Names of each two series that are the same, sample by sample."""
+    known: dict[bytes, str] = {}
+    for name, values in series:
+        content = values.tobytes()
+        if content in known:
+            yield known[content], name
+        known.setdefault(content, name)
 
 
 SETTLING = 0.2
@@ -114,51 +125,51 @@ class Samples:
         """Whether losses of contact can be seen: behind a low-pass the force does not fall to 0."""
         return not self.low_passed and self.record.longest.filtered is None
 
+    def _joined(self, of_piece: Callable[[Piece], Array]) -> Array:
+        return np.concatenate([of_piece(piece) for piece in self.record.pieces])
+
     @cached_property
     def raw(self) -> Array:
         """(n,): contact force as recorded (N)."""
-        return np.concatenate([piece.force for piece in self.record.pieces])
+        return self._joined(lambda piece: piece.force)
 
     @cached_property
     def filtered(self) -> Array:
         """(n,): contact force behind EN 50317's low-pass (N), or as recorded where it was low-passed."""
         if self.low_passed:
             return self.raw
-        return np.concatenate([low_pass(piece.force, piece.time_step) for piece in self.record.pieces])
+        return self._joined(lambda piece: low_pass(piece.force, piece.time_step))
 
     @cached_property
     def in_place(self) -> Array:
         """(n,): as ``filtered``, but without delay (N), for pictures and for comparisons by place."""
         if self.low_passed:
             return self.raw
-        return np.concatenate(
-            [zero_phase_low_pass(piece.force, piece.time_step) for piece in self.record.pieces]
-        )
+        return self._joined(lambda piece: zero_phase_low_pass(piece.force, piece.time_step))
 
     @cached_property
     def settled(self) -> NDArray[np.bool_]:
         """(n,): samples whose filtered force counts."""
-        if self.low_passed:
-            return np.ones(len(self.raw), dtype=bool)
-        pieces = self.record.pieces
-        return np.concatenate([np.arange(len(one.force)) * one.time_step >= SETTLING for one in pieces])
+        time = self._joined(lambda piece: np.arange(len(piece.force)) * piece.time_step)
+        return (time >= SETTLING) | self.low_passed
 
     @cached_property
     def position(self) -> Array:
         """(n,): along the line (m)."""
-        return np.concatenate([piece.position for piece in self.record.pieces])
+        return self._joined(lambda piece: piece.position)
 
     @cached_property
     def until(self) -> Array:
         """(n,): position of the next sample of the piece (m), of its last one as the speed has it."""
-        found = []
-        for piece in self.record.pieces:
-            last = piece.position[-1] + piece.time_step * local_speed(piece)[-1]
-            found.append(np.append(piece.position[1:], last))
-        return np.concatenate(found)
 
-    def way(self, inside: NDArray[np.bool_]) -> float:
-        """Way (m) that samples inside, (n,), cover; what several pieces cover counts once."""
+        def following(piece: Piece) -> Array:
+            last = piece.position[-1] + piece.time_step * local_speed(piece)[-1]
+            return np.append(piece.position[1:], last)
+
+        return self._joined(following)
+
+    def distance(self, inside: NDArray[np.bool_]) -> float:
+        """Distance (m) that samples inside, (n,), cover; what several pieces cover counts once."""
         begin, end = self.position[inside], self.until[inside]
         order = np.argsort(begin, kind="stable")
         begin, end = begin[order], np.maximum.accumulate(end[order])
@@ -168,7 +179,7 @@ class Samples:
     @cached_property
     def speed(self) -> Array:
         """(n,): local speed (m/s)."""
-        return np.concatenate([local_speed(piece) for piece in self.record.pieces])
+        return self._joined(local_speed)
 
     @cached_property
     def run(self) -> NDArray[np.intp]:
@@ -188,7 +199,7 @@ GRID = 0.25
 SEARCH, NEAR = 1.5, 0.5
 """Spans on each side within which a shift is searched: without any idea, and about one that is given."""
 ENOUGH = 0.5
-"""Share of the way that the best-covered shift has in common with the run, from which others count."""
+"""Share of the distance that the best-covered shift has in common with the run, from which others count."""
 
 
 @dataclass(frozen=True)
@@ -223,16 +234,17 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
     ]
     # Lag k reads the record at places - lags[k], which begins at index len(lags) - 1 - k.
     found = np.array([_correlation(own, pieces, len(lags) - 1 - k) for k in range(len(lags))])
-    ways, correlations = GRID * found[:, 1], found[:, 0]
-    if not ways.max() >= span:
+    distances, correlations = GRID * found[:, 1], found[:, 0]
+    if not distances.max() >= span:
         first, last = samples.position.min(), samples.position.max()
         raise InputError(
             f"The record runs from {first:,.0f} to {last:,.0f} m and the evaluated run from {begin:,.0f} to "
             f"{end:,.0f} m, so they have less than a span in common; give about what is to be added to the "
             f"record's positions: --shift {0.5 * (begin + end - first - last):.0f}."
         )
-    correlations[(ways < ENOUGH * ways.max()) | ~np.isfinite(correlations)] = -1.0
-    peaks = _peaks(correlations)
+    correlations[(distances < ENOUGH * distances.max()) | ~np.isfinite(correlations)] = -1.0
+    edged = np.concatenate([[-math.inf], correlations, [-math.inf]])
+    peaks = np.flatnonzero((correlations >= edged[:-2]) & (correlations >= edged[2:])).tolist()
     best = max(peaks, key=lambda k: correlations[k])
     rest = [k for k in peaks if abs(lags[k] - lags[best]) > 0.25 * span]
     second = max(rest, key=lambda k: correlations[k], default=None)
@@ -250,11 +262,6 @@ def _correlation(own: Array, pieces: list[Array], begin: int) -> tuple[float, in
     if len(a) < 2 or a.std() == 0 or b.std() == 0:
         return math.nan, len(a)
     return float(np.corrcoef(a, b)[0, 1]), len(a)
-
-
-def _peaks(values: Array) -> list[int]:
-    padded = np.concatenate([[-math.inf], values, [-math.inf]])
-    return np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:])).tolist()
 
 
 def _vertex(lags: Array, values: Array, k: int) -> tuple[float, float]:

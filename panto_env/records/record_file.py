@@ -25,7 +25,7 @@ from ..base.record_columns import JITTER, LENGTHS, TIME, Column, places_of, read
 from ..base.table import Sheet, write_table
 from .axes import RUNS_BACK, Break, axes_of, cut
 from .plausibility import check_axes, check_force, check_motion, check_speed
-from .record import Piece, Record
+from .record import Piece, Record, repeated
 
 STRIPS = 4
 """Maximum number of force sensors, and of accelerometers, of a collector head."""
@@ -228,19 +228,17 @@ def write_record(record: Record, path: str | Path) -> None:
     """
     if Path(path).suffix.lower() != ".csv":
         raise InputError(f"{path} must end in .csv.")
-    found: dict[str, Any] = {"run": [piece.run for piece in record.pieces for _ in piece.force]}
     headings = {"time": "time (s)", "position": "position (m)", "force": "force (N)"}
+    headings |= {"height": "height (m)", "uplift": "uplift (m)"}
+    found: dict[str, Any] = {}
+    if any(piece.run for piece in record.pieces):
+        found["run"] = [piece.run for piece in record.pieces for _ in piece.force]
     for name in headings:
-        found[name] = np.concatenate([getattr(piece, name) for piece in record.pieces])
-    for name in ("height", "uplift"):
         series = [getattr(piece, name) for piece in record.pieces]
         if any(each is not None for each in series):
-            headings[name] = f"{name} (m)"
             missing = [np.full(len(piece.force), np.nan) for piece in record.pieces]
             pairs = zip(series, missing, strict=True)
             found[name] = np.concatenate([empty if own is None else own for own, empty in pairs])
-    if not any(found["run"]):
-        del found["run"]
     write_table(Sheet("record", found, headings), path)
 
 
@@ -249,10 +247,10 @@ def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
     seen = (key for key in ("height", "uplift") if key in values)
     check_motion({key: values[key] for key in seen if not np.isnan(values[key]).all()})
     raised = values.get("raised")
-    kept = np.isfinite(force) & (True if raised is None else raised > 0.5)
-    if kept.sum() < 2:
+    known = np.isfinite(force) & (True if raised is None else raised > 0.5)
+    if known.sum() < 2:
         raise InputError("No sample has a force of a raised pantograph; check the columns force and raised.")
-    check_force(force[kept])
+    check_force(force[known])
     runs = _runs(values.get("run"), len(force))
     pieces: list[Piece] = []
     breaks: list[Break] = []
@@ -309,13 +307,11 @@ def _check(pieces: Sequence[Piece]) -> None:
             f"The runs have different rates, from {1 / max(steps):.4g} to {1 / min(steps):.4g} samples a "
             "second; give each a file of its own."
         )
-    seen: dict[bytes, str] = {}
-    for piece in pieces:
-        other = seen.setdefault(piece.force.tobytes(), piece.run)
-        if other != piece.run:
+    for one, other in repeated((piece.run, piece.force) for piece in pieces):
+        if one != other:
             raise InputError(
-                f"Runs {shortly(other)} and {shortly(piece.run)} have the same forces, sample by sample; "
-                "leave one of them out."
+                f"Runs {shortly(one)} and {shortly(other)} have the same forces, sample by sample; leave "
+                "one of them out."
             )
 
 

@@ -64,17 +64,9 @@ class Loop:
         """Margins of the rig as it is."""
         return margins_of(self.frequency, self._gain(self.rig))
 
-    def slowest_cylinder(self) -> float:
-        """Natural frequency (Hz) of the cylinder below which the loop is not stable, if it is compensated for
-        as one of the rig's own frequency.
-        """
-        own = self.rig.cylinder.natural_frequency
-
-        def stable(frequency: float) -> bool:
-            slower = with_values(self.rig, {"cylinder": {"natural_frequency": frequency}})
-            return is_stable(self._gain(slower))
-
-        return threshold(stable, SLOWEST * own, own)
+    def stable(self, rig: RigData) -> bool:
+        """Whether the loop is stable with another cylinder, compensated for as it is."""
+        return is_stable(self._gain(rig))
 
     def _gain(self, rig: RigData) -> Response:
         return analog_response(rig, self.pantograph, self.frequency) * self._computer
@@ -213,17 +205,15 @@ def bearable_delay(rig: RigData, pantograph: PantographData, speed_kmh: float, m
     return threshold(stable, most, 0.0, share=0.02)
 
 
-def slowest_cylinder(rig: RigData, pantograph: PantographData, speed_kmh: float) -> float:
-    """Natural frequency (Hz) of the cylinder below which the rig is not stable, if it is compensated for as
-    one of the rig's own frequency.
+def slowest_cylinder(rig: RigData, stable: Callable[[RigData], bool], share: float = 0.01) -> float:
+    """Natural frequency (Hz) of the cylinder below which a rig is not stable, if it is compensated for as one
+    of the rig's own frequency; to a share of itself.
     """
     own = rig.cylinder.natural_frequency
+    assumed = {"assumed_frequency": rig.computer.assumed_frequency or own}
 
-    def stable(natural_frequency: float) -> bool:
-        tables = {
-            "cylinder": {"natural_frequency": natural_frequency},
-            "computer": {"assumed_frequency": rig.computer.assumed_frequency or own},
-        }
-        return grows_not(with_values(rig, tables), pantograph, speed_kmh)
+    def with_cylinder(frequency: float) -> bool:
+        slower = {"cylinder": {"natural_frequency": frequency}, "computer": assumed}
+        return stable(with_values(rig, slower))
 
-    return threshold(stable, SLOWEST * own, own, share=0.02)
+    return threshold(with_cylinder, SLOWEST * own, own, share)

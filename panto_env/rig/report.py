@@ -13,6 +13,7 @@ from ..base.arrays import from_kmh
 from ..base.plotting import POSITION, legend_above, panels, series_colour
 from ..base.table import Table
 from ..metrics.low_pass import amplitudes, zero_phase_low_pass
+from ..metrics.trajectory import Trajectory
 from ..plant.catenary.rig import RigData
 from ..plant.pantograph.schema import PantographData
 from . import margins as growth
@@ -23,12 +24,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-QUANTITIES = (
-    ("contact force (N)", "contact_force", 1.0),
-    ("collectors (mm)", "head", 1e3),
-    ("frame (mm)", "frame", 1e3),
-)
-"""What is compared: words with the unit, attribute of ``Trajectory``, scale."""
+QUANTITIES = {
+    "contact_force": ("contact force", "N", 1.0),
+    "head": ("collectors", "mm", 1e3),
+    "frame": ("frame", "mm", 1e3),
+}
+"""What is compared: attribute of ``Trajectory``, words, unit and scale to it."""
 SEARCHED = 2.5
 """How far the delay that a simulation bears is looked for, as a multiple of the linear loop's."""
 
@@ -50,8 +51,8 @@ def stability(rig: RigData, pantograph: PantographData, speed_kmh: float) -> Sta
     return Stability(
         linear,
         growth.bearable_delay(rig, pantograph, speed_kmh, SEARCHED * linear.delay),
-        loop.slowest_cylinder(),
-        growth.slowest_cylinder(rig, pantograph, speed_kmh),
+        growth.slowest_cylinder(rig, loop.stable),
+        growth.slowest_cylinder(rig, lambda slower: growth.grows_not(slower, pantograph, speed_kmh), 0.02),
     )
 
 
@@ -68,7 +69,7 @@ def pair_facts(pair: Pair) -> dict[str, Any]:
         "reference": pair.reference.catenary,
         "followed_hz": pair.followed(),
         "first_not_followed": vars(pair.first_lost()),
-        "bands": {name: [vars(band) for band in pair.bands(name)] for _, name, _ in QUANTITIES},
+        "bands": {name: [vars(band) for band in pair.bands(name)] for name in QUANTITIES},
     }
 
 
@@ -94,10 +95,10 @@ def timing_facts(timing: Timing) -> dict[str, Any]:
 def pair_table(pair: Pair) -> Table:
     """Rms by band of force and displacements, and of the difference."""
     rows, ends = [], []
-    for words, name, scale in QUANTITIES:
+    for name, (words, unit, scale) in QUANTITIES.items():
         for band in pair.bands(name):
             sizes = (f"{scale * band.reference:.2f}", f"{scale * band.rig:.2f}", f"{100 * band.error:.1f}")
-            rows.append((words, f"{band.low:g}-{band.high:g}", *sizes))
+            rows.append((f"{words} ({unit})", f"{band.low:g}-{band.high:g}", *sizes))
         ends.append(len(rows) - 1)
     title = f"{pair.rig.catenary} beside {pair.reference.catenary}, rms by band of frequency"
     return Table(title, ("", "Hz", "line itself", "rig", "difference (%)"), rows, 2, tuple(ends))
@@ -149,11 +150,6 @@ def timing_table(name: str, timing: Timing) -> Table:
 LINE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": "--"}
 SHOWN_SPANS = 3
 MOST_SHOWN = 30.0  # Hz
-PANELS = (
-    ("head", 1e3, "collectors", "mm"),
-    ("frame", 1e3, "frame", "mm"),
-    ("contact_force", 1.0, "contact force to 20 Hz", "N"),
-)
 
 
 def plot_pairs(pairs: Sequence[Pair]) -> Figure:
@@ -163,33 +159,31 @@ def plot_pairs(pairs: Sequence[Pair]) -> Figure:
     inside = first.inside(pairs[0].spans)
     begin = first.position[inside][0]
     end = begin + SHOWN_SPANS * first.alignment.mean_length
-    drawn = {f"on {pair.rig.catenary}": pair.rig for pair in pairs}
-    drawn |= {f"under line {pair.reference.catenary}": pair.reference for pair in pairs}
-    for axis, (name, scale, label, unit) in zip(axes, PANELS, strict=False):
-        for k, (who, run) in enumerate(drawn.items()):
+    drawn: dict[str, tuple[Trajectory, dict[str, Any]]] = {
+        f"on {pair.rig.catenary}": (pair.rig, {"color": series_colour(k), "linewidth": 2.5})
+        for k, pair in enumerate(pairs)
+    }
+    drawn |= {f"under line {pair.reference.catenary}": (pair.reference, LINE_STYLE) for pair in pairs}
+    for axis, name in zip(axes, ("head", "frame", "contact_force"), strict=False):
+        label, unit, scale = QUANTITIES[name]
+        for who, (run, style) in drawn.items():
             values = getattr(run, name)
             if name == "contact_force":
-                values = zero_phase_low_pass(values, run.time_step)
+                values, label = zero_phase_low_pass(values, run.time_step), "contact force to 20 Hz"
             values = scale * (values - values[run.inside(pairs[0].spans)].mean())
             shown = (run.position >= begin) & (run.position <= end)
-            style = LINE_STYLE if who.startswith("under") else _rig_style(k)
             axis.plot(run.position[shown], values[shown], label=who, **style)
         axis.set(ylabel=f"{label},\nwithout mean ({unit})", xlim=(begin, end))
         axis.grid(axis="y", color="0.92")
         mark_supports_of_run(axis, first)
     legend_above(axes[0], 4)
     axes[2].set_xlabel(POSITION)
-    for k, (who, run) in enumerate(drawn.items()):
+    for who, (run, style) in drawn.items():
         force = run.contact_force[run.inside(pairs[0].spans)]
         frequency, amplitude = amplitudes(force, run.time_step)
         shown = frequency <= MOST_SHOWN
-        style = LINE_STYLE if who.startswith("under") else _rig_style(k)
         axes[3].plot(frequency[shown], amplitude[shown], label=who, **style)
     axes[3].set(xlabel="frequency (Hz)", ylabel="amplitude of the\ncontact force (N)", xlim=(0, MOST_SHOWN))
     axes[3].grid(color="0.92")
     figure.suptitle(f"{first.pantograph} at {first.speed_kmh:g} km/h, as Figs 5 to 8 of paper 2")
     return figure
-
-
-def _rig_style(number: int) -> dict[str, Any]:
-    return {"color": series_colour(number), "linewidth": 2.5}

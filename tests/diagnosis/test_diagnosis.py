@@ -75,10 +75,10 @@ def learned():
 
 def test_patterns_of_passes_are_taken_out_and_the_rest_is_as_large_as_it_was_made(learned):
     passes = made_up(30, np.random.default_rng(2))
-    levels = [learned.weigh(passes.only(k), 1.0)[1][0] * np.sqrt((learned.size**2).mean()) for k in range(30)]
+    levels = [learned.score(passes.only(k), 1.0)[1][0] * np.sqrt((learned.size**2).mean()) for k in range(30)]
     # Noise of rms 0.6 / sqrt(1 - 0.8^2) = 1 times a size of rms sqrt(4.5). The mean of 10 passes is off by a
     # tenth of that variance, and so is what their pattern, known as well as the mean, explains.
-    rest = np.concatenate([learned.weigh(passes.only(k), 1.0)[0].rest for k in range(30)])
+    rest = np.concatenate([learned.score(passes.only(k), 1.0)[0].residual for k in range(30)])
     assert rest.std() == pytest.approx(np.sqrt(4.5) * np.sqrt(1 + 2 / 10), rel=0.03)
     assert np.std(passes.force - learned.mean) > 1.5 * rest.std()
     assert np.std(levels) < 0.2 * np.mean(levels)
@@ -86,7 +86,7 @@ def test_patterns_of_passes_are_taken_out_and_the_rest_is_as_large_as_it_was_mad
 
 def test_whitened_remainders_are_white_and_their_energy_is_one(learned):
     passes = made_up(20, np.random.default_rng(3))
-    scores = np.array([learned.weigh(passes.only(k), 1.0)[0].score[PER_SPAN:] for k in range(20)])
+    scores = np.array([learned.score(passes.only(k), 1.0)[0].score[PER_SPAN:] for k in range(20)])
     assert scores.mean() == pytest.approx(1.0, rel=0.1)
     # Of noise whose correlation falls by 0.8 from place to place, with the white noise that it reckons with.
     lags = 0.8 ** np.arange(len(learned.predictor) + 1) + FLOOR * (np.arange(len(learned.predictor) + 1) == 0)
@@ -161,7 +161,7 @@ def test_the_threshold_is_a_quantile_of_gumbel_s_by_maximum_likelihood():
 def test_the_whole_line_has_changed_where_a_further_pass_would_hardly_be_so_loud(learned, count, spread):
     """12 healthy levels of known spread in the logarithm: Student's t of further passes, at 1 in 1000."""
     passes = made_up(count, np.random.default_rng(6))
-    levels = np.log(learned.weigh(passes, 1.0)[1])
+    levels = np.log(learned.score(passes, 1.0)[1])
     healthy = spread * np.sqrt(11 / 12) * np.array([-1.0, 1.0] * 6)
     assert np.std(healthy, ddof=1) == pytest.approx(spread)
     limit = stats.t.ppf(0.999, 11) * spread * np.sqrt(1 / count + 1 / 12)
@@ -180,7 +180,7 @@ def test_healthy_passes_held_against_each_other_are_as_loud_as_further_ones():
         noise = replace(passes, force=100 + random.standard_normal(passes.force.shape))
         one = Healthy.of(noise.only(0, 1, 2, 3))
         healthy.append(one.levels.mean())
-        later += [one.weigh(noise.only(k), 1.0)[1][0] for k in range(4, 8)]
+        later += [one.score(noise.only(k), 1.0)[1][0] for k in range(4, 8)]
     assert np.mean(healthy) == pytest.approx(np.mean(later), rel=0.012)
 
 
@@ -190,18 +190,18 @@ def test_a_bump_is_found_where_it_is_and_a_healthy_pass_has_none(learned):
     for k, at in enumerate((25.25, 18.7, 9.4)):
         bumped = passes.force.copy()
         bumped[:, int(at * PER_SPAN) : int(at * PER_SPAN) + 12] += 15.0
-        evidence, _ = learned.weigh(replace(passes, force=bumped).only(k), limit)
+        evidence, _ = learned.score(replace(passes, force=bumped).only(k), limit)
         (region,) = regions(evidence)
         assert abs(evidence.position[region.peak] - at * SPAN) < 8
-    assert sum(len(regions(learned.weigh(passes.only(k), limit)[0])) for k in range(12)) <= 2
+    assert sum(len(regions(learned.score(passes.only(k), limit)[0])) for k in range(12)) <= 2
 
 
 def test_a_mean_of_passes_shows_what_one_does_not(learned):
     passes = made_up(9, np.random.default_rng(5))
     passes.force[:, 20 * PER_SPAN : 20 * PER_SPAN + 12] += 3.0
     at = slice(20 * PER_SPAN - 10, 20 * PER_SPAN + 20)
-    alone = [learned.weigh(passes.only(k), 1.0)[0].score[at].max() for k in range(9)]
-    assert learned.weigh(passes, 1.0)[0].score[at].max() > 1.5 * np.median(alone)
+    alone = [learned.score(passes.only(k), 1.0)[0].score[at].max() for k in range(9)]
+    assert learned.score(passes, 1.0)[0].score[at].max() > 1.5 * np.median(alone)
 
 
 def evidence_of(score, rest=None):

@@ -44,7 +44,7 @@ def of_simulated(healthy):
 def in_numbers(found):
     """A diagnosis as plain data; of its curves some values."""
     evidence = found.evidence
-    curves = {name: getattr(evidence, name)[::97].tolist() for name in ("position", "rest", "score")}
+    curves = {name: getattr(evidence, name)[::97].tolist() for name in ("position", "residual", "score")}
     facts = {
         name: getattr(found, name) for name in ("changed", "level", "begin", "end", "false_alarms", "notes")
     }
@@ -121,7 +121,7 @@ def test_a_verdict_says_what_was_found_where_and_what_chance_would_find(count, c
 def test_the_whole_line_has_changed_from_twice_the_level_on(above):
     """Of healthy passes that hardly differ from one another."""
     learned, passes = Healthy.of(made_up(10, np.random.default_rng(1))), made_up(1, np.random.default_rng(6))
-    levels = np.log(learned.weigh(passes, 1.0)[1])
+    levels = np.log(learned.score(passes, 1.0)[1])
     healthy = np.exp(1e-3 * np.array([-1.0, 1.0] * 5) + levels - np.log(above))
     assert judge(passes, replace(learned, levels=healthy)).changed == (above > 2)
 

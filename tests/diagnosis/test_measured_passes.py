@@ -49,7 +49,7 @@ def healthy_record():
 def known(healthy_record, coarse):
     """A fit that knows droppers to a tenth of a millimetre, and that the line is as designed."""
     line, pantograph = load_catenary(LINE), load_pantograph(PANTOGRAPH)
-    values = preparing.problem([healthy_record], line, pantograph, free=("droppers",)).fitting.values.all
+    values = preparing.problem([healthy_record], line, pantograph, free=("droppers",)).values.all
     return Stored(
         "earlier", line.model_dump_json(), pantograph.model_dump_json(), values, np.zeros(len(values)),
         1e-8 * np.eye(len(values)), (540.0, 880.0), np.full(BANDS, 0.6), (),

@@ -42,7 +42,10 @@ def upside_down(motion):
 
 REFUSED = {
     "a gap": (lambda m: with_value(m, "frame", slice(500, 510), np.nan), r"frame holds no number at 0\.50"),
-    "mm for m": (lambda m: with_values(m, head=1e3 * m.head), "head holds heights of .* mm in a column"),
+    "mm for m": (
+        lambda m: with_values(m, head=1e3 * m.head),
+        "holds displacements of .* mm in a column",
+    ),
     "m for mm": (lambda m: with_values(m, head=1e-4 * m.head), "moves by .* µm only: metres"),
     "a jump": (
         lambda m: with_value(m, "head", slice(9000, None), m.head[9000:] + 0.1),

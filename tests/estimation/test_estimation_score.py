@@ -131,8 +131,8 @@ def test_an_unknown_input_is_that_of_least_squares_over_the_whole_record(driven)
     motion, pantograph = driven
     motion, n = noisy(motion), 40
     settings = EstimatorSettings()
-    system = _system(model_of(motion, pantograph, settings.model_copy(update={"force_model": HELD})))
-    size, m = len(system.contact), len(system.observed)
+    system, contact = _system(model_of(motion, pantograph, settings.model_copy(update={"force_model": HELD})))
+    size, m = len(contact), len(system.observed)
     measured, pushed = motion.measured(m)[:n], motion.inputs[:n] @ system.inputs.T
     start = system.observed.T @ measured[0]
     values, vectors = np.linalg.eigh(system.process_noise)
@@ -158,13 +158,13 @@ def test_an_unknown_input_is_that_of_least_squares_over_the_whole_record(driven)
         if k + 1 < n:
             where = size * n + k
             parts = [(place[k + 1], np.eye(size)), (place[k], -system.transition)]
-            add(inverse, [*parts, (slice(where, where + 1), -system.contact[:, None])], pushed[k])
+            add(inverse, [*parts, (slice(where, where + 1), -contact[:, None])], pushed[k])
     matrix, target = np.vstack(rows), np.concatenate(right)
     unit = np.linalg.norm(matrix, axis=0)
     solved = np.linalg.lstsq(matrix / unit, target, rcond=None)[0] / unit
     state, covariance = start, system.start_covariance
     for k in range(n):
-        gain, of_force, corrected = _gain(system, covariance)
+        gain, of_force, corrected = _gain(system, contact, covariance)
         news = measured[k] - system.observed @ state
         force = of_force @ news
         state = system.transition @ (state + gain @ news) + pushed[k]

@@ -144,7 +144,7 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     """
     records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
     found = fit(records, line, load_pantograph(PANTOGRAPH))
-    first = found.problem.first_span
+    first = found.problem.values.design.first_span
     spans = line.spans if line.ends else BEFORE.get(kind, 0) + SPANS + BEYOND
     droppers = len(line.layout(spans).positions)
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
@@ -159,8 +159,8 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
         "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
     }
     rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
-    rows["settled"] = found.solution.settled
-    rows["left"] = [_short(left) for _, left in found.left]
+    rows["settled"] = found.solution.converged
+    rows["left"] = [_short(residual) for _, residual in found.std]
     rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
     for name, truth in truths.items():
         own = found.of_kind(name)

@@ -31,8 +31,8 @@ def main() -> None:
         print(f"{perf_counter() - begin:.0f} s: {doing}", flush=True)
 
     found = fit(records, load_catenary(LINE), load_pantograph(PANTOGRAPH), working=working)
-    whole, freed = perf_counter() - begin, len(found.problem.fitting.values)
-    print(f"{len(found.found)} values compared, {freed} freed, settled: {found.solution.settled}")
+    whole, freed = perf_counter() - begin, len(found.problem.values)
+    print(f"{len(found.found)} values compared, {freed} freed, settled: {found.solution.converged}")
     print(
         f"{whole:.0f} s on {cores()} cores, {whole / simulated:.0f} times as long as to simulate the passes"
     )

@@ -58,7 +58,7 @@ def test_tensions_droppers_and_supports_are_found_within_their_intervals(fitted,
 
 def test_what_is_left_is_the_sensors_noise_and_the_position_error_is_found(fitted):
     """2 N at 500 samples a second are 0.63 N in a coefficient; values take some of it up."""
-    ((before, after),) = fitted.left
+    ((before, after),) = fitted.std
     assert before > 20
     assert 0.2 < after < 0.7
     (white,) = fitted.whiteness
@@ -71,7 +71,7 @@ def test_what_is_left_is_the_sensors_noise_and_the_position_error_is_found(fitte
 
 
 def test_it_settles(fitted, steps):
-    assert fitted.solution.settled
+    assert fitted.solution.converged
     assert steps[-1][0].steps == fitted.solution.state.steps < STEPS
     numbers = [state.steps for state, _ in steps]
     more = np.diff(numbers).tolist()
@@ -98,13 +98,13 @@ def test_droppers_known_to_be_right_stay(record, design, pantograph):
     """A tolerance is a prior: with hardly any, droppers do not move, and what they did is left over."""
     rigid = fit([record], design, pantograph, free=("tensions", "droppers"), tolerances={"droppers": 1e-6})
     assert max(abs(each.difference) for each in rigid.of_kind("droppers")) < 2e-5
-    assert rigid.left[0][1] > 5
+    assert rigid.std[0][1] > 5
 
 
 def test_tables_and_picture(fitted):
     told = plain(fitted)
     assert told["settled"] is True
-    assert told["records"][0]["left"] == fitted.left[0][1]
+    assert told["records"][0]["left"] == fitted.std[0][1]
     assert len(told["values"]) == len(fitted.found)
     (row,) = parts_table(fitted).rows
     assert row[:2] == ("run", "250.0")

@@ -39,7 +39,7 @@ SHORT = {"distance": 780.0, "spans": 20, "accuracy": "fast", "record_droppers": 
 
 def made_up(ready, differences, shift=0.0, silent=()):
     """A fit that found differences of values by name, and tells them, but for silent ones."""
-    fitting = ready.fitting
+    fitting = ready
     start = fitting.start()
     x, deviation = start.x.copy(), fitting.prior.copy()
     for k, value in enumerate(fitting.values.all):
@@ -48,9 +48,8 @@ def made_up(ready, differences, shift=0.0, silent=()):
             deviation[k] *= 1.0 if value.name in silent else 0.1
     x[len(fitting.values) :][: len(fitting.parts)] = shift
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
-    random = np.random.default_rng(0)
-    left = tuple(random.standard_normal(len(part.measured.kept)) for part in fitting.parts)
-    return Fit(ready, Solution(state, np.diag(deviation**2), (), left, True))
+    residual = np.random.default_rng(0).standard_normal(len(fitting.band))
+    return Fit(ready, Solution(state, np.diag(deviation**2), np.empty((0, 0)), residual, True))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +67,7 @@ def written(done, tmp_path_factory):
 def test_the_file_is_the_design_s_with_what_was_found(written, done):
     line = load_catenary(written)
     assert line.as_found == CONDITION  # with the dropper that is hardly told: others were found with it
-    plan = done.problem.fitting.values.design
+    plan = done.problem.values.design
     assert line.spans == plan.spans
     assert line.model_copy(update={"as_found": None, "spans": 10, "name": LINE, "sources": {}}) == (
         load_catenary(LINE).model_copy(update={"sources": {}})
@@ -103,10 +102,10 @@ def test_a_fit_of_a_fitted_line_begins_with_what_the_first_ended_with_and_adds_t
     written, record, pantograph, done, tmp_path
 ):
     again = problem([record], load_catenary(written), pantograph)
-    fitting, x = done.problem.fitting, done.solution.state.x[: len(done.problem.fitting.values)]
+    fitting, x = done.problem, done.solution.state.x[: len(done.problem.values)]
     (after,) = fitting.sampled(fitting.parts[0], [fitting.values.variant(x, pantograph.static_force)])
-    np.testing.assert_allclose(again.fitting.as_designed()[0], after, atol=0.2)
-    assert again.fitting.values.design.condition.miscut_droppers == CONDITION.miscut_droppers
+    np.testing.assert_allclose(again.as_designed()[0], after, atol=0.2)
+    assert again.values.design.condition.miscut_droppers == CONDITION.miscut_droppers
     more = {"dropper 4 of span 12": -0.001, "dropper 2 of span 12": 0.005, "support 13": 0.001}
     write_line(
         made_up(again, more | {"tension of the contact wire": 0.01}), written, tmp_path / "b.toml", "b.csv"

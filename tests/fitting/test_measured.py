@@ -34,7 +34,7 @@ def test_places_lie_in_the_stretch_a_fiftieth_of_a_second_apart():
 
 def test_coefficients_go_from_two_spans_to_18_hz():
     own = taken(piece())
-    frequency = own.kept * PER_SECOND / (2 * len(own.place))
+    frequency = own.compared * PER_SECOND / (2 * len(own.place))
     step = frequency[1] - frequency[0]
     assert SPEED / (2 * SPAN) <= frequency[0] < SPEED / (2 * SPAN) + step
     assert HIGHEST - step < frequency[-1] <= HIGHEST
@@ -48,13 +48,13 @@ def test_coefficients_of_white_noise_are_white_with_equal_variance():
     own = taken(piece())
     noise = np.random.default_rng(1).standard_normal((4000, len(own.place)))
     found = own.coefficients(noise)
-    np.testing.assert_allclose(np.cov(found, rowvar=False), np.eye(len(own.kept)), atol=0.12)
+    np.testing.assert_allclose(np.cov(found, rowvar=False), np.eye(len(own.compared)), atol=0.12)
 
 
 def test_back_inverts():
     own = taken(piece())
     random = np.random.default_rng(2)
-    coefficients = random.standard_normal(len(own.kept))
+    coefficients = random.standard_normal(len(own.compared))
     force = own.back(coefficients)
     np.testing.assert_allclose(own.coefficients(force), coefficients, atol=1e-12)
     assert own.std(coefficients) == pytest.approx(force.std(), rel=1e-12)  # its mean is 0

@@ -45,19 +45,19 @@ def exact(record, design, pantograph, coarse):
 
 @pytest.fixture(scope="module")
 def derivatives(exact):
-    """Derivatives of coefficients at the design, and what is left there."""
-    fitting = exact.fitting
+    """Jacobian of coefficients at the design, and the residual there."""
+    fitting = exact
     small = np.diag([1e-5 if value.kind == "tensions" else 1e-6 for value in fitting.values.all])
-    _, (block,), (left,) = fitting.derivatives(fitting.start(), small, "fine", lambda doing: None)
-    return block, left
+    _, jacobian, residual = fitting.derivatives(fitting.start(), small, "fine", lambda doing: None)
+    return jacobian, residual
 
 
 def test_where_things_are(ready, design):
-    plan = ready.fitting.values.design
+    plan = ready.values.design
     begins = 60.0 * np.arange(plan.spans)
     np.testing.assert_allclose(plan.layout.positions, (begins[:, None] + design.droppers.positions).ravel())
     np.testing.assert_allclose(plan.layout.supports[1:-1], begins[1:])
-    assert ready.first_span == 0
+    assert ready.values.design.first_span == 0
     assert ready.stretch[0] == 60.0 * (FIRST_SETTLED - 1)
     assert 60.0 * SPANS - 25 < ready.stretch[1] < 60.0 * SPANS - 20
     assert ready.shifts == (0.0,)
@@ -66,7 +66,7 @@ def test_where_things_are(ready, design):
 def test_the_true_line_gives_the_force_of_a_record_without_noise(ready, truth, design, pantograph):
     """Index by index: no value stands in another's place, or with another sign."""
     clean = record_of(line_condition=BUILT, seed=SEED, force_noise=0.0)
-    fitting = problem([clean], design, pantograph).fitting
+    fitting = problem([clean], design, pantograph)
     x = np.array([truth.of(value) for value in fitting.values.all])
     (part,) = fitting.parts
     away = part.measured.force() - force_of(fitting, x)
@@ -75,9 +75,9 @@ def test_the_true_line_gives_the_force_of_a_record_without_noise(ready, truth, d
 
 
 def test_too_few_coefficients_for_so_many_values_are_noted(ready, record, design, pantograph):
-    told = sum(len(part.measured.kept) for part in ready.fitting.parts)
-    assert told < 2 * len(ready.fitting.values)
-    assert f"{told} coefficients for {len(ready.fitting.values)} values" in ready.notes[-1]
+    told = sum(len(part.measured.compared) for part in ready.parts)
+    assert told < 2 * len(ready.values)
+    assert f"{told} coefficients for {len(ready.values)} values" in ready.notes[-1]
 
 
 def test_records_of_several_tension_lengths_are_noted(pantograph):
@@ -99,13 +99,13 @@ def test_derivatives_of_all_droppers_add_up(exact, derivatives):
 
     So nothing is lost where a pass goes on, in other lanes, from shortly before what differs.
     """
-    values, (part,) = exact.fitting.values, exact.fitting.parts
+    values, (part,) = exact.values, exact.parts
     which = values.of_kind("droppers")
     places = np.array([values.all[k].place for k in which])
     d = np.zeros(len(values))
     d[which] = np.sin(np.pi * (places - places[0]) / np.ptp(places))
     small = 1e-6 * d
-    change = force_of(exact.fitting, small) - force_of(exact.fitting, -small)
+    change = force_of(exact, small) - force_of(exact, -small)
     actual = part.measured.coefficients(change) / 2e-6
     summed = derivatives[0][:, : len(values)] @ d
     np.testing.assert_allclose(summed, actual, atol=0.05 * np.linalg.norm(actual) / np.sqrt(len(actual)))
@@ -119,10 +119,10 @@ def test_derivatives_of_all_droppers_add_up(exact, derivatives):
 @pytest.mark.slow
 def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
     """At the last unevenness, -1, a dropper is just about to slacken: there both sides differ by 6 %."""
-    values, (part,) = exact.fitting.values, exact.fitting.parts
+    values, (part,) = exact.values, exact.parts
     number = values.of_kind(kind)[which]
     x = size * np.eye(len(values))[number]
-    change = force_of(exact.fitting, x) - force_of(exact.fitting, -x)
+    change = force_of(exact, x) - force_of(exact, -x)
     actual = part.measured.coefficients(change) / (2 * size)
     assert np.linalg.norm(derivatives[0][:, number] - actual) < 0.02 * np.linalg.norm(actual)
 
@@ -131,10 +131,10 @@ def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
 @pytest.mark.slow
 def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     """What is left falls by the derivative times either, with the static force that follows the mean."""
-    fitting = ready.fitting
+    fitting = ready
     x = np.zeros((3, len(fitting.prior)))
     x[1:, which] = 0.2 * fitting.prior[which] * np.array([-1, 1])
-    _, low, high = (own[0] for own in fitting.tried(fitting.start(), list(x))[0])
+    _, low, high = fitting.residuals(fitting.start(), x)
     column = derivatives[0][:, which]
     change = (low - high) / (x[2] - x[1])[which]
     assert np.linalg.norm(column - change) < 0.2 * np.linalg.norm(column)  # the force bends
@@ -146,24 +146,22 @@ def test_a_position_error_is_found(record, ready, design, pantograph, by):
     """Roughly, before any step; steps find the rest (``test_fit``)."""
     found = problem([moved(record, by)], design, pantograph, free=("tensions",))
     assert found.shifts[0] == pytest.approx(-by, abs=0.3)
-    away = found.fitting.parts[0].measured
+    away = found.parts[0].measured
     seen = away.force(-by - found.shifts[0])
-    same = np.interp(
-        away.place, ready.fitting.parts[0].measured.place, ready.fitting.parts[0].measured.force()
-    )
+    same = np.interp(away.place, ready.parts[0].measured.place, ready.parts[0].measured.force())
     np.testing.assert_allclose(seen[5:-20], same[5:-20], atol=1.0)
 
 
 def test_a_record_from_far_along_the_line(record, ready, design, pantograph):
     """60 spans on, a record is held against a pass that begins before it, of spans named by their place."""
     far = problem([moved(record, 60 * 60.0)], design, pantograph, free=("droppers",))
-    assert far.first_span == 60 - LEAD
+    assert far.values.design.first_span == 60 - LEAD
     assert far.shifts == (0.0,)
-    own, same = far.fitting.parts[0].measured, ready.fitting.parts[0].measured
+    own, same = far.parts[0].measured, ready.parts[0].measured
     skipped = 60.0 * LEAD
     assert own.place[0] == pytest.approx(skipped + END, abs=0.5)
     np.testing.assert_allclose(own.piece.position - own.offset - skipped, same.piece.position)
-    names = [value.name for value in far.fitting.values.all]
+    names = [value.name for value in far.values.all]
     # Nine spans before what is compared, which begins 20 m behind the first support.
     assert names[0] == f"dropper 4 of span {60 - FIRST_SETTLED + 2}"
 
@@ -177,7 +175,7 @@ def test_a_measured_pass_has_settled_at_the_line_s_first_support(pantograph, des
         inside = (piece.position >= begin) & (piece.position < begin + 60 * SPANS)
         cut = replace(piece, position=piece.position[inside] - begin, force=piece.force[inside])
         found = problem([replace(whole, pieces=(cut,))], design, pantograph, free=("droppers",))
-        assert found.first_span == first_span
+        assert found.values.design.first_span == first_span
         assert found.before == 60.0 * first_span
         # What is compared has its places on the line.
         begins = 60.0 * (FIRST_SETTLED - 1) if spans == 0 else END
@@ -193,7 +191,7 @@ def test_an_end_of_a_record_is_not_compared_though_it_is_moved(pantograph, desig
     cut = replace(piece, position=piece.position[inside] - short_of, force=piece.force[inside])
     found = problem([replace(whole, pieces=(cut,))], design, pantograph, free=("tensions",))
     assert found.shifts[0] == pytest.approx(short_of, abs=0.5)
-    own = found.fitting.parts[0].measured
+    own = found.parts[0].measured
     position = own.piece.position - own.offset
     assert position[0] + END - 1e-6 <= own.place[0]
     assert own.place[-1] <= position[-1] - END + 1e-6
@@ -206,9 +204,9 @@ def test_what_was_found_before_is_moved_with_the_spans(record, design, pantograp
     )
     line = design.model_copy(update={"as_found": known})
     far = problem([moved(record, 60 * 60.0)], line, pantograph, free=("tensions",))
-    condition = far.fitting.values.design.condition
-    assert condition.broken_droppers == ((70 - far.first_span, 3),)
-    assert condition.raised_supports == ((65 - far.first_span, 0.004),)
+    condition = far.values.design.condition
+    assert condition.broken_droppers == ((70 - far.values.design.first_span, 3),)
+    assert condition.raised_supports == ((65 - far.values.design.first_span, 0.004),)
     assert condition.ice == 0.1
     assert condition.tension_scatter == TOLERANCES["tensions"]
 
@@ -222,7 +220,7 @@ def test_what_a_record_says_of_itself_and_a_filter_taken_for_granted_are_among_t
     coarse = replace(piece, position=np.round(piece.position, 1), force=behind)
     said = Record("May", (coarse,), ("Positions are the integral of the speed.",))
     found = problem([said], design, pantograph, free=("tensions",))
-    assert found.fitting.parts[0].measured.piece is coarse
+    assert found.parts[0].measured.piece is coarse
     note, filtered = found.of_records
     assert note == "May: Positions are the integral of the speed."
     assert filtered.startswith("May was low-passed before it was recorded, and is taken as behind EN 50317's")
@@ -250,7 +248,7 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     named = replace(record, name="b", pieces=(replace(short, run="May"),))
     both = problem([record, named], design, pantograph, free=("tensions",))
     assert both.of_records[0].startswith("b (run 'May') is left out: It has only")
-    assert len(both.of_records) == len(both.fitting.parts) == 1  # and nothing is said of the other one
+    assert len(both.of_records) == len(both.parts) == 1  # and nothing is said of the other one
 
 
 def test_a_record_of_another_line_is_called_strange_in_the_file_of_the_fit_too(record, pantograph):

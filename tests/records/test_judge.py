@@ -201,11 +201,11 @@ def test_the_way_of_several_runs_counts_once():
     fast, slow = steady(80.0, 1, run="a"), steady(10.0, 2, begin=30.0, run="b")
     beyond = steady(50.0, 1, begin=70.0, run="c")
     samples = Samples(Record("a", (fast, slow, beyond)))
-    assert samples.way(samples.run == 0) == pytest.approx(80)
-    assert samples.way(samples.run <= 1) == pytest.approx(80)
-    assert samples.way(samples.run >= 0) == pytest.approx(120)
-    assert samples.way(samples.run >= 1) == pytest.approx(70)
-    assert samples.way(samples.run > 2) == 0
+    assert samples.distance(samples.run == 0) == pytest.approx(80)
+    assert samples.distance(samples.run <= 1) == pytest.approx(80)
+    assert samples.distance(samples.run >= 0) == pytest.approx(120)
+    assert samples.distance(samples.run >= 1) == pytest.approx(70)
+    assert samples.distance(samples.run > 2) == 0
 
 
 def ended():
