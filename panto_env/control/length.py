@@ -15,8 +15,8 @@ from ..base.errors import InputError, beside
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.plant import Plant
+from ..plant.speed import ahead, largest_drift, largest_lag
 from ..plant.state import SAMPLE_ROWS
-from ..plant.train import ahead, largest_drift, largest_lag
 from .settings import RunSettings, speed_range
 
 COPIES = 2

@@ -12,8 +12,8 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.schema import PantographData, with_scatter
+from ..plant.speed import draw_drift
 from ..plant.state import SAMPLE_ROWS, Ending, Row
-from ..plant.train import draw_drift
 from ..plant.wind import draw_side_wind, draw_wind
 from .episode import Results
 from .memory import forget

@@ -29,7 +29,8 @@ from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
-from ..plant.train import MOST_COLLECTORS, Train, largest_drift
+from ..plant.speed import largest_drift
+from ..plant.train import MOST_COLLECTORS, Train
 from .entries import OBSERVATIONS
 from .reward import REWARDS, CostWeights, Reward
 

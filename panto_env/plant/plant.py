@@ -25,9 +25,10 @@ from .pantograph.schema import (
     rest_state,
 )
 from .pantograph.step import Part
+from .speed import DRIFT_ROWS, ahead, gain
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
-from .train import DRIFT_ROWS, Train, ahead, gain
+from .train import Train
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
 
 
