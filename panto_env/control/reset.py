@@ -12,7 +12,7 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.schema import PantographData, with_scatter
-from ..plant.speed import draw_drift
+from ..plant.speed import DRIFT_ROWS, draw_drift
 from ..plant.state import SAMPLE_ROWS, Ending, Row
 from ..plant.wind import draw_side_wind, draw_wind
 from .episode import Results
@@ -35,7 +35,7 @@ class Starts(NamedTuple):
     line: Sequence[DrawnLine]  # of each lane
     pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
-    drift: Array | None  # (lanes, DRIFT_ROWS): of the speeds; None where these are constant
+    drift: Array | None  # (lanes, drifting): of the speeds; None where these are constant
 
 
 def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
@@ -45,9 +45,12 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
     parts = len(plant.model.droppers), len(plant.model.supports)
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way, rms = np.full(len(lanes), low), np.zeros(len(lanes)), settings.drift
+    profile = settings.speed_profile
+    knots = np.zeros(0) if profile is None else profile.rows(plant.time_step)
     if not (low < high or lines_differ or scatter or run_in or rms):
         unused = np.random.default_rng(0)
-        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, None)
+        steady = np.tile(np.append(np.zeros(DRIFT_ROWS), knots), (len(lanes), 1)) if knots.size else None
+        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, steady)
     windy = any(condition.wind for condition in conditions)
     windy_across = any(condition.side_wind for condition in conditions)
     line, pantographs, drift = [], [], []
@@ -60,8 +63,9 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
             pantographs.append([with_scatter(designed, scatter, own) for designed in settings.riding])
         if run_in > 0:
             way[k] = plant.alignment.support(own.uniform(0, run_in))
-        if rms > 0:
-            drift.append(draw_drift(rms, plant.time_step, own))
+        if rms > 0 or knots.size:
+            waves = draw_drift(rms, plant.time_step, own) if rms > 0 else np.zeros(DRIFT_ROWS)
+            drift.append(np.append(waves, knots))
         if windy:  # drawn last: all else is as in still air
             line[k] = replace(line[k], wind=draw_wind(line[k].condition.weather, plant.time_step, own))
         if windy_across:

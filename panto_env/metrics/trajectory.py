@@ -211,8 +211,8 @@ class Trajectory:
 
     @property
     def drifts(self) -> bool:
-        """Whether the train's speed drifts."""
-        return bool(self.settings.get("speed_drift"))
+        """Whether the train's speed drifts, or follows a profile."""
+        return bool(self.settings.get("speed_drift") or self.settings.get("speed_profile"))
 
     @property
     def wind(self) -> float:
