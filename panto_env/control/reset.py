@@ -36,6 +36,7 @@ class Starts(NamedTuple):
     pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
     drift: Array | None  # (lanes, drifting): of the speeds; None where these are constant
+    faults: Array | None = None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
 
 
 def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
@@ -47,13 +48,16 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
     speed, way, rms = np.full(len(lanes), low), np.zeros(len(lanes)), settings.drift
     profile = settings.speed_profile
     knots = np.zeros(0) if profile is None else profile.rows(plant.time_step)
-    if not (low < high or lines_differ or scatter or run_in or rms):
+    faults = settings.faults
+    if not (low < high or lines_differ or scatter or run_in or rms or any(each.drawn for each in faults)):
         unused = np.random.default_rng(0)
         steady = np.tile(np.append(np.zeros(DRIFT_ROWS), knots), (len(lanes), 1)) if knots.size else None
-        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, steady)
+        same = np.array([each.draw(plant.time_step, unused) for each in faults])
+        own_faults = np.tile(same, (len(lanes), 1, 1)) if faults else None
+        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, steady, own_faults)
     windy = any(condition.wind for condition in conditions)
     windy_across = any(condition.side_wind for condition in conditions)
-    line, pantographs, drift = [], [], []
+    line, pantographs, drift, spoilt = [], [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
         if low < high:
@@ -71,7 +75,10 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
         if windy_across:
             side_wind = draw_side_wind(line[k].condition.across, plant.time_step, own)
             line[k] = replace(line[k], side_wind=side_wind)
-    return Starts(speed, line, pantographs, way, np.array(drift) if drift else None)
+        if faults:  # drawn last: all else is as without them
+            spoilt.append([each.draw(plant.time_step, own) for each in faults])
+    drifts, rows = np.array(drift) if drift else None, np.array(spoilt) if spoilt else None
+    return Starts(speed, line, pantographs, way, drifts, rows)
 
 
 def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
@@ -81,6 +88,8 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     drawn = _draw(task, lanes, of_lane)
     forces = task.static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantographs, forces, drawn.drift)
+    if drawn.faults is not None:
+        task.episode.faults.table[lanes] = drawn.faults
     run_in = np.round(drawn.way / (drawn.speed * length.control_interval))
     end = length.plant_steps(drawn.speed, run_in, drawn.drift)
     # A collector behind the first comes onto the line later: its episode begins there.

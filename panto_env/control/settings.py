@@ -31,7 +31,8 @@ from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
 from ..plant.speed import DRIFT_ROWS, KNOT_ROWS, SpeedProfile, largest_drift
 from ..plant.train import MOST_COLLECTORS, Train
-from .entries import OBSERVATIONS
+from .entries import ESTIMATED, OBSERVATIONS
+from .faults import FAULTS, Fault, faults_of
 from .reward import REWARDS, CostWeights, Reward
 
 R = TypeVar("R", bound="RunSettings")
@@ -231,6 +232,12 @@ class RunSettings(Numerics):
         description='sensors: "ideal", "realistic", "blind", one with values such as "ideal:force_noise=5", '
         "or a table",
     )
+    faults: Annotated[tuple[Fault, ...], BeforeValidator(faults_of)] = Field(
+        (),
+        description="faults of sensors and actuators: one or several of "
+        f"{', '.join(FAULTS)}, with values such as "
+        '"force-gain:value=0.8", or tables of part, kind, value, begin, lasts, every and probability',
+    )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
         validate_default=True,
@@ -384,6 +391,11 @@ class RunSettings(Numerics):
                 f"distances must give {count - 1} numbers, one for each of the pantographs behind the first, "
                 f"not {len(self.distances)}."
             )
+        if self.faults and self.observation == ESTIMATED:
+            raise InputError(
+                "The filter of the observation 'estimated' reads the sensors before their faults; leave out "
+                "faults, or take another observation."
+            )
         if self.controlled[-1] > count:
             raise InputError(
                 f"controlled names pantograph {self.controlled[-1]}, but the train has only {count}."
@@ -507,6 +519,7 @@ def as_designed(settings: RunSettings, speed: float) -> RunSettings:
         "pantograph_scatter": 0.0,
         "speed_drift": 0.0,
         "speed_profile": None,
+        "faults": (),
         "run_in": 0.0,
         "distance": None,
         "spans": None,
