@@ -221,11 +221,11 @@ class EpisodeLength:
 
     def _drifting_steps(self, stride: float, run_in: float, drift: Array, distance: float) -> int:
         """``plant_steps`` of one train with drift; stride: mean distance in a control step (m)."""
-        lag, slowest = largest_lag(self._drift), stride
-        farthest = min(self._plant.model.length, stride * run_in + lag + distance) + lag
+        lag, slowest, begin = largest_lag(self._drift), stride, stride * run_in
         if self._profile is not None:
-            farthest = self._plant.model.length + lag
             slowest = self._profile.range[0] * self.control_interval
+            begin += ahead(drift[None], np.array([[run_in * self.control_steps]]))[0, 0]
+        farthest = min(self._plant.model.length, begin + lag + distance) + lag
         steps = np.arange(math.ceil(farthest / slowest) + 1.0)
         position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # increasing
         needed = np.searchsorted(position, position[int(run_in)] + distance - 1e-9)

@@ -160,7 +160,7 @@ def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
     for k in range(episode.averages.shape[1]):
         now[NOW.READING + k] -= episode.averages[row, k]
     for place in range(episode.front.ahead.size):
-        now[NOW_ROWS + place] = force_in_front(episode, own, agent, row, place)
+        now[NOW_ROWS + place] = force_in_front(episode, run, own, agent, lane, row, place)
     now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))
     now[NOW.STRIDE] = stride(run, collector, lane, own[ROW.STEP])
     now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)
