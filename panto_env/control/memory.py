@@ -88,7 +88,7 @@ def force_in_front(episode, run, own, agent, lane, row, place):
     ago = since / stride
     if run.drift.shape[1] > DRIFT_ROWS:  # a profile: the time is that of the train's own way
         here = position(run, 0, lane, own[ROW.STEP])
-        for _ in range(3):
+        for _ in range(8):
             then = own[ROW.STEP] - ago * episode.control_steps
             ago += (since - (here - position(run, 0, lane, then))) / stride
             ago = min(max(ago, 0.0), kept.size - 2.0)

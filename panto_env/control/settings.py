@@ -216,9 +216,10 @@ class RunSettings(Numerics):
     )
     speed_profile: Annotated[SpeedProfile | None, _unless_none(_profile)] = Field(
         None,
-        description="speeds (km/h) that the train has one after the other, instead of speed_kmh: points over "
-        'the place along the line (m), such as "place:0=120,2000=200", in Python [(0, 120), (2000, 200)]; or '
-        'over time (s), such as "time:0=120,30=200"; in between the acceleration is constant',
+        description="speeds (km/h) that the train has one after the other, which take the place of "
+        'speed_kmh: points over the place along the line (m), such as "place:0=120,2000=200", in Python '
+        '[(0, 120), (2000, 200)]; or over time (s), such as "time:0=120,30=200"; in between the acceleration '
+        "is constant",
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
@@ -411,11 +412,7 @@ class RunSettings(Numerics):
     def _mean_of_profile(self) -> Self:
         """The speed of a run with a profile is its mean."""
         if self.speed_profile is not None:
-            mean = (to_kmh(self.speed_profile.mean),) * 2
-            default = type(self).model_fields["speed_kmh"].default
-            if self.speed_kmh not in (mean, speed_range(default)):
-                raise InputError("Give either speed_kmh or speed_profile, not both.")
-            object.__setattr__(self, "speed_kmh", mean)
+            object.__setattr__(self, "speed_kmh", (to_kmh(self.speed_profile.mean),) * 2)
         return self
 
     @property

@@ -122,7 +122,6 @@ def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled, spe
     """Between control steps on the straight line between readings; at rest before the first was there."""
     places, behind = (0.0, 12.5, 100.0), 100.0
     settings = {**TRAIN, "controlled": controlled, "front": places, "sensors": "ideal", **SHORT}
-    del settings["speed_kmh"]
     env = make(**settings | {"observation": "measured", "run_in": 0.0} | speed)
     seen, _ = env.reset(seed=1)
     rows = [seen]

@@ -142,6 +142,9 @@ def test_a_profile_that_no_train_follows_is_refused(given, said):
         simulate(speed_profile=given)
 
 
-def test_a_speed_and_a_profile_exclude_each_other():
-    with pytest.raises(InputError, match="either speed_kmh or speed_profile"):
-        run_settings({"speed_kmh": 250.0, "speed_profile": BRAKING})
+def test_a_profile_takes_the_place_of_a_speed_and_a_speed_in_options_that_of_the_profile():
+    profile = SpeedProfile(points=BRAKING)
+    assert run_settings({"speed_kmh": 250.0, "speed_profile": BRAKING}).speeds == profile.range
+    env = gymnasium.make("panto_env:Pantograph-v0", speed_profile=BRAKING, distance=300.0).unwrapped
+    assert env.reset(seed=0)[1]["speed_kmh"] == pytest.approx(3.6 * profile.mean)
+    assert env.reset(seed=0, options={"speed_kmh": 250.0})[1]["speed_kmh"] == pytest.approx(250.0)
