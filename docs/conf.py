@@ -4,8 +4,8 @@ import shutil
 import sys
 from pathlib import Path
 
+from panto_baselines.benchmark.run import read_result
 from panto_baselines.report.page import save
-from panto_baselines.report.result import read_result
 from panto_env import __version__
 
 HERE = Path(__file__).parent

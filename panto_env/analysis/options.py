@@ -31,20 +31,24 @@ def print_criteria(criteria: Sequence[Criterion], title: str) -> None:
         console.print(line, soft_wrap=True)
 
 
-RENAMED = {"speed_kmh": "speed", "spans": "line_spans"}
+RENAMED = {"speed_kmh": "speed", "spans": "line_spans", "faults": "fault"}
 """Options with another name: the unit is in the help, and --spans are the evaluated ones."""
 IN_MILLISECONDS = ("time_step",)
 """Options in milliseconds, of settings in seconds."""
-SEVERAL: dict[str, type] = {"pantograph": str, "distances": float, "controlled": int}
+OF_TRAINS: dict[str, type] = {"pantograph": str, "distances": float, "controlled": int}
 """Options that may be given several times, and the type of each value. A command without distances takes one
 pantograph."""
+SEVERAL = OF_TRAINS | {"faults": str}
+"""The same, and an option that any command takes several times."""
+TEXTS = {"speed_profile": str}
+"""Options whose value is read from a text."""
 SIMPLE = (bool, int, float, str)
 PANELS = ("Line", "Pantograph", "Run", "Output", "Control and learning")
 """Panels of the help, in its order."""
 LINE, PANTOGRAPH, RUN, OUTPUT, LEARNING = PANELS
 _SETTINGS = {
     LINE: "catenary line_condition spans",
-    PANTOGRAPH: "pantograph distances controlled mean_force pantograph_scatter actuator sensors",
+    PANTOGRAPH: "pantograph distances controlled mean_force pantograph_scatter actuator sensors faults",
     LEARNING: "control_interval washout observation harmonics history line_values normalise estimator "
     "known_pantograph reward cost settle",
 }
@@ -103,6 +107,7 @@ def with_settings(
                 for name, value in options.items()
                 if value is not None
             }
+            settings = {name: value for name, value in settings.items() if value != []}
             command(_riding(settings) if trains else settings, **given)
 
         hints = get_type_hints(command, include_extras=True)
@@ -139,13 +144,13 @@ def _riding(settings: dict[str, Any]) -> dict[str, Any]:
         settings["pantographs"] = named
     elif named:
         settings["pantograph"] = named[0]
-    return {name: value for name, value in settings.items() if not (name in SEVERAL and value == [])}
+    return settings
 
 
 def _type(name: str) -> type | None:
     """Type of an option: that of the default, or the setting's first simple type besides None."""
-    if name in SEVERAL:
-        return SEVERAL[name]
+    if name in SEVERAL or name in TEXTS:
+        return (SEVERAL | TEXTS)[name]
     field = fields()[name]
     if type(field.default) in SIMPLE:
         return type(field.default)
@@ -156,7 +161,8 @@ def _type(name: str) -> type | None:
 
 
 def _option(name: str, defaults: bool, trains: bool) -> inspect.Parameter:
-    field, kind, several = fields()[name], _type(name), trains and name in SEVERAL
+    field, kind = fields()[name], _type(name)
+    several = name in SEVERAL and (trains or name not in OF_TRAINS)
     text = field.description or ""
     if name in IN_MILLISECONDS:
         text = text.replace("(s)", "(ms)", 1)

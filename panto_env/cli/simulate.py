@@ -24,6 +24,8 @@ from ..analysis.options import (
 )
 from ..analysis.plots import plot_run, save
 from ..base.errors import InputError
+from ..base.table import Table as TextTable
+from ..metrics.by_span import SPEED_HEADINGS, by_speed
 from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
 from ..metrics.trajectory import OUTPUTS, Trajectory
@@ -37,6 +39,7 @@ from ..terminal import (
     into_file,
     number,
     print_json,
+    print_table,
     say,
     writable,
     written_last,
@@ -96,12 +99,14 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     train = trajectory.train
     covered = trajectory.common_spans(chosen)
     chosen = covered or chosen
+    profile = trajectory.identity.has_profile
     if json:
         results = [
             {
                 "figures": own.summary(chosen).as_dict(),
                 "compliance": [each.as_dict() for each in own.compliance(chosen)],
             }
+            | ({"by_speed": [each._asdict() for each in by_speed(own, chosen)]} if profile else {})
             for own in train
         ]
         others = [_own_facts(own) | result for own, result in zip(train[1:], results[1:], strict=True)]
@@ -113,7 +118,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
     every = [own.summary(chosen) for own in train]
     for key, label in LABELS.items():
         table.add_row(label.name, *(number(label.scale * getattr(own, key), 2) for own in every), label.unit)
-    title = f"{trajectory.pantographs} on {trajectory.catenary} at {trajectory.speed_kmh:g} km/h"
+    title = f"{trajectory.pantographs} on {trajectory.catenary} at {trajectory.speed_in_words}"
     console.print(f"{title}, policy {trajectory.policies}, spans {in_words(covered)}")
     for place, own in enumerate(train, start=1):
         if not math.isnan(own.target_mean):
@@ -124,6 +129,11 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
                 f"{own.target_mean:.1f} N{at}."
             )
     console.print(table)
+    if profile:
+        for own in train:
+            title = f"{own.pantograph} by the train's speed"
+            headings = tuple(SPEED_HEADINGS.values())
+            print_table(TextTable(title, headings, by_speed(own, chosen), text_columns=0))
     for place, own in enumerate(train, start=1):
         title = f"Requirements at {own.speed_kmh:g} km/h, {own.line.system}"
         title += f", pantograph {place}" if len(train) > 1 else ""

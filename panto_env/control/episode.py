@@ -16,6 +16,7 @@ from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
 from ..plant.state import HEAD_RANGE, LOSS_TIME, PerCollector, per_collector
 from .entries import AVERAGED, DEVIATIONS, line_values
+from .faults import FaultArrays, fault_arrays
 from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
@@ -55,6 +56,7 @@ class Episode(NamedTuple):
     control_steps: int  # plant steps in a control step
     front: FrontArrays
     memory: MemoryArrays
+    faults: FaultArrays  # of readings and commands
     mean_share: float  # weight of a control step in the running mean of the force
     washout_share: float  # weight of a control step in the washout's average; 0: there is no washout
     loss_limit: int  # plant steps without contact that end an episode
@@ -107,6 +109,7 @@ def new_episode(
             settings.runs.speeds,
             settings.control_interval,
         ),
+        faults=fault_arrays(settings.faults, lanes, rows),
         mean_share=_share(settings.control_interval, MEAN_TIME),
         washout_share=_share(settings.control_interval, settings.washout),
         loss_limit=round(LOSS_TIME / plant.time_step),

@@ -15,8 +15,8 @@ from ..base.errors import InputError, beside
 from ..plant.catenary import CATENARIES
 from ..plant.catenary.schema import MOST_SPANS
 from ..plant.plant import Plant
+from ..plant.speed import ahead, largest_drift, largest_lag
 from ..plant.state import SAMPLE_ROWS
-from ..plant.train import ahead, largest_drift, largest_lag
 from .settings import RunSettings, speed_range
 
 COPIES = 2
@@ -141,7 +141,7 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
         runs=settings.runs,
         bilateral=settings.bilateral,
         varied=settings.pantograph_scatter > 0,
-        drifting=settings.speed_drift > 0,
+        drifting=settings.drift_rows,
     )
     if lanes > FEW_LANES:
         few, there = make_plant(lanes=FEW_LANES), machine.memory()
@@ -159,7 +159,7 @@ class EpisodeLength:
 
     def __init__(self, settings: RunSettings, plant: Plant) -> None:
         """Raises InputError for a distance, control interval or speed that is not possible on the plant."""
-        self._drift, self._plant = settings.drift, plant
+        self._drift, self._profile, self._plant = settings.drift, settings.speed_profile, plant
         self.settling = plant.alignment.support(settings.settle)  # m
         given = settings.distance
         train = plant.train.length
@@ -187,7 +187,7 @@ class EpisodeLength:
                 f"of {1e3 * self.control_interval:g} ms, not {self.distance:g} m."
             )
         # In the slowest run, after the longest run-in.
-        slow = self.speed_range[0]
+        slow = settings.speeds[0]
         run_in = np.ceil(plant.alignment.support(settings.run_in) / (slow * self.control_interval))
         lag = largest_lag(self._drift)  # of a train by its drift (m)
         self._late = math.ceil(lag / (slow * self.control_interval)) * self.control_steps
@@ -197,7 +197,8 @@ class EpisodeLength:
         """Lowest and highest speed (m/s) of a number or a range (km/h); InputError if not valid here."""
         low, high = map(from_kmh, speed_range(speed_kmh))
         drift = largest_drift(self._drift)
-        for speed in (low - drift, high + drift):
+        least, most = (low, high) if self._profile is None else self._profile.range
+        for speed in (least - drift, most + drift):
             self._plant.check_speed(speed)
         return low, high
 
@@ -220,9 +221,12 @@ class EpisodeLength:
 
     def _drifting_steps(self, stride: float, run_in: float, drift: Array, distance: float) -> int:
         """``plant_steps`` of one train with drift; stride: mean distance in a control step (m)."""
-        lag = largest_lag(self._drift)
-        farthest = min(self._plant.model.length, stride * run_in + lag + distance) + lag
-        steps = np.arange(math.ceil(farthest / stride) + 1.0)
+        lag, slowest, begin = largest_lag(self._drift), stride, stride * run_in
+        if self._profile is not None:
+            slowest = self._profile.range[0] * self.control_interval
+            begin += ahead(drift[None], np.array([[run_in * self.control_steps]]))[0, 0]
+        farthest = min(self._plant.model.length, begin + lag + distance) + lag
+        steps = np.arange(math.ceil(farthest / slowest) + 1.0)
         position = stride * steps + ahead(drift[None], steps[None] * self.control_steps)[0]  # increasing
         needed = np.searchsorted(position, position[int(run_in)] + distance - 1e-9)
         possible = np.searchsorted(position, self._plant.model.length + 1e-9) - 1
@@ -231,4 +235,5 @@ class EpisodeLength:
     @property
     def most_control_steps(self) -> int:
         """Control steps of the longest possible episode, at the lowest speed."""
-        return (int(self.plant_steps(self.speed_range[0])) + self._late) // self.control_steps
+        slow = self.speed_range[0] if self._profile is None else self._profile.range[0]
+        return (int(self.plant_steps(slow)) + self._late) // self.control_steps

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..base.arrays import to_kmh
 from ..catalog.drawn_lines import DrawnLines
 from ..plant.catenary import CatenaryData
 from .settings import RunSettings, run_settings
@@ -58,6 +59,10 @@ def on_drawn_line(settings: R, random: Callable[[], np.random.Generator]) -> R:
         return settings
     own = line_generator(random())
     if isinstance(lines, DrawnLines):
+        profile = settings.speed_profile
+        if profile is not None:  # of a line that is for its highest speed
+            line, _ = lines.draw(own, (to_kmh(profile.range[1]),) * 2)
+            return settings.model_copy(update={"catenary": line})
         line, speed_kmh = lines.draw(own, settings.speed_kmh)
         return settings.model_copy(update={"catenary": line, "speed_kmh": speed_kmh})
     return settings.on_line(lines[own.integers(len(lines))])

@@ -20,8 +20,9 @@ from ..base.arrays import Array
 from ..base.errors import InputError
 from ..plant.alignment import Alignment
 from ..plant.sensors import READING, Reading
+from ..plant.speed import DRIFT_ROWS
 from ..plant.state import ROW, PerCollector, per_collector
-from ..plant.train import Train
+from ..plant.train import Train, position
 from .state import NOW, NOW_ROWS, TASK_ROW
 
 
@@ -79,11 +80,18 @@ def keep_front(episode, sensors, run, reading, agent, lane, row):
 
 
 @inlined
-def force_in_front(episode, own, agent, row, place):
+def force_in_front(episode, run, own, agent, lane, row, place):
     """Contact force (N) that the one in front measured at a place ahead: between the nearest two readings."""
     front, kept = episode.front, episode.front.kept[row]
     stride = own[ROW.STRIDE] * episode.control_steps
-    ago = max(front.behind[agent] - front.ahead[place], 0.0) / stride
+    since = max(front.behind[agent] - front.ahead[place], 0.0)  # distance since then
+    ago = since / stride
+    if run.drift.shape[1] > DRIFT_ROWS:  # a profile: the time is that of the train's own way
+        here = position(run, 0, lane, own[ROW.STEP])
+        for _ in range(8):
+            then = own[ROW.STEP] - ago * episode.control_steps
+            ago += (since - (here - position(run, 0, lane, then))) / stride
+            ago = min(max(ago, 0.0), kept.size - 2.0)
     time, times, whole = int(own[ROW.STEP]) // episode.control_steps, kept.size, int(ago)
     later = kept[(time - whole + times * times) % times]
     earlier = kept[(time - whole - 1 + times * times) % times]

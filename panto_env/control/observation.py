@@ -19,6 +19,7 @@ from ..plant.sensors import Reading, read_odometer
 from ..plant.state import ROW
 from ..plant.train import Train, place_on_line, stride
 from .entries import CENTRED, WRITERS, Entry, earlier, entries_of
+from .faults import take_noise_off
 from .memory import force_in_front, keep_and_recall
 from .state import NOW, NOW_ROWS, TASK_ROW
 
@@ -154,10 +155,12 @@ def prepare_entries(episode, sensors, run, own, now, agent, lane, row):
     collector = episode.controlled[agent]
     if sensors.noise.shape[2] > 0:
         add_noise(sensors, now[NOW.READING :], collector, lane)
+        if episode.faults.table.shape[1] > 0:
+            take_noise_off(episode.faults, own, now[NOW.READING :], lane, row)
     for k in range(episode.averages.shape[1]):
         now[NOW.READING + k] -= episode.averages[row, k]
     for place in range(episode.front.ahead.size):
-        now[NOW_ROWS + place] = force_in_front(episode, own, agent, row, place)
+        now[NOW_ROWS + place] = force_in_front(episode, run, own, agent, lane, row, place)
     now[NOW.SPANS] = in_spans(episode.alignment, place_on_line(run, collector, lane, own[ROW.STEP]))
     now[NOW.STRIDE] = stride(run, collector, lane, own[ROW.STEP])
     now[NOW.SPEED] = now[NOW.STRIDE] * (1.0 / episode.time_step)

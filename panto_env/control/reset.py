@@ -12,8 +12,8 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..plant.line_condition import DrawnLine, draw
 from ..plant.pantograph.schema import PantographData, with_scatter
+from ..plant.speed import DRIFT_ROWS, draw_drift
 from ..plant.state import SAMPLE_ROWS, Ending, Row
-from ..plant.train import draw_drift
 from ..plant.wind import draw_side_wind, draw_wind
 from .episode import Results
 from .memory import forget
@@ -35,7 +35,8 @@ class Starts(NamedTuple):
     line: Sequence[DrawnLine]  # of each lane
     pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
-    drift: Array | None  # (lanes, DRIFT_ROWS): of the speeds; None where these are constant
+    drift: Array | None  # (lanes, drifting): of the speeds; None where these are constant
+    faults: Array | None = None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
 
 
 def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
@@ -45,12 +46,18 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
     parts = len(plant.model.droppers), len(plant.model.supports)
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way, rms = np.full(len(lanes), low), np.zeros(len(lanes)), settings.drift
-    if not (low < high or lines_differ or scatter or run_in or rms):
+    profile = settings.speed_profile
+    knots = np.zeros(0) if profile is None else profile.rows(plant.time_step)
+    faults = settings.faults
+    if not (low < high or lines_differ or scatter or run_in or rms or any(each.drawn for each in faults)):
         unused = np.random.default_rng(0)
-        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, None)
+        steady = np.tile(np.append(np.zeros(DRIFT_ROWS), knots), (len(lanes), 1)) if knots.size else None
+        same = np.array([each.draw(plant.time_step, unused) for each in faults])
+        own_faults = np.tile(same, (len(lanes), 1, 1)) if faults else None
+        return Starts(speed, [draw(conditions, unused, *parts)] * len(lanes), [], way, steady, own_faults)
     windy = any(condition.wind for condition in conditions)
     windy_across = any(condition.side_wind for condition in conditions)
-    line, pantographs, drift = [], [], []
+    line, pantographs, drift, spoilt = [], [], [], []
     for k, lane in enumerate(lanes.tolist()):
         own = random(lane)
         if low < high:
@@ -60,14 +67,18 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
             pantographs.append([with_scatter(designed, scatter, own) for designed in settings.riding])
         if run_in > 0:
             way[k] = plant.alignment.support(own.uniform(0, run_in))
-        if rms > 0:
-            drift.append(draw_drift(rms, plant.time_step, own))
+        if rms > 0 or knots.size:
+            waves = draw_drift(rms, plant.time_step, own) if rms > 0 else np.zeros(DRIFT_ROWS)
+            drift.append(np.append(waves, knots))
         if windy:  # drawn last: all else is as in still air
             line[k] = replace(line[k], wind=draw_wind(line[k].condition.weather, plant.time_step, own))
         if windy_across:
             side_wind = draw_side_wind(line[k].condition.across, plant.time_step, own)
             line[k] = replace(line[k], side_wind=side_wind)
-    return Starts(speed, line, pantographs, way, np.array(drift) if drift else None)
+        if faults:  # drawn last: all else is as without them
+            spoilt.append([each.draw(plant.time_step, own) for each in faults])
+    drifts, rows = np.array(drift) if drift else None, np.array(spoilt) if spoilt else None
+    return Starts(speed, line, pantographs, way, drifts, rows)
 
 
 def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> None:
@@ -77,6 +88,8 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     drawn = _draw(task, lanes, of_lane)
     forces = task.static_forces(drawn.speed)
     plant.start(lanes, drawn.speed, drawn.line, drawn.pantographs, forces, drawn.drift)
+    if drawn.faults is not None:
+        task.episode.faults.table[lanes] = drawn.faults
     run_in = np.round(drawn.way / (drawn.speed * length.control_interval))
     end = length.plant_steps(drawn.speed, run_in, drawn.drift)
     # A collector behind the first comes onto the line later: its episode begins there.

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 
 from ..base.arrays import from_kmh, to_kmh
 from ..base.errors import InputError, shown, suggest
-from ..base.settings import Between, parse, plain, sentence
+from ..base.settings import Between, parse, parse_inline, plain, sentence
 from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
 from ..estimation.model import ESTIMATORS, EstimatorSettings
@@ -29,8 +29,10 @@ from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
 from ..plant.numerics import Numerics, Runs
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import SensorSettings, sensor_settings
-from ..plant.train import MOST_COLLECTORS, Train, largest_drift
-from .entries import OBSERVATIONS
+from ..plant.speed import DRIFT_ROWS, KNOT_ROWS, SpeedProfile, largest_drift
+from ..plant.train import MOST_COLLECTORS, Train
+from .entries import ESTIMATED, OBSERVATIONS
+from .faults import FAULTS, Fault, faults_of
 from .reward import REWARDS, CostWeights, Reward
 
 R = TypeVar("R", bound="RunSettings")
@@ -127,6 +129,21 @@ def _distance(value: Any) -> float:
     return value
 
 
+def _profile(value: Any) -> SpeedProfile:
+    """Of a list of points over place, a table, or a text such as "time:0=120,30=200"."""
+    if isinstance(value, str):
+        over, _, points = value.partition(":")
+        try:
+            value = {"over": over, "points": [(float(at), own) for at, own in parse_inline(points).items()]}
+        except ValueError as error:
+            raise InputError(
+                f"speed_profile must read such as 'place:0=120,2000=200', not {shown(value)}."
+            ) from error
+    return parse(
+        SpeedProfile, {"points": value} if isinstance(value, list | tuple) else value, "speed_profile"
+    )
+
+
 def _mean_force(value: Any) -> float | str | tuple[float, ...]:
     if isinstance(value, list | tuple) and len(value):
         return tuple(_force(each) for each in value)
@@ -197,6 +214,13 @@ class RunSettings(Numerics):
         description="rms of a slow drift of the speed about its mean, with periods of 7 to 29 s, drawn per "
         "run (km/h); the aerodynamic force and a required mean force that depends on the speed follow it",
     )
+    speed_profile: Annotated[SpeedProfile | None, _unless_none(_profile)] = Field(
+        None,
+        description="speeds (km/h) that the train has one after the other, which take the place of "
+        'speed_kmh: points over the place along the line (m), such as "place:0=120,2000=200", in Python '
+        '[(0, 120), (2000, 200)]; or over time (s), such as "time:0=120,30=200"; in between the acceleration '
+        "is constant",
+    )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
@@ -208,6 +232,12 @@ class RunSettings(Numerics):
         validate_default=True,
         description='sensors: "ideal", "realistic", "blind", one with values such as "ideal:force_noise=5", '
         "or a table",
+    )
+    faults: Annotated[tuple[Fault, ...], BeforeValidator(faults_of)] = Field(
+        (),
+        description="faults of sensors and actuators: one or several of "
+        f"{', '.join(FAULTS)}, with values such as "
+        '"force-gain:value=0.8", or tables of part, kind, value, begin, lasts, every and probability',
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
@@ -362,6 +392,11 @@ class RunSettings(Numerics):
                 f"distances must give {count - 1} numbers, one for each of the pantographs behind the first, "
                 f"not {len(self.distances)}."
             )
+        if self.faults and self.observation == ESTIMATED:
+            raise InputError(
+                "The filter of the observation 'estimated' reads the sensors before their faults; leave out "
+                "faults, or take another observation."
+            )
         if self.controlled[-1] > count:
             raise InputError(
                 f"controlled names pantograph {self.controlled[-1]}, but the train has only {count}."
@@ -371,6 +406,13 @@ class RunSettings(Numerics):
                 f"mean_force must be one number, or one for each of the {count} pantographs, not "
                 f"{len(self.mean_force)}."
             )
+        return self
+
+    @model_validator(mode="after")
+    def _mean_of_profile(self) -> Self:
+        """The speed of a run with a profile is its mean."""
+        if self.speed_profile is not None:
+            object.__setattr__(self, "speed_kmh", (to_kmh(self.speed_profile.mean),) * 2)
         return self
 
     @property
@@ -416,7 +458,9 @@ class RunSettings(Numerics):
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """Lowest and highest mean speed of the train (m/s)."""
+        """Lowest and highest mean speed of the train, or those of its profile (m/s)."""
+        if self.speed_profile is not None:
+            return self.speed_profile.range
         low, high = self.speed_kmh
         return from_kmh(low), from_kmh(high)
 
@@ -424,6 +468,13 @@ class RunSettings(Numerics):
     def drift(self) -> float:
         """Rms of the drift of the speed about its mean (m/s)."""
         return from_kmh(self.speed_drift)
+
+    @property
+    def drift_rows(self) -> int:
+        """Number of entries of a lane's drift: 0 where the speed is constant."""
+        if self.speed_profile is not None:
+            return DRIFT_ROWS + KNOT_ROWS * len(self.speed_profile.points)
+        return DRIFT_ROWS if self.speed_drift else 0
 
     @property
     def runs(self) -> Runs:
@@ -464,6 +515,8 @@ def as_designed(settings: RunSettings, speed: float) -> RunSettings:
         "line_condition": (LineCondition(),),
         "pantograph_scatter": 0.0,
         "speed_drift": 0.0,
+        "speed_profile": None,
+        "faults": (),
         "run_in": 0.0,
         "distance": None,
         "spans": None,

@@ -17,6 +17,7 @@ from ..plant.sensors import take_first_readings, take_readings
 from ..plant.state import ENDING, LARGEST_HEIGHT, PLACE, ROW, Row
 from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, place_on_line, position
+from .faults import spoil_command, spoil_readings
 from .memory import keep_front
 from .observation import (
     begin_averages,
@@ -162,7 +163,7 @@ def add_control_step_to_figures(task, now):
 
 
 @inlined
-def take_action(episode, own, task, now, row):
+def take_action(episode, own, task, now, lane, row):
     """Clip an action, and set the requested forces and the reward's terms for the action.
 
     With a washout the slow average of the actuator's force is subtracted first, so that the action can't move
@@ -185,6 +186,8 @@ def take_action(episode, own, task, now, row):
         now[NOW.RATE] += change * change
         task[TASK_ROW.ACTION + a] = action
         own[ROW.COMMAND + acted] = action * episode.force_limit
+    if episode.faults.table.shape[1] > 0:
+        spoil_command(episode.faults, own, lane, row)
 
 
 @inlined
@@ -287,9 +290,8 @@ def control_lane(packed, entries, values, flags, lane):
     agents, ended = len(episode.controlled), False
     for a in range(agents):
         row = lane * agents + a
-        take_action(
-            episode, run.table[episode.controlled[a], lane], episode.table[row], episode.now[row], row
-        )
+        own, task, now = run.table[episode.controlled[a], lane], episode.table[row], episode.now[row]
+        take_action(episode, own, task, now, lane, row)
     for _ in range(episode.steps[lane]):
         if run.table[0, lane, ROW.STEP] >= episode.table[lane * agents, TASK_ROW.END]:
             break  # beyond the end there are neither line nor rows of samples
@@ -302,6 +304,8 @@ def control_lane(packed, entries, values, flags, lane):
         for a in range(agents):
             row = lane * agents + a
             own, task, now = run.table[episode.controlled[a], lane], episode.table[row], episode.now[row]
+            if episode.faults.table.shape[1] > 0:
+                spoil_readings(episode.faults, own, now[NOW.READING :], lane, row)
             go_on_with_averages(episode, now, row)
             compute_reward(episode, own, task, now, values[row])
             compute_cost(episode, now, values[row])
@@ -365,6 +369,8 @@ def observe_start(packed, entries, values, flags, first, last):
                 c, row = episode.controlled[a], lane * agents + a
                 own, task, now = run.table[c, lane], episode.table[row], episode.now[row]
                 take_first_readings(sensors, c, own, now[NOW.READING :], lane)
+                if episode.faults.table.shape[1] > 0:
+                    spoil_readings(episode.faults, own, now[NOW.READING :], lane, row)
                 begin_averages(episode, now, row)
                 prepare_entries(episode, sensors, run, own, now, a, lane, row)
                 begin_history(episode, task, now)

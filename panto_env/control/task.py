@@ -70,8 +70,11 @@ class Task:
         """
         if not (isinstance(lanes, int) and lanes >= 1):
             raise InputError(f"The number of lanes must be a whole number from 1 up, not {shown(lanes)}.")
-        if settings.speed_drift and settings.line.kind == "rig":
-            raise InputError("A rig runs its line at one speed; leave out speed_drift, or use another line.")
+        if settings.drift_rows and settings.line.kind == "rig":
+            raise InputError(
+                "A rig runs its line at one speed; leave out speed_drift and speed_profile, or "
+                "use another line."
+            )
         self.settings, self.actuator, self.trim = settings, settings.actuator, trim
         plant = new_plant(settings, lanes)
         warn_of_spring(settings)

@@ -175,7 +175,8 @@ class Episodes:
         check_names(options, "option")
         if not options:
             return self
-        settings = read_settings(dict(self.settings) | dict(options), type(self.settings))
+        given = dict(self.settings) | ({"speed_profile": None} if "speed_kmh" in options else {})
+        settings = read_settings(given | dict(options), type(self.settings))
         others = Episodes(settings, **self._of_task)
         if others._spaces != self._spaces:
             raise InputError(

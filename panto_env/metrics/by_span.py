@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, to_kmh
 from .figures import SpanChoice, contact_loss, statistics
 from .low_pass import low_pass
 
@@ -75,6 +75,41 @@ def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
             )
         )
     return found
+
+
+SPEED_HEADINGS = {"low": "from (km/h)", "high": "to (km/h)", "distance": "distance (m)", **OF_FORCE}
+
+
+class SpeedFigures(NamedTuple):
+    """Figures of all places with speeds of one class; forces are behind EN 50317's filter, but for losses."""
+
+    low: float  # km/h
+    high: float  # km/h
+    distance: float  # m
+    mean: float  # N
+    std: float  # N
+    max: float  # N
+    min: float  # N
+    contact_loss: float  # share of the time (%)
+
+
+def by_speed(run: Trajectory, spans: SpanChoice = None, width: float = 20.0) -> list[SpeedFigures]:
+    """Figures of the evaluated spans by classes of the speed, each ``width`` wide (km/h), the slowest first.
+
+    Raises InputError as ``Trajectory.summary`` does.
+    """
+    inside, number = run.inside(spans), np.floor(to_kmh(run.speeds) / width + 1e-9)
+    filtered = low_pass(run.contact_force, run.time_step)
+    classes = [(each, inside & (number == each)) for each in np.unique(number[inside]).tolist()]
+    return [
+        SpeedFigures(
+            low=width * each,
+            high=width * (each + 1),
+            distance=float(run.speeds[here].sum() * run.time_step),
+            **_of_force(filtered[here], run.contact_force[here]),
+        )
+        for each, here in classes
+    ]
 
 
 BEHIND = 200.0

@@ -22,7 +22,8 @@ class Identity:
 
     version: str
     controlled: tuple[int, ...]  # numbers of the controlled pantographs, 1 for the first
-    drifts: bool  # whether the train's speed drifts
+    drifts: bool  # whether the train's speed drifts, or follows a profile
+    has_profile: bool  # whether it follows a profile
     conditions: tuple[Mapping[str, Any], ...]  # of the line, of which one was drawn; plain data
     spacing: float | None  # of the grid (m); None for lines without one
     window: int | None  # travelling spans, 0 for the whole line; None for lines without a grid
@@ -33,7 +34,8 @@ class Identity:
         return cls(
             version=settings.get("version", "unknown"),
             controlled=tuple(settings.get("controlled", (1,))),
-            drifts=bool(settings.get("speed_drift")),
+            drifts=bool(settings.get("speed_drift") or settings.get("speed_profile")),
+            has_profile=bool(settings.get("speed_profile")),
             conditions=tuple(settings.get("line_condition") or ()),
             spacing=settings.get("spacing"),
             window=settings.get("window"),

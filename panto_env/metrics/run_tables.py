@@ -15,8 +15,9 @@ from ..plant.catenary.flexible.static import HEADINGS as AT_REST
 from ..plant.catenary.flexible.static import as_rows, droppers_at_rest
 from .by_span import DROPPER_HEADINGS as MOVING
 from .by_span import SPAN_HEADINGS as BY_SPAN
+from .by_span import SPEED_HEADINGS as BY_SPEED
 from .by_span import STRETCH_HEADINGS as BY_STRETCH
-from .by_span import by_span, by_stretch, moving_droppers
+from .by_span import by_span, by_speed, by_stretch, moving_droppers
 from .compliance import Criterion
 from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
@@ -134,6 +135,16 @@ def of_stretches(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     return Sheet.of_rows("overlaps", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_STRETCH})
 
 
+def of_speeds(run: Trajectory, spans: SpanChoice = None) -> Sheet:
+    """Figures by classes of the speed. Raises InputError as ``Trajectory.summary`` does."""
+    rows = [
+        of_run | each._asdict()
+        for own, covered, of_run in _each([run], spans)
+        for each in by_speed(own, covered)
+    ]
+    return Sheet.of_rows("by speed", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_SPEED})
+
+
 def facts(run: Trajectory, without: str = "") -> Sheet:
     """What a run is: line, pantograph, settings, and where it ended, as text.
 
@@ -161,6 +172,8 @@ def save_tables(run: Trajectory, path: str | Path, spans: SpanChoice = None) -> 
     sheets, without = [], ""
     try:
         sheets = [figures([run], spans)]
+        if run.identity.has_profile:
+            sheets.append(of_speeds(run, spans))
         if run.spans_differ:
             sheets.append(of_spans(run, spans))
             if by_stretch(run, spans):

@@ -196,6 +196,13 @@ class Trajectory:
         return to_kmh(self.speed)
 
     @property
+    def speed_in_words(self) -> str:
+        """Speed of the train, or lowest and highest of a profile, as "200 to 260 km/h"."""
+        if not self.identity.has_profile:
+            return f"{self.speed_kmh:g} km/h"
+        return f"{to_kmh(self.speeds.min()):.4g} to {to_kmh(self.speeds.max()):.4g} km/h"
+
+    @property
     def speeds(self) -> Array:
         """Speed of the train at each sample, (n,) (m/s)."""
         if not self.identity.drifts or len(self.time) < FEWEST:

@@ -25,9 +25,10 @@ from .pantograph.schema import (
     rest_state,
 )
 from .pantograph.step import Part
+from .speed import ahead, gain
 from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
-from .train import DRIFT_ROWS, Train, ahead, gain
+from .train import Train
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
 
 
@@ -45,15 +46,15 @@ class Plant:
         runs: Runs = RUNS,
         bilateral: bool = False,
         varied: bool = False,
-        drifting: bool = False,
+        drifting: int = 0,
     ) -> None:
         """Build the line and the tables of all lanes; each lane must be started before it advances.
 
         runs: the speeds and line conditions for which the plant is built. bilateral: let the contact pull, as
-        paper 3's equations do. varied: each lane may have a pantograph with other values. drifting: each
-        lane's speed may drift. Raises InputError where grid and step are not usable, or a defect is given at
-        a dropper, support or place that the line does not have; and for several collectors on a line along
-        which no waves run from one to the other.
+        paper 3's equations do. varied: each lane may have a pantograph with other values. drifting: number
+        of entries of each lane's drift, 0 where the speed is constant. Raises InputError where grid and step
+        are not usable, or a defect is given at a dropper, support or place that the line does not have; and
+        for several collectors on a line along which no waves run from one to the other.
         """
         check_collectors(catenary, len(train.collectors))
         self.catenary, self.train, self.lanes = catenary, train, lanes
@@ -99,7 +100,7 @@ class Plant:
                 count,
             ),
             waves=aligned_zeros((lanes, 3 * waves)),
-            drift=aligned_zeros((lanes, DRIFT_ROWS if drifting else 0)),
+            drift=aligned_zeros((lanes, drifting)),
             wind=aligned_zeros((lanes, GUST_ROWS if winds else 0)),
             alignment=self.alignment.arrays,
             levels=np.array(catenary.contact_heights),
@@ -171,7 +172,7 @@ class Plant:
         to go. lanes: a number or (n,). speeds: of the trains (m/s), a number or (n,), below the wave speed of
         the wire. drawn: the lanes' lines, from ``line_condition.draw``; by default as the first condition
         gives them. pantographs: of the collectors, for each lane, where they are varied. static_forces:
-        instead of the pantographs', (collectors, n) (N). drift: of their speeds, (n, DRIFT_ROWS), by default
+        instead of the pantographs', (collectors, n) (N). drift: of their speeds, (n, drifting), by default
         none. Raises InputError for a bad speed, and for springs of a pantograph that give way.
         """
         lanes, run = np.atleast_1d(lanes), self.run

@@ -127,7 +127,7 @@ class Run(NamedTuple):
     driven: PerCollector  # 1 for each collector with an actuator, 0 without
     aerodynamic: PerCollector  # uplift of each collector per squared distance covered in a step (N/m^2)
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
-    drift: Array  # (lanes, DRIFT_ROWS): of the speed; no rows where it is constant
+    drift: Array  # (lanes, drifting): of the speed; no rows where it is constant
     wind: Array  # (lanes, GUST_ROWS): mean and gusts; no rows where none blows
     alignment: AlignmentArrays
     levels: Array  # (supports,): the contact wire's own height at each (m); none where it is level

@@ -284,7 +284,7 @@ def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
         (["q"], "Unknown policy 'q'"),
         (["p", "--catenary", "nowhere"], "Unknown catenary"),
         (["p", "--actuator", "strong"], "key 'actuator'"),
-        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .csv, .xlsx, .parquet"),
+        (["p", "--output", "out.txt"], "out.txt must end in one of .json, .json.gz, .csv, .xlsx, .parquet"),
         (["p", "--html", "out.txt"], "out.txt must end in .html"),
         (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
     ],

@@ -233,9 +233,10 @@ def test_a_trim_by_speed_is_near_that_of_each_speed():
 
 def made_up(**changes):
     """A run whose speed drifts, by how much a required mean force is then higher."""
-    run = {"speed": 55.0, "drifts": True, "speeds": np.array([50.0, 60.0, 70.0, 80.0])}
+    run = {"speed": 55.0, "speeds": np.array([50.0, 60.0, 70.0, 80.0])}
     inside = np.array([False, True, True, False])
-    return SimpleNamespace(inside=lambda spans: inside, **run | changes)
+    identity = SimpleNamespace(**{"drifts": True} | changes)
+    return SimpleNamespace(inside=lambda spans: inside, identity=identity, **run)
 
 
 def test_it_is_the_mean_over_the_spans_of_what_each_speed_requires():

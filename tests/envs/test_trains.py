@@ -110,12 +110,19 @@ def test_agents_see_and_earn_what_the_environment_of_the_train_does():
         view.step({})
 
 
-@pytest.mark.parametrize("controlled", [2, [1, 2]])
-def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled):
+@pytest.mark.parametrize(
+    ("controlled", "speed"),
+    [
+        (2, {"speed_kmh": 300.0}),
+        ([1, 2], {"speed_kmh": 300.0}),
+        (2, {"speed_profile": [(0, 220), (60, 220), (260, 190)]}),
+    ],
+)
+def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled, speed):
     """Between control steps on the straight line between readings; at rest before the first was there."""
     places, behind = (0.0, 12.5, 100.0), 100.0
     settings = {**TRAIN, "controlled": controlled, "front": places, "sensors": "ideal", **SHORT}
-    env = make(**settings | {"observation": "measured", "run_in": 0.0, "speed_kmh": 300.0})
+    env = make(**settings | {"observation": "measured", "run_in": 0.0} | speed)
     seen, _ = env.reset(seed=1)
     rows = [seen]
     ended = False
@@ -132,8 +139,9 @@ def test_the_second_sees_what_the_first_measured_at_places_ahead(controlled):
     read = np.append(at_rest, first.contact_force[every - 1 :: every])
     last = len(first.contact_force) // every
     times = np.arange(last + 1)
-    ago = (behind - np.array(places)) / (300 / 3.6 * 0.01)
-    expected = np.interp((times[-len(rows) :, None] - ago).ravel(), times, read).reshape(len(rows), -1)
+    way = task.plant.position(0, times * every)
+    then = np.interp(way[-len(rows) :, None] + np.array(places) - behind, way, times)
+    expected = np.interp(then.ravel(), times, read).reshape(len(rows), -1)
     assert expected.std() > 20
     np.testing.assert_allclose(observed, expected, atol=2e-2)
 

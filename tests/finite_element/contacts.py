@@ -81,6 +81,13 @@ class Contacts:
         self.active = np.zeros(droppers + contacts, bool)
         self.active[droppers] = True
 
+    def set_speed(self, speed: float) -> None:
+        """Go on at a speed (m/s), and under the lift at it."""
+        if speed != self.speed:
+            self.speed = speed
+            for own, chain in zip(self.collectors, self.chains, strict=True):
+                chain.load[-1] = own.pantograph.nominal_force(speed)
+
     def touches(self, x: float) -> list[Touch]:
         """Collectors and the wires over them, with the first collector at ``x`` (m).
 

@@ -12,6 +12,7 @@ from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from .contacts import Collector, Contacts
 from .hermite import Array
 from .newmark import Newmark
+from .simulation import Motion
 from .system import build
 
 
@@ -31,10 +32,12 @@ def balance(
     speed_kmh: float,
     distance: float,
     step: float = 5e-4,
+    motion: Motion | None = None,
 ) -> Balance:
     """A run of ``distance`` (m) on a line without damping, under heads with some; all lose none elsewhere.
 
     Lift and train (F v y') give what is in wires, droppers (also slack), masses, contacts and dampers.
+    motion: of a train whose speed changes, instead of ``speed_kmh``.
     """
     values = line.model_dump(exclude_none=True)
     values["damping"] = {"alpha": 0.0, "beta": 0.0}
@@ -45,6 +48,8 @@ def balance(
         for own in collectors
     ]
     speed = speed_kmh / 3.6
+    motion = motion or Motion(np.array([0.0]), np.array([speed]))
+    _, places, speeds = motion.until(distance, step)
     system = build(line, line.spans, 1.0)
     assert abs(system.damping).max() == 0
     wires = Newmark(system.mass, system.damping, system.stiffness, step)
@@ -73,9 +78,10 @@ def balance(
     first, before = stored_and_given(0.0, forces)
     given = error = turnover = 0.0
     slack, all_forces = 0, [forces]
-    for n in range(1, int(distance / (speed * step))):
-        forces, *_, tension = solver.advance(speed * step * n)
-        energy, now = stored_and_given(speed * step * n, forces)
+    for x, speed in zip(places[1:].tolist(), speeds[1:].tolist(), strict=True):
+        solver.set_speed(speed)
+        forces, *_, tension = solver.advance(x)
+        energy, now = stored_and_given(x, forces)
         given += step * (before + now) / 2
         turnover += step * abs(before + now) / 2
         error = max(error, abs(energy - first - given))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import PantographData
@@ -25,6 +26,7 @@ from .system import LineSystem, build
 __all__ = [
     "Collector",
     "Figures",
+    "Motion",
     "Result",
     "StaticShape",
     "figures",
@@ -32,6 +34,23 @@ __all__ = [
     "static_shape",
     "stretch",
 ]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A train whose speed changes evenly from one time to the next, and stays after the last."""
+
+    times: Array  # shape (n,) (s), from 0
+    speeds: Array  # shape (n,) (m/s)
+
+    def until(self, distance: float, step: float) -> tuple[Array, Array, Array]:
+        """Times (s), places (m) and speeds (m/s), in steps of ``step`` (s), up to a distance (m)."""
+        time = step * np.arange(int((distance / self.speeds.min() + self.times[-1]) / step) + 2)
+        both = np.union1d(time, self.times)
+        way = cumulative_trapezoid(np.interp(both, self.times, self.speeds), both, initial=0.0)
+        places = np.interp(time, both, way)
+        there = places <= distance + 1e-9
+        return time[there], places[there], np.interp(time[there], self.times, self.speeds)
 
 
 @dataclass(frozen=True)
@@ -62,15 +81,19 @@ def simulate(
     element: float = 1.0,
     time_step: float = 1e-3,
     distance: float | None = None,
+    motion: Motion | None = None,
 ) -> Result:
     """Run a pantograph from the wire's end at x = 0, all at rest there, at a speed in km/h.
 
     ``spans`` and ``distance`` (m) are the line's own and the whole line unless given; ``element``
     (m) bounds the elements, ``time_step`` is in s. The spring to the ground is unloaded with the lowest
-    mass at nominal contact wire height 0, whatever the height of the first support.
+    mass at nominal contact wire height 0, whatever the height of the first support. ``motion`` gives
+    speeds that change, and ``speed_kmh`` is then that at the start.
     """
     system = build(line, line.spans if spans is None else spans, element)
-    return ride(system, pantograph, speed_kmh, time_step, distance)
+    collectors = [Collector(pantograph)]
+    (result,) = ride_together(system, collectors, speed_kmh, time_step, distance, motion=motion)
+    return result
 
 
 def ride(
@@ -93,6 +116,7 @@ def ride_together(
     time_step: float,
     distance: float | None = None,
     wind: SideWind | None = None,
+    motion: Motion | None = None,
 ) -> list[Result]:
     """A run of several collectors, one result each; ``distance`` (m) is the first one's.
 
@@ -100,12 +124,16 @@ def ride_together(
     """
     speed, whole = speed_kmh / 3.6, float(system.nodes[-1])
     steps = int(min(distance or whole, whole) / (speed * time_step) + 1e-9)
+    time = time_step * np.arange(steps + 1)
+    places, speeds = speed * time, np.full(steps + 1, speed)
+    if motion is not None:
+        time, places, speeds = motion.until(min(distance or whole, whole), time_step)
+        steps = len(time) - 1
     wires = Newmark(system.mass, system.damping, system.stiffness, time_step)
     solver = Contacts(system, wires, collectors, speed)
     if wind is not None:
         wind.settle(wires, solver.solve)
 
-    time = time_step * np.arange(steps + 1)
     forces = np.zeros((steps + 1, len(collectors), len(system.pairs)))
     heads, lowest = np.zeros((2, steps + 1, len(collectors)))
     tension = np.zeros((steps + 1, system.dropper_tension.size))
@@ -114,12 +142,13 @@ def ride_together(
     for n in range(1, steps + 1):
         if wind is not None:
             wires.load = wind.push(time[n])
-        forces[n], heads[n], lowest[n], tension[n] = solver.advance(speed * time[n])
+        solver.set_speed(speeds[n])
+        forces[n], heads[n], lowest[n], tension[n] = solver.advance(places[n])
         uplift[n] = wires.u[system.supports]
     return [
         Result(
             time,
-            speed * time - own.behind,
+            places - own.behind,
             forces[:, number].sum(axis=1),
             heads[:, number],
             lowest[:, number],

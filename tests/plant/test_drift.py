@@ -11,7 +11,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.metrics.trajectory import Trajectory
 from panto_env.plant.functions import sine_of_turns
-from panto_env.plant.train import ahead, draw_drift, largest_drift, largest_lag
+from panto_env.plant.speed import ahead, draw_drift, largest_drift, largest_lag
 
 from ..lanes import check_lanes_are_singles
 

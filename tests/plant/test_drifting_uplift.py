@@ -12,8 +12,8 @@ from panto_env.control.settings import run_settings
 from panto_env.estimation.estimate import estimate
 from panto_env.estimation.motion import measure
 from panto_env.metrics.compliance import largest_mean
+from panto_env.plant.speed import draw_drift
 from panto_env.plant.state import Row
-from panto_env.plant.train import draw_drift
 
 from ..pantograph_alone import means, replay
 

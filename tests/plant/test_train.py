@@ -10,7 +10,8 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control.settings import run_settings
 from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.plant import Plant
-from panto_env.plant.train import Collector, Train, draw_drift
+from panto_env.plant.speed import draw_drift
+from panto_env.plant.train import Collector, Train
 
 ONE = Train.of(load_pantograph("dsa380"))
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from panto_env.base.settings import Settings
+from panto_env.control.faults import FAULTS
 from panto_env.control.reward import REWARDS
 from panto_env.envs import IDS
 from panto_env.estimation.model import ESTIMATORS
@@ -25,6 +26,7 @@ PACKAGES = ("panto_env", "panto_baselines", "panto_agents")
 PRESETS = {
     "actuator": ACTUATOR_PRESETS,
     "estimator": ESTIMATORS,
+    "fault": FAULTS,
     "line condition": LINE_CONDITIONS,
     "reward": REWARDS,
     "sensors": SENSOR_PRESETS,

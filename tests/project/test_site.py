@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from panto_baselines.report.result import read_result
+from panto_baselines.benchmark.run import read_result
 from panto_env.control.settings import fields
 from panto_env.envs import IDS
 from panto_env.envs.settings import EnvironmentSettings
