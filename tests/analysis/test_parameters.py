@@ -146,7 +146,7 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
     options = {each.name: each for each in command.__signature__.parameters.values()}
     assert not {"settings", "precision"} & set(options)
     assert options.pop("more").default == 3
-    renamed = {"speed": "speed_kmh", "line_spans": "spans"}
+    renamed = {"speed": "speed_kmh", "line_spans": "spans", "fault": "faults"}
     for name, option in options.items():
         field = fields()[renamed.get(name, name)]
         kind, info = option.annotation.__metadata__[0], option.annotation.__metadata__[-1]
@@ -155,7 +155,7 @@ def test_every_option_of_a_setting_has_its_help_and_no_value_by_itself():
         own = field.description.replace("(s)", "(ms)", 1) if name == "time_step" else field.description
         flag = isinstance(field.default, bool)
         default = "" if flag or field.default in (None, ()) else f" Default: {field.default}."
-        often = " May be given several times." * (name in SEVERAL)
+        often = " May be given several times." * (renamed.get(name, name) in SEVERAL)
         assert info.help == f"{own[:1].upper()}{own[1:]}.{often}{default}"
 
 

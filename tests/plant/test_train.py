@@ -10,7 +10,7 @@ from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control.settings import run_settings
 from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.plant import Plant
-from panto_env.plant.speed import draw_drift
+from panto_env.plant.speed import DRIFT_ROWS, KNOT_ROWS, SpeedProfile, draw_drift
 from panto_env.plant.train import Collector, Train
 
 ONE = Train.of(load_pantograph("dsa380"))
@@ -35,13 +35,17 @@ def test_settings_of_a_run_say_who_rides():
     )
 
 
-@pytest.mark.parametrize("drifting", [False, True])
+PROFILE = SpeedProfile(over="time", points=[(0, 280), (0.2, 282), (0.5, 280)])
+
+
+@pytest.mark.parametrize("drifting", [0, DRIFT_ROWS, DRIFT_ROWS + KNOT_ROWS * len(PROFILE.points)])
 def test_kernels_and_python_agree_on_where_a_collector_is_behind_the_first(drifting):
     """A collector at some distance is there at every step: the record of a massless line is of its place."""
     behind = 25.0
     train = Train((replace(ONE.first, distance=behind),))
     plant = Plant(load_catenary("periodic-stiffness"), train, drifting=drifting)
-    drift = draw_drift(3.0, plant.time_step, np.random.default_rng(1))[None] if drifting else None
+    both = draw_drift(3.0, plant.time_step, np.random.default_rng(1)), PROFILE.rows(plant.time_step)
+    drift = np.concatenate(both)[None, :drifting] if drifting else None
     plant.start(0, 80.0, drift=drift)
     assert plant.position(0, 0, 0)[0] == -behind
     samples = plant.samples(401)
