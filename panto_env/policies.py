@@ -23,6 +23,8 @@ from .control.arguments import numbers
 from .control.observation import OBSERVATION_SETTINGS, Context
 from .control.settings import RunSettings
 
+OTHER = "policy="
+"""Parameter of a policy around another one: the other's name."""
 MODELS = ".safetensors"
 """Suffix of model files that hold no code."""
 
@@ -49,8 +51,9 @@ class Policy(Protocol):
 def find_policy(source: Any) -> Policy:
     """Policy from an object, a name, a model file, or a class in a Python file.
 
-    A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5". A file is
-    run once in a process, and again after it has changed.
+    A name may have parameters, "pd:gain=0.5"; so may a class, "my_controller.py:Name:gain=0.5". Of a policy
+    around another one, with a class attribute ``AROUND_ANOTHER``, that one's name may follow:
+    "guarded:pd:gain=0.5". A file is run once in a process, and again after it has changed.
 
     Raises InputError where the policy does not exist.
     """
@@ -72,7 +75,10 @@ def find_policy(source: Any) -> Policy:
             f"(.{', .'.join(loaders)}), or of a Python file and a class in it (my_controller.py:Name)."
         )
     if kind == "installed":
-        return _make(_maker(point), str(source), parameters)
+        maker = _maker(point)
+        if getattr(maker, "AROUND_ANOTHER", False) and not parameters.startswith(OTHER):
+            parameters = f"{OTHER}{parameters!r}"
+        return _make(maker, str(source), parameters)
     if not os.path.isfile(path):
         raise InputError(f"The model file {path} does not exist; check the path.")
     with plugins.blamed(point):
@@ -98,12 +104,25 @@ def check_named(policy: str, where: str | Path) -> None:
     Our own model files hold no code; those of other loaders may. where: the file, for the message.
     """
     kind, _ = _kind(policy)
+    if kind == "installed":  # its parameters may name others
+        for name in _named_in(policy.partition(":")[2]):
+            check_named(name, where)
     if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
         raise InputError(
             f"{where} names the policy {shown(policy)}, but a file may name only installed policies and "
             f"model files ({MODELS}): code from a path runs only where you name it yourself, on the command "
             "line or in Python."
         )
+
+
+def _named_in(parameters: str) -> Iterator[str]:
+    """What may be names of policies in the parameters of another one."""
+    yield parameters
+    try:
+        given = parse_inline(parameters)
+    except InputError:
+        return
+    yield from (value for value in given.values() if isinstance(value, str))
 
 
 def wishes(policy: Any) -> dict[str, Any]:

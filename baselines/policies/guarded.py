@@ -1,0 +1,264 @@
+"""A guard around any policy: readings that cannot be are held, and a command that does harm fades to passive.
+
+In the literature such a guard is a simplex architecture, or run-time assurance (Seto and Sha, "An engineering
+method for safety region development", CMU/SEI-99-TR-018, 1999): a simple and trusted controller, here none at
+all, takes over where a monitor sees a better performing one leave what is safe.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from panto_env.control.entries import (
+    AVERAGED,
+    CENTRED,
+    DEVIATION,
+    DEVIATIONS,
+    FORCE_DEVIATION,
+    READING_ENTRIES,
+    earlier,
+)
+from panto_env.control.observation import Context
+from panto_env.policies import find_policy, wishes
+
+from .line_model import DELAY, LAG, Sampled, line_model, mean_line
+
+Array = NDArray[np.float64]
+Observation = NDArray[np.float32]
+
+SAME = 5e-5
+"""Difference of two readings, in the observation's scale, below which a sensor seems to stand still."""
+STANDS = 2
+"""Control steps in a row without a change after which a reading is held."""
+PATIENCE, RETURN = 1.2, 0.5
+"""Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
+(s) for which they must move again before it comes back."""
+LISTENING = 2.0
+"""Time (s) at the start in which the pantograph is passive and is listened to."""
+WINDOW, SHORT_WINDOW = 1.5, 0.4
+"""Time constants (s) of the means and variances that the monitor compares."""
+FORCES = ("contact force", "force deviation", f"contact force{DEVIATION}")
+"""Names of the entry that has the contact force, by kind of observation."""
+SETTLED = 1.0
+"""Time (s) after the command has faded in before the monitor judges."""
+HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
+"""Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
+``SETTLED``, before, and over the short window."""
+SPREAD = 1.1
+"""Ratio of the force's standard deviation to that last heard while passive above which control fades,
+whatever the model says."""
+SHIFT, SHIFT_WINDOW = 0.03, 5.0
+"""Share of the nominal force by which control may move the mean force, by the model; time constant of that
+mean (s)."""
+LOW = 0.2
+"""Share of the nominal force below which the command may not take more away."""
+FADE_OUT, FADE_IN = 0.2, 0.5
+"""Times (s) in which the command fades out and in."""
+PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
+"""First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
+GOOD = 20.0
+"""Time (s) of control without harm after which the next pause is the first again."""
+
+
+class Guarded:
+    """A policy whose readings are checked, and whose command fades to passive where it does harm.
+
+    Rules, each with a constant above:
+
+    - a reading that stands still, or is exactly zero, is held at its last value; what memory shows of
+      that time is taken for unknown. After ``PATIENCE`` the command fades out, until the reading has moved
+      again for ``RETURN``.
+    - from a model of pantograph and mean line (``line_model``) and the command that was given, it knows what
+      control has added to the contact force. If the force would vary less without (``HARM``), the command
+      fades out.
+    - so it does where the force varies more than it did while passive (``SPREAD``), which needs no model,
+      and where the mean force is moved (``SHIFT``).
+    - where the force is low and control has taken some away, the command takes no more (``LOW``).
+
+    It comes back by itself after a pause, each longer than the one before. Where the speed or the line
+    changes, the spread that was heard while passive is out of date; then it pauses, and listens anew.
+    """
+
+    AROUND_ANOTHER = True  # the other's name follows its own: "guarded:pd"
+
+    def __init__(self, policy: str, delay: float = DELAY, lag: float = LAG) -> None:
+        """policy: its name, as a benchmark takes it. delay of actuator and sensors together, lag of the
+        actuator: s.
+
+        Raises InputError where the policy does not exist.
+        """
+        self._policy, self._delays = find_policy(policy), (delay, lag)
+        vars(self).update({"observation": "measured"} | wishes(self._policy))
+
+    def reset(self, context: Context) -> None:
+        """Prepare for an episode. Raises InputError for a line without wires."""
+        self._policy.reset(context)
+        self._readings = Readings(context)
+        self._monitor = Monitor(context, *self._delays)
+
+    def act(self, observation: Observation) -> Array:
+        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
+        seen = self._readings.checked(observation)
+        action = np.clip(np.asarray(self._policy.act(seen), dtype=float), -1.0, 1.0)
+        gate = self._monitor(seen, self._readings)
+        if self._monitor.low:
+            action = np.maximum(action, 0.0)
+        return np.asarray(gate * action)
+
+
+class Readings:
+    """The readings of an observation: which are plausible, and what is shown instead of the others."""
+
+    def __init__(self, context: Context) -> None:
+        layout, interval = context.layout, context.control_interval
+        names = [entry.name for entry in layout.entries]
+        ending = DEVIATION if layout.kind == DEVIATIONS else ""
+        own = [f"{name}{ending}" for name, _, _ in READING_ENTRIES]
+        if layout.kind == CENTRED:
+            own[-1] = "force deviation"
+        self.present = np.array([names.index(name) for name in own])
+        self.force = int(self.present[-1])
+        self._past = [
+            np.array([names.index(earlier(name, k)) for name in own]) for k in range(1, layout.history + 1)
+        ]
+        entries = [layout.entries[place] for place in self.present]
+        zeros = [
+            (-1.0 / FORCE_DEVIATION if e.name == "force deviation" else -e.centre / e.scale) for e in entries
+        ]
+        self._zero = np.full(len(own), np.inf) if ending else np.array(zeros)
+        self._share = 1 - math.exp(-interval / AVERAGED) if ending else 0.0  # of an average, in a step
+        self._memory = [
+            (place, int(span.split()[0]), float(ahead.split()[0]) / interval)
+            for place, name in enumerate(names)
+            if name.startswith("remembered force")
+            for _, span, ahead in [name.split(", ")]
+        ]
+        self._per_step = interval * context.speed / context.alignment.mean_length  # spans
+        self._unknown = 0.0 if layout.kind in (CENTRED, DEVIATIONS) else context.nominal_force / 100.0
+        self._last: Array | None = None  # as read
+        self._shown: list[Array] = []  # the newest last
+        self._stood = np.zeros(len(own), dtype=int)
+        self._shift = np.zeros(len(own))  # of slow averages, by what was read while a sensor was faulty
+        self._faulty: deque[bool] = deque(maxlen=4000)
+        self.held = 0.0  # time for which any has been held (s)
+        self._interval = interval
+
+    def checked(self, observation: Observation) -> Observation:
+        """The observation with held values for those that cannot be."""
+        read = observation[self.present].astype(float)
+        seen = observation.copy()
+        if self._last is None:
+            self._last, self._shown = read, [read]
+            self._faulty.append(False)
+            return seen
+        still = np.abs(read - (1 - self._share) * self._last) < SAME
+        self._stood = np.where(still, self._stood + 1, 0)
+        bad = (self._stood >= STANDS) | (np.abs(read - self._zero) < 1e-6)
+        # One that begins to be held has shown what is wrong since it stands still: its last value is before.
+        begins = bad & (self._stood == STANDS) & (len(self._shown) > STANDS)
+        for back in range(1, STANDS + 1) if begins.any() else ():
+            wrong, right = self._shown[-back], self._shown[-1 - STANDS]
+            self._shift += np.where(begins, self._share * wrong, 0.0)
+            self._shown[-back] = np.where(begins, right, wrong)
+        shown = np.where(bad, self._shown[-1], read + self._shift)
+        # The environment's averages go on with what was read, these stay where they are while it is held.
+        self._shift += self._share * (read - np.where(bad, 0.0, shown))
+        self._last = read
+        self._faulty.append(bool(bad.any()))
+        self.held = self.held + self._interval if bad.any() else 0.0
+        for k, past in enumerate(self._past, start=1):
+            seen[past] = self._shown[-min(k, len(self._shown))]
+        seen[self.present] = shown
+        self._shown = [*self._shown[-8:], shown]
+        if self._memory and any(self._faulty):
+            self._forget(seen)
+        return seen
+
+    def _forget(self, seen: Observation) -> None:
+        """Take for unknown what memory has of times in which a reading was faulty."""
+        for place, spans, ahead in self._memory:
+            ago = round(spans / self._per_step - ahead)
+            recent = [self._faulty[-k] for k in range(max(ago - 3, 1), ago + 4) if k <= len(self._faulty)]
+            if any(recent):
+                seen[place] = self._unknown
+
+
+class Monitor:
+    """Whether control does good: the gate by which a command is multiplied, 0 to 1."""
+
+    def __init__(self, context: Context, delay: float, lag: float) -> None:
+        self._interval, self._limit = context.control_interval, context.force_limit
+        line, layout = mean_line(context), context.layout
+        self._models = [
+            Sampled(line_model(replace(context, channels=(channel,)), line, delay, lag), self._interval)
+            for channel in context.channels
+        ]
+        self._states = [np.zeros(model.size) for model in self._models]
+        names = [entry.name for entry in layout.entries]
+        self._commands = [k for k, name in enumerate(names) if re.fullmatch("last .* action", name)]
+        force = next(entry for entry in layout.entries if entry.name in FORCES)
+        self._nominal = context.nominal_force
+        of_nominal = force.name == "force deviation"
+        newtons = self._nominal if of_nominal else 1.0
+        self._to_force = force.scale * newtons, (force.centre + of_nominal) * newtons
+        self._absolute = layout.kind != DEVIATIONS
+        self._shares = 1 - np.exp(-self._interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW]))
+        self._means = np.zeros((2, 2))  # over both windows: of the force, and without control
+        self._squares, self._added = np.zeros((2, 2)), 0.0
+        self._begun = False
+        self.gate, self.low = 0.0, False
+        self._waits, self._pause, self._acted, self._passive_for = LISTENING, PAUSE, 0.0, 0.0
+        self._heard = math.inf  # standard deviation while passive (N)
+
+    def __call__(self, seen: Observation, readings: Readings) -> float:
+        """Gate for this control step; seen: the checked observation."""
+        scale, centre = self._to_force
+        force = centre + scale * float(seen[readings.force])
+        added = 0.0
+        for k, (model, place) in enumerate(zip(self._models, self._commands, strict=True)):
+            command = float(seen[place]) * self._limit
+            self._states[k] = model.a @ self._states[k] + model.b * command
+            added += float(model.c[0] @ self._states[k])
+        if readings.held == 0.0:
+            self._add(force, added)
+        deviations = np.sqrt(np.maximum(self._squares, 1e-9))
+        self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
+        if self._passive_for > SETTLED:
+            self._heard = float(deviations[0, 0])
+        self._acted = self._acted + self._interval if self.gate == 1.0 else 0.0
+        if self._acted > GOOD:
+            self._pause = PAUSE
+        if readings.held > PATIENCE:
+            self._waits = max(self._waits, RETURN)
+        elif self.gate > 0.0 and self._waits == 0.0 and self._does_harm(deviations):
+            self._waits, self._pause = self._pause, min(GROWTH * self._pause, LONGEST_PAUSE)
+        self._waits = max(self._waits - self._interval, 0.0)
+        step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / FADE_IN
+        self.gate = min(max(self.gate + step, 0.0), 1.0)
+        self.low = self._absolute and force < LOW * self._nominal and added < 0.0
+        return self.gate
+
+    def _add(self, force: float, added: float) -> None:
+        now = np.array([force, force - added])
+        if not self._begun:
+            self._means[:], self._begun = now, True
+        shares = self._shares[:2, None]
+        self._means += shares * (now - self._means)
+        self._squares += shares * ((now - self._means) ** 2 - self._squares)
+        self._added += self._shares[2] * (added - self._added)
+
+    def _does_harm(self, deviations: Array) -> bool:
+        (acted, without), (acted_lately, without_lately) = deviations
+        settled = self._acted > SETTLED  # what was heard at first is of waves that still build up
+        return bool(
+            acted > (HARM if settled else EARLY_HARM) * without
+            or acted_lately > SHORT_HARM * without_lately
+            or (settled and acted > SPREAD * self._heard)
+            or abs(self._added) > SHIFT * self._nominal
+        )
