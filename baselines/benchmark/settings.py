@@ -51,7 +51,7 @@ class LineAtSpeed(NamedTuple):
 TEST = range(1000)
 SELECTION = range(1000, 2000)
 TRAINING = range(2000, 1_000_000)
-# Above the seeds under which the benchmark records its tapes (``controls.OTHER_SEED``).
+# Above the seeds under which the benchmark records its tapes (``OTHER_SEED``).
 DATA = range(2_000_000, 3_000_000)
 Purpose = Literal["test", "selection", "training", "data"]
 SEEDS: dict[Purpose, range] = {"test": TEST, "selection": SELECTION, "training": TRAINING, "data": DATA}

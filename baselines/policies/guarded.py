@@ -46,7 +46,7 @@ WINDOW, SHORT_WINDOW = 1.5, 0.4
 FORCES = ("contact force", "force deviation", f"contact force{DEVIATION}")
 """Names of the entry that has the contact force, by kind of observation."""
 SETTLED = 1.0
-"""Time (s) after the command has faded in before the monitor judges."""
+"""Time (s) of control, or without it, after which the windows hold nothing else."""
 HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
 """Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
 ``SETTLED``, before, and over the short window."""
@@ -146,6 +146,7 @@ class Readings:
         self._stood = np.zeros(len(own), dtype=int)
         self._shift = np.zeros(len(own))  # of slow averages, by what was read while a sensor was faulty
         self._faulty: deque[bool] = deque(maxlen=4000)
+        self._sound_for = math.inf  # control steps since one was faulty
         self.held = 0.0  # time for which any has been held (s)
         self._interval = interval
 
@@ -172,11 +173,12 @@ class Readings:
         self._last = read
         self._faulty.append(bool(bad.any()))
         self.held = self.held + self._interval if bad.any() else 0.0
+        self._sound_for = 0 if bad.any() else self._sound_for + 1
         for k, past in enumerate(self._past, start=1):
             seen[past] = self._shown[-min(k, len(self._shown))]
         seen[self.present] = shown
         self._shown = [*self._shown[-8:], shown]
-        if self._memory and any(self._faulty):
+        if self._memory and self._sound_for < len(self._faulty):
             self._forget(seen)
         return seen
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -127,22 +127,24 @@ def of_spans(run: Trajectory, spans: SpanChoice = None) -> Sheet:
 
 def of_stretches(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     """Figures of overlaps, behind them and elsewhere. Raises InputError as ``Trajectory.summary`` does."""
-    rows = [
-        of_run | each._asdict()
-        for own, covered, of_run in _each([run], spans)
-        for each in by_stretch(own, covered)
-    ]
-    return Sheet.of_rows("overlaps", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_STRETCH})
+    return _of_parts("overlaps", by_stretch, BY_STRETCH, run, spans)
 
 
 def of_speeds(run: Trajectory, spans: SpanChoice = None) -> Sheet:
     """Figures by classes of the speed. Raises InputError as ``Trajectory.summary`` does."""
+    return _of_parts("by speed", by_speed, BY_SPEED, run, spans)
+
+
+def _of_parts(
+    name: str, parts: Callable[..., Any], headings: Mapping[str, str], run: Trajectory, spans: SpanChoice
+) -> Sheet:
+    """A row for each of the parts into which a function takes each record of a run."""
     rows = [
         of_run | each._asdict()
         for own, covered, of_run in _each([run], spans)
-        for each in by_speed(own, covered)
+        for each in parts(own, covered)
     ]
-    return Sheet.of_rows("by speed", rows, {"speed_kmh": HEADINGS["speed_kmh"], **BY_SPEED})
+    return Sheet.of_rows(name, rows, {"speed_kmh": HEADINGS["speed_kmh"], **headings})
 
 
 def facts(run: Trajectory, without: str = "") -> Sheet:
