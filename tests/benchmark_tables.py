@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from panto_baselines.benchmark.report import harm_table
 from panto_baselines.benchmark.run import read_result
 from panto_baselines.report.tables import summary
 from panto_env.base.files import write_whole
@@ -34,9 +35,13 @@ def with_tables(text: str) -> str:
     """The page's text with the tables of the stored results."""
     for path in sorted(RESULTS.glob("*.json.gz")):
         result = read_result(path)
-        table = summary(result)
-        block = f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
-        old = rf"^\*{re.escape(result.title)}: Δσ.*\*\n\n(?:\|.*\n)+"
+        blocks = [
+            f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
+            for table in (summary(result), harm_table(result.title, result.by_rank))
+        ]
+        block = "\n".join(blocks)
+        title = re.escape(result.title)
+        old = rf"^\*{title}: Δσ.*\*\n\n(?:\|.*\n)+(?:\n\*{title}: harm\*\n\n(?:\|.*\n)+)?"
         text, found = re.subn(old, lambda _, block=block: block, text, flags=re.MULTILINE)
         text += "" if found else f"\n{block}"
     return text

@@ -13,8 +13,9 @@ import numpy as np
 
 from panto_env.base.arrays import Array
 
+from .harm import Harm, window_changes
 from .settings import REFERENCE, TAPE, Number, control_of
-from .single_pass import Row
+from .single_pass import LATE, Row
 from .statistics import (
     ADVICE,
     MOVED,
@@ -50,6 +51,8 @@ class Standing:
     change: Number  # of sigma from the passive one at the same mean force, interquartile mean of passes (%)
     interval: Interval | None  # 95 % interval of ``change``; None: see interval_of_mean
     interval_for_lines: Interval | None  # 95 % interval for other lines; None with fewer than three
+    early: Number  # ``change`` in the early window alone (%)
+    late: float | None  # in the late window alone (%); None unless all lines have one
     worst_quarter: Number  # the same change, mean of the quarter of passes where it is largest (%)
     worst: Number  # maximum change of any cell (%)
     worst_at: str  # line and speed of that cell
@@ -63,6 +66,7 @@ class Standing:
     passes: int
     moved: int  # passes whose mean force the policy moves by more than 1.5 %
     most_moved: Number  # change of the mean force in the pass where it is largest (%)
+    harm: Harm
     disqualified: str  # the reason, or "" if the policy qualifies in every cell
     rank: int | None = None  # by ``change``, from 1; a training has none, its method has
     better_than: Mapping[str, Share] = field(default_factory=dict)  # by other policy: see standings
@@ -90,7 +94,10 @@ def standings(
     everywhere = [name for name, own in own_cells.items() if [cell.place for cell in own] == places]
     clusters = _clusters(own_rows[REFERENCE])
     changes = {name: relative_changes(own_rows[name])[None] for name in everywhere}
-    found = {name: _standing(name, own_cells[name], changes[name][0], clusters) for name in everywhere}
+    found = {
+        name: _standing(name, own_cells[name], own_rows[name], changes[name][0], clusters)
+        for name in everywhere
+    }
     for method, trainings in methods.items():
         changes[method] = np.concatenate([changes.pop(name) for name in trainings])
         found[method] = _of_method(method, [found[name] for name in trainings], changes[method], clusters)
@@ -139,18 +146,28 @@ def _clusters(rows: Sequence[Row]) -> Clusters:
     return Clusters(np.array(line), np.array([row.seed for row in rows]))
 
 
-def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clusters) -> Standing:
+def _standing(
+    policy: str, cells: Sequence[Cell], rows: Sequence[Row], changes: Array, clusters: Clusters
+) -> Standing:
     worst = max(cells, key=lambda cell: -np.inf if np.isnan(cell.change) else cell.change)
     shares = [cell.oracle_share for cell in cells if cell.oracle_share is not None]
 
     def mean(name: str) -> float:
-        return float(np.mean([cell.figures[name] for cell in cells]))
+        windows = (name, f"{LATE}{name}")
+        return float(
+            np.mean([np.mean([cell.figures[n] for n in windows if n in cell.figures]) for cell in cells])
+        )
+
+    def in_window(number: int) -> float:
+        return 100 * interquartile_mean(np.array([window_changes([row])[number, 0] for row in rows]))
 
     return Standing(
         policy=policy,
         change=100 * interquartile_mean(changes),
         interval=interval_of_mean(100 * changes, clusters),
         interval_for_lines=interval_for_lines(100 * changes, clusters),
+        early=in_window(0),
+        late=None if any(row.late is None for row in rows) else in_window(1),
         worst_quarter=100 * worst_quarter(changes),
         worst=worst.change,
         worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
@@ -164,14 +181,18 @@ def _standing(policy: str, cells: Sequence[Cell], changes: Array, clusters: Clus
         passes=sum(cell.seeds for cell in cells),
         moved=sum(cell.moved for cell in cells),
         most_moved=max((cell.most_moved for cell in cells), key=_size),
+        harm=Harm.over([(f"{cell.catenary}, {cell.speed_kmh:g} km/h", cell.harm) for cell in cells]),
         disqualified=_disqualification(cells),
     )
 
 
 def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clusters: Clusters) -> Standing:
     """changes: relative changes of sigma, (trainings, passes)."""
-    names = ["change", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"]
-    names += ["saturation"] if trainings[0].oracle_share is None else ["saturation", "oracle_share"]
+    names = ["change", "early", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"]
+    names += [
+        "saturation",
+        *(name for name in ("late", "oracle_share") if getattr(trainings[0], name) is not None),
+    ]
     means: dict[str, Any] = {n: float(np.mean([getattr(each, n) for each in trainings])) for n in names}
     out = next((each for each in trainings if each.disqualified), None)
     return replace(
@@ -182,6 +203,7 @@ def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clust
         passes=sum(each.passes for each in trainings),
         moved=sum(each.moved for each in trainings),
         most_moved=max((each.most_moved for each in trainings), key=_size),
+        harm=Harm.over([(each.policy, each.harm) for each in trainings]),
         disqualified=f"{out.policy}: {out.disqualified}" if out else "",
         trainings={each.policy: each.change for each in trainings},
         **means,

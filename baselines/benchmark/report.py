@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import groupby
-from math import isnan
+from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +15,16 @@ from rich.text import Text
 
 from panto_env.analysis.plots import fit_force_axis, mark_supports_of_run
 from panto_env.base.plotting import LIMIT, POSITION, series_colour
+from panto_env.base.table import Table as TextTable
 from panto_env.metrics import compliance as en50367
 from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.terminal import number
 
-from .overall import next_in_ranking, with_feedback
+from .harm import MOST_GROWN, MOST_WORSE, WORSE
+from .overall import Standing, next_in_ranking, with_feedback
 from .run import Benchmark
-from .settings import REFERENCE
+from .settings import REFERENCE, Windows
 from .single_pass import ROW_LABELS, drive
 from .statistics import Cell
 
@@ -51,10 +54,10 @@ LEGEND = (
     "95 %; what is drawn is the seed, for all speeds at once. σ, max and min are those of the force "
     "low-passed at 20 Hz. The worst quarter is the mean Δσ of the quarter of passes where it is highest. "
     "Policies are ranked by Δσ. One is not ranked that moves the mean force by more than 1.5 % in a cell or "
-    "in a third of all passes, or by more than 5 % in any pass. A method's figures are means over its "
-    "trainings, and its intervals cover their spread. CL is paper 1's ratio of contact loss, CF its cost "
-    "function; over all lines they are means over cells. Intervals are for these lines, or for others "
-    "like them, as if these were a random sample."
+    "in a third of all passes, or by more than 5 % in any pass; nor one that does harm. A method's figures "
+    "are means over its trainings, and its intervals cover their spread. CL is paper 1's ratio of contact "
+    "loss, CF its cost function; over all lines they are means over cells. Intervals are for these lines, or "
+    "for others like them, as if these were a random sample."
 )
 
 ORACLE = (
@@ -68,13 +71,67 @@ def tables(outcome: Benchmark) -> RenderableType:
     """One table per line, one over all of them, and a legend."""
     parts: list[RenderableType] = []
     cells = groupby(outcome.cells, key=lambda cell: (cell.catenary, cell.pantograph))
-    for (names, cells_of_line), (first, last) in zip(cells, outcome.spans, strict=True):
-        title = f"{' on '.join(reversed(names))}, spans {first}–{last}"
+    for (names, cells_of_line), windows in zip(cells, outcome.windows, strict=True):
+        title = f"{' on '.join(reversed(names))}, {spans_in_words(windows)}"
         parts += [*_table_of_line(list(cells_of_line), title), ""]
     out = [each for each in outcome.standings if each.disqualified]
     reasons = [Text(f"{each.policy} is not ranked: {each.disqualified}.", style="red") for each in out]
     legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
-    return Group(*parts, _overall(outcome), *reasons, Text(legend, style="dim"))
+    harm = as_rich(harm_table(outcome.settings.title, outcome.standings))
+    return Group(*parts, _overall(outcome), harm, *reasons, Text(f"{legend} {LEGEND_OF_HARM}", style="dim"))
+
+
+def spans_in_words(windows: Windows) -> str:
+    """The windows of a line: "spans 10–19, late 101–110"."""
+    words = "spans {}–{}".format(*windows.early)
+    return words if windows.late is None else words + ", late {}–{}".format(*windows.late)
+
+
+LEGEND_OF_HARM = (
+    f"Harm, in either window: passes whose σ is more than {WORSE['sigma']:g} % above that of the passive "
+    "pantograph at the same mean force; that lose more contact than the unchanged passive one, or lose it "
+    f"where that keeps it; whose minimum is more than {WORSE['minimum']:g} N below, or uplift more than "
+    f"{WORSE['uplift']:g} mm above; in brackets the largest difference. Not ranked: σ more than "
+    f"{MOST_WORSE:g} % above in any pass, contact lost where the passive pantograph keeps it, or a change of "
+    f"σ that is more than {MOST_GROWN:g} points larger in the late window of a line."
+)
+
+
+def harm_table(title: str, standings: Sequence[Standing]) -> TextTable:
+    """Table of what each policy makes worse, over all passes: counts and the worst, and Δσ by window."""
+    late = any(one.late is not None for one in standings)
+    columns: dict[str, Callable[[Standing], str]] = {"policy": lambda one: one.policy}
+    if late:
+        columns["Δσ early (%)"] = lambda one: number(one.early, 1)
+        columns["late (%)"] = lambda one: "–" if one.late is None else number(one.late, 1)
+    columns |= {
+        "worst pass (%)": lambda one: f"{one.harm.worst:+.1f}" if isfinite(one.harm.worst) else "–",
+        "σ higher": lambda one: str(one.harm.sigma),
+        "CL higher": lambda one: str(one.harm.loss),
+        "contact lost": lambda one: str(one.harm.lost),
+        "minimum lower": lambda one: (
+            f"{one.harm.minimum}{_at_most(one.harm.lowest_minimum, WORSE['minimum'], 'N')}"
+        ),
+        "uplift higher": lambda one: (
+            f"{one.harm.uplift}{_at_most(1e3 * one.harm.most_uplift, WORSE['uplift'], 'mm')}"
+        ),
+        "of": lambda one: str(one.harm.passes),
+    }
+    return TextTable.of(f"{title}: harm", [one for one in standings if one.policy != REFERENCE], columns)
+
+
+def _at_most(value: float, least: float, unit: str) -> str:
+    return f" ({value:.0f} {unit})" if value > least else ""
+
+
+def as_rich(table: TextTable) -> Table:
+    """A table for the terminal."""
+    shown = Table(title=table.title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for k, heading in enumerate(table.headings):
+        shown.add_column(heading, justify="right" if k else "left", overflow="fold")
+    for row in table.cells:
+        shown.add_row(*row)
+    return shown
 
 
 def _overall(outcome: Benchmark) -> Table:
@@ -185,7 +242,9 @@ def plot(outcome: Benchmark) -> Figure:
         _sigmas(sigmas, cells, colours)
         _changes(changes, cells, colours)
         where = f"pantograph {line.pantograph}, line {line.catenary}"
-        part.suptitle(f"{where}; evaluated spans {in_words(outcome.spans[k])}, seeds: {cells[0].seeds}")
+        part.suptitle(
+            f"{where}; evaluated spans {in_words(outcome.windows[k].early)}, seeds: {cells[0].seeds}"
+        )
         handles, labels = _legend((forces, sigmas), cells)
         part.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
     return figure
@@ -194,7 +253,7 @@ def plot(outcome: Benchmark) -> Figure:
 def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> None:
     settings, line = outcome.settings, outcome.settings.lines[k]
     speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
-    first, last = outcome.spans[k]
+    first, last = outcome.windows[k].early
     shown = max(first, last - 1), last
     rows = zip(outcome.rows, outcome.played, strict=True)
     place = (line.catenary, line.pantograph, speed, seed)

@@ -21,7 +21,7 @@ from panto_env.cluster import spread
 from panto_env.control import Task
 from panto_env.control.lines import fewest_spans, on_example
 from panto_env.control.settings import far_enough, run_settings
-from panto_env.metrics.figures import FIRST_SETTLED, HEADINGS
+from panto_env.metrics.figures import FIRST_SETTLED, HEADINGS, LAST_USUAL
 from panto_env.plant.catenary.schema import CLEAR
 
 from ..oracle.stored import stored_changes
@@ -33,11 +33,12 @@ from .settings import (
     BenchmarkSettings,
     Line,
     LineAtSpeed,
+    Windows,
     control_of,
     policy_of,
     salt_hash,
 )
-from .single_pass import ROW_HEADINGS, Pass, Row, along, oracle_tape, run_pass
+from .single_pass import LATE, ROW_HEADINGS, Pass, Row, along, line_ends, oracle_tape, run_pass
 from .statistics import Cell, compare
 
 SUFFIXES = (*JSON, *TABLES)
@@ -49,7 +50,7 @@ class Benchmark:
     """Outcome of a benchmark."""
 
     settings: BenchmarkSettings
-    spans: tuple[tuple[int, int], ...]  # evaluated on each line: first and last, counted from 1
+    windows: tuple[Windows, ...]  # evaluated on each line
     rows: tuple[Row, ...]  # one per pass, in the order of lines, speeds, policies and seeds
     cells: tuple[Cell, ...]  # one per policy, line and speed
     standings: tuple[Standing, ...]  # one per policy that runs on every line
@@ -65,7 +66,7 @@ class Benchmark:
                 "settings": self.settings.model_dump(mode="json"),
                 "salt_sha256": None if self.settings.salt is None else salt_hash(self.settings.salt),
                 "actions_sha256": actions.digest(self.played),
-                "spans": self.spans,
+                "windows": self.windows,
                 "learnt": self.learnt,
                 "standings": [asdict(each) for each in self.standings],
                 "cells": [asdict(cell) for cell in self.cells],
@@ -82,7 +83,9 @@ class Benchmark:
         """
         check_output(path, SUFFIXES)
         if suffix_of(path) not in JSON:
-            write_rows([row.as_dict() for row in self.rows], path, HEADINGS | ROW_HEADINGS)
+            headings = HEADINGS | ROW_HEADINGS
+            late = {f"{LATE}{name}": f"{LATE}{heading}" for name, heading in headings.items()}
+            write_rows([row.as_dict() for row in self.rows], path, headings | late)
             return
         write_checked(path, self.as_dict())
         actions.save(self.played, actions.beside(path))
@@ -107,11 +110,11 @@ def run(
     check_passes(count * len(settings.seeds), "This benchmark")
     try:
         _check_policies(settings)
-        spans = tuple(evaluated_spans(settings, line) for line in settings.lines)
+        windows = tuple(evaluated_windows(settings, line) for line in settings.lines)
         first = settings.drawn_seeds[0]
         jobs = [
             partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == first)
-            for line, covered, policy, speed, seed in passes_of(settings, spans)
+            for line, covered, policy, speed, seed in passes_of(settings, windows)
         ]
         if workers == 1 and ray is None:
             passes = one_by_one(jobs, progress=progress)
@@ -120,7 +123,7 @@ def run(
         learnt = _learnt(jobs, passes)
     finally:
         apart.close()
-    return outcome_of(settings, spans, passes, learnt)
+    return outcome_of(settings, windows, passes, learnt)
 
 
 def _learnt(jobs: Sequence[Callable[[], Pass]], passes: Sequence[Pass]) -> tuple[str, ...]:
@@ -148,10 +151,10 @@ def _check_policies(settings: BenchmarkSettings) -> None:
 
 
 def passes_of(
-    settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]
-) -> Iterator[tuple[Line, tuple[int, int], str, float, int]]:
-    """Line, evaluated spans, policy, speed (km/h) and seed of each pass, in the order of a result's rows."""
-    for line, covered in zip(settings.lines, spans, strict=True):
+    settings: BenchmarkSettings, windows: Sequence[Windows]
+) -> Iterator[tuple[Line, Windows, str, float, int]]:
+    """Line, windows, policy, speed (km/h) and seed of each pass, in the order of a result's rows."""
+    for line, covered in zip(settings.lines, windows, strict=True):
         for speed in line.speeds_kmh:
             for policy in settings.policies_on(line):
                 for seed in settings.drawn_seeds:
@@ -160,40 +163,56 @@ def passes_of(
 
 def outcome_of(
     settings: BenchmarkSettings,
-    spans: tuple[tuple[int, int], ...],
+    windows: tuple[Windows, ...],
     passes: Sequence[Pass],
     learnt: tuple[str, ...] = (),
 ) -> Benchmark:
     """Outcome of all passes; learnt: see ``compare``."""
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows, stored_bounds(settings, spans), learnt)
+    cells = compare(rows, stored_bounds(settings, windows), learnt)
     played = tuple(each.played for each in passes)
     standing = standings(rows, cells, settings.trainings)
-    return Benchmark(settings, spans, rows, cells, standing, traces, played, learnt)
+    return Benchmark(settings, windows, rows, cells, standing, traces, played, learnt)
 
 
 def stored_bounds(
-    settings: BenchmarkSettings, spans: Sequence[tuple[int, int]]
+    settings: BenchmarkSettings, windows: Sequence[Windows]
 ) -> dict[LineAtSpeed, dict[int, float]]:
-    """Changes of sigma (%) of the stored oracles, by line and speed, and by seed."""
+    """Changes of sigma (%) of the stored oracles in the early window, by line and speed, and by seed."""
     found = {}
-    for line, covered in zip(settings.lines, spans, strict=True):
+    for line, covered in zip(settings.lines, windows, strict=True):
         for speed in line.speeds_kmh:
-            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered):
+            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered.early):
                 found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
     return found
 
 
-def evaluated_spans(settings: BenchmarkSettings, line: Line) -> tuple[int, int]:
-    """First and last span to evaluate; raises InputError where the line cannot be run with these settings."""
+def evaluated_windows(settings: BenchmarkSettings, line: Line) -> Windows:
+    """Windows to evaluate; raises InputError where the line cannot be run with these settings."""
+    late = None if line_ends(line.catenary) else settings.late_spans
+    early = _evaluated(settings, line, line.spans or (None if late is None else (FIRST_SETTLED, LAST_USUAL)))
+    if late is None:
+        return Windows(early)
+    if late[0] <= early[1]:
+        raise InputError(
+            f"late_spans must come after spans {early[0]} to {early[1]} of line '{line.catenary}', not at "
+            f"{late[0]} to {late[1]}."
+        )
+    return Windows(early, _evaluated(settings, line, late))
+
+
+def _evaluated(
+    settings: BenchmarkSettings, line: Line, given_spans: tuple[int, int] | None
+) -> tuple[int, int]:
+    """First and last span of a window: those given, or from the tenth to the last that a run covers whole."""
     given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
     chosen = run_settings(given)
     task = Task(far_enough(on_example(chosen)))
     last = task.plant.alignment.last_whole_span(task.length.own_distance)
     if (shortest := fewest_spans(chosen)) is not None:  # whose end reflects waves
         last = min(last, shortest - CLEAR)
-    first, last = line.spans or (FIRST_SETTLED, last)
+    first, last = given_spans or (FIRST_SETTLED, last)
     where = f"on line '{line.catenary}', where every run covers {task.length.own_distance:g} m"
     if not 1 <= first <= last:
         raise InputError(
@@ -212,7 +231,7 @@ class Result(BaseModel):
 
     version: str
     settings: dict[str, Any]
-    spans: tuple[tuple[int, int], ...]
+    windows: tuple[Windows, ...]
     standings: tuple[Standing, ...]
     cells: tuple[Cell, ...]
     traces: tuple[Trace, ...]
@@ -257,7 +276,7 @@ class Result(BaseModel):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        if not self.cells or len(self.spans) != len({place[:2] for place in self.places}):
+        if not self.cells or len(self.windows) != len({place[:2] for place in self.places}):
             raise ValueError("must have cells, and spans for each of their lines")
         standing = {one.policy for one in self.standings if not one.trainings}
         if not standing | {one.policy for one in self.traces} <= set(self.policies):

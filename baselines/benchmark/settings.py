@@ -40,6 +40,13 @@ Number = Annotated[
 """A figure; nan if there is none, which is null in JSON."""
 
 
+class Windows(NamedTuple):
+    """Spans of a pass that are judged: first and last of each window, counted from 1."""
+
+    early: tuple[int, int]
+    late: tuple[int, int] | None = None  # after a long way
+
+
 class LineAtSpeed(NamedTuple):
     """A line, the pantograph on it, and its speed (km/h)."""
 
@@ -201,6 +208,11 @@ class BenchmarkSettings(Settings):
         False,
         description="whether installed policies run in the process of the plant instead of apart from it; "
         "those from a file never do",
+    )
+    late_spans: tuple[Span, Span] | None = Field(
+        None,
+        description="first and last span of a second window that is judged likewise, on lines that go on so "
+        "far; passes are as much longer",
     )
     actuator: Actuator = of_run("actuator")
     sensors: _Sensors = of_run("sensors")

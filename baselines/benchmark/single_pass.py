@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,9 @@ from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.entries import FULL as NOT_MEASURED
+from panto_env.control.lines import fewest_spans
 from panto_env.control.observation import Context
+from panto_env.control.settings import run_settings
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import LABELS, Figures, Label
 from panto_env.plant.train import MOST_COLLECTORS
@@ -36,6 +39,7 @@ from .settings import (
     Blind,
     Line,
     Tape,
+    Windows,
     control_of,
     policy_of,
 )
@@ -86,9 +90,13 @@ ROW_HEADINGS = {
 """Headings with units, in files of tables, of what ``Row`` has beside the figures of a run."""
 
 
+LATE = "late_"
+"""Before the names of figures of the late window."""
+
+
 @dataclass(frozen=True)
 class Row:
-    """Figures of one pass; all are nan if it ended early (``terminated``)."""
+    """Figures of one pass in one window; all are nan if it ended early (``terminated``)."""
 
     policy: str
     catenary: str
@@ -104,6 +112,12 @@ class Row:
     pressed_std: float  # sigma of the passive pantograph at the same mean force (N)
     pressed_cost_function: float  # CF of that passive pantograph (N m)
     controlled_means: tuple[float, ...] = ()  # of several controlled pantographs, the first in front (N)
+    late: Row | None = field(default=None, repr=False)  # the same pass in the late window, if there is one
+
+    @property
+    def windows(self) -> tuple[Row, ...]:
+        """The row of each window, the early one first."""
+        return (self,) if self.late is None else (self, self.late)
 
     @property
     def means(self) -> tuple[float, ...]:
@@ -112,10 +126,14 @@ class Row:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """All figures; means of several controlled pantographs come last, as mean_1, mean_2, ..."""
+        """All figures; means of several controlled pantographs follow, as mean_1, mean_2, ...
+
+        Those of the late window come last, as late_mean, late_std, ...
+        """
         own = {name: getattr(self, name) for name in (*OWN_LABELS, "pressed_std", "pressed_cost_function")}
         each = {f"mean_{agent}": mean for agent, mean in enumerate(self.controlled_means, start=1)}
-        return self.figures.as_dict() | own | each
+        late = {} if self.late is None else self.late.numbers
+        return self.figures.as_dict() | own | each | {f"{LATE}{name}": late[name] for name in late}
 
     def as_dict(self) -> dict[str, Any]:
         """What identifies the pass, and its figures, in one table."""
@@ -134,7 +152,7 @@ class Pass(NamedTuple):
 def run_pass(
     settings: BenchmarkSettings,
     line: Line,
-    spans: tuple[int, int],
+    windows: Windows,
     policy: str,
     speed_kmh: float,
     seed: int,
@@ -142,14 +160,34 @@ def run_pass(
     traced: bool = False,
     played: Played | None = None,
 ) -> Pass:
-    """Run one pass; its figures cover ``spans``, first and last, counted from 1.
+    """Run one pass, and judge it in its windows.
 
-    traced: whether to keep what a page draws of the pass. played: of the policy in an earlier run of this
-    pass, to play again instead of running the policy.
+    traced: whether to keep what a page draws of the pass, in the early window. played: of the policy in an
+    earlier run of this pass, to play again instead of running the policy.
 
     Raises InputError, naming the policy, if the policy fails.
     """
     first, recorders = _record(settings, line, policy, speed_kmh, seed, played)
+    judge = partial(_judged, settings, line, policy, speed_kmh, seed, first, recorders)
+    row = judge(windows.early)
+    if windows.late is not None:
+        row = replace(row, late=judge(windows.late))
+    kept = traced and not row.terminated
+    run = first.worst_controlled(windows.early)
+    return Pass(row, played_by(recorders), trace(run, windows.early, policy, line) if kept else None)
+
+
+def _judged(
+    settings: BenchmarkSettings,
+    line: Line,
+    policy: str,
+    speed_kmh: float,
+    seed: int,
+    first: Trajectory,
+    recorders: list[_CommandRecorder],
+    spans: tuple[int, int],
+) -> Row:
+    """Row of a pass over ``spans``, first and last; first: the record of its first pantograph."""
     # Of several controlled pantographs the one with the largest sigma is judged.
     controlled = [first.train[number - 1] for number in line.controlled]
     run = first.worst_controlled(spans)
@@ -169,7 +207,7 @@ def run_pass(
         else:
             arguments = _arguments(settings, line, speed_kmh, seed)
             at_same_mean = passive_at_mean_of(first, spans, arguments)
-    row = Row(
+    return Row(
         policy=policy,
         catenary=line.catenary,
         pantograph=line.pantograph,
@@ -187,8 +225,6 @@ def run_pass(
             float("nan") if first.terminated else own.summary(spans).mean for own in several
         ),
     )
-    kept = traced and not run.terminated
-    return Pass(row, played_by(recorders), trace(run, spans, policy, line) if kept else None)
 
 
 def drive(
@@ -240,10 +276,24 @@ def _record(
     return run, recorders
 
 
+BEYOND, SHORT_SPAN = 12, 40.0
+"""Spans behind the last judged one, half of the longest window of a plant, and a short span (m)."""
+
+
 def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     """Settings of the runs along a line, by name, except the speed."""
     names = ("actuator", "sensors", *CONDITIONS)
-    return line.settings | {"distance": line.distance} | {name: getattr(settings, name) for name in names}
+    given = line.settings | {"distance": line.distance} | {name: getattr(settings, name) for name in names}
+    if settings.late_spans is not None and line.distance is None and not line_ends(line.catenary):
+        train = int(np.ceil(sum(line.distances) / SHORT_SPAN))
+        given["spans"] = settings.late_spans[1] + BEYOND + train
+    return given
+
+
+@cache
+def line_ends(catenary: str) -> bool:
+    """Whether a line, or one that is drawn, ends after its sequence of spans."""
+    return fewest_spans(run_settings({"catenary": catenary})) is not None
 
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:

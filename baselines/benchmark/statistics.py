@@ -21,6 +21,7 @@ from pydantic import FiniteFloat
 from panto_env.base.arrays import Array
 from panto_env.base.errors import beside
 
+from .harm import Harm, harm_of, harmful, relative, window_changes
 from .settings import REFERENCE, LineAtSpeed, Number
 from .single_pass import Row
 
@@ -235,6 +236,7 @@ class Cell:
     """One policy on one line at one speed, over all seeds; changes are relative, pass by pass.
 
     "At the same mean": a passive pantograph on the same line with the mean force of the policy's own pass.
+    With an early and a late window a pass has the mean of its changes in both.
     """
 
     policy: str
@@ -246,6 +248,8 @@ class Cell:
     figures: dict[str, Number]  # interquartile means; nan if a pass ended early
     change: Number  # of sigma from the passive pantograph at the same mean (%)
     interval: Interval | None  # 95 % interval of ``change``; None: see interval_of_mean
+    early: Number  # ``change`` in the early window alone (%)
+    late: float | None  # in the late window alone (%); None without one
     cost_change: Number  # of CF from the passive pantograph at the same mean (%)
     mean_change: Number  # of the mean force from the unchanged passive pantograph (%)
     most_moved: Number  # that change in the pass where it is largest (%)
@@ -253,7 +257,8 @@ class Cell:
     improved: Number  # share of passes with a smaller sigma than the passive pantograph at the same mean
     spread: Number  # standard deviation of sigma over the seeds, relative to its mean (%)
     oracle: float | None  # change of sigma that the stored oracle reaches (%); None without a pass of both
-    oracle_share: float | None  # of the oracle's gain, over the passes that it ran; None likewise
+    oracle_share: float | None  # of the oracle's gain, over early windows that both ran; None likewise
+    harm: Harm
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
 
@@ -308,16 +313,20 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
     tables = [row.numbers for row in rows]
     figures = {name: interquartile_mean(np.array([each[name] for each in tables])) for name in tables[0]}
     sigma = np.array([row.figures.std for row in rows])
+    by_window = window_changes(rows)
     changes = relative_changes(rows)
-    costs = _relative(
-        [row.figures.cost_function for row in rows], [row.pressed_cost_function for row in rows]
-    )
-    # Pass by pass, with the same line, speed, seed and noise.
-    paired = [zip(row.means, own.means, strict=True) for row, own in zip(rows, passive_rows, strict=True)]
-    # Of several controlled pantographs the largest change in size.
-    means = np.array([max((own / its - 1 for own, its in pair), key=abs) for pair in paired])
-    both = [(own, oracle[row.seed]) for own, row in zip(changes, rows, strict=True) if row.seed in oracle]
+    early, *rest = (100 * interquartile_mean(each) for each in by_window)
+    late = rest[0] if rest else None
+    costs = relative(
+        [[each.figures.cost_function for each in row.windows] for row in rows],
+        [[each.pressed_cost_function for each in row.windows] for row in rows],
+    ).mean(axis=1)
+    means = _moved_means(rows, passive_rows)
+    both = [
+        (own, oracle[row.seed]) for own, row in zip(by_window[0], rows, strict=True) if row.seed in oracle
+    ]
     reached, bound = np.mean(both, axis=0).tolist() if both else (0.0, None)
+    harm = harm_of(rows, passive_rows)
     return Cell(
         policy=first.policy,
         catenary=first.catenary,
@@ -328,28 +337,53 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         figures=figures,
         change=100 * interquartile_mean(changes),
         interval=interval_of_mean(100 * changes, Clusters.of_one_line(len(rows))),
+        early=early,
+        late=late,
         cost_change=100 * interquartile_mean(costs),
-        mean_change=100 * interquartile_mean(means),
-        most_moved=100 * float(means[np.argmax(np.abs(means))]),  # nan if any is nan
-        moved=int(np.sum(np.abs(means) > MOVED)),
+        mean_change=100 * _typical(means),
+        most_moved=100 * _most(means),
+        moved=int(np.sum((np.abs(means) > MOVED).any(axis=0))),
         improved=float("nan") if np.isnan(changes).any() else float(np.mean(changes < 0)),
         oracle=bound,
         oracle_share=None if bound is None else 100 * reached / bound + 0.0,  # no minus zero
         spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
-        disqualified=_disqualification(rows, passive_rows, means),
+        harm=harm,
+        disqualified=_disqualification(rows, passive_rows, means) or harmful(harm, early, late),
         rank=None,
     )
 
 
 def relative_changes(rows: Sequence[Row]) -> Array:
-    """Relative changes of sigma from the passive pantograph at the same mean, (rows,); nan if it has none."""
-    return _relative([row.figures.std for row in rows], [row.pressed_std for row in rows])
+    """Relative changes of sigma from the passive pantograph at the same mean, (rows,), mean of the windows.
+
+    nan where there is no such pantograph.
+    """
+    # One by one: not all lines need have a late window.
+    return np.array([window_changes([row]).mean() for row in rows])
 
 
-def _relative(values: Sequence[float], to: Sequence[float]) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):  # a sigma of 0 has no relative change
-        changes: Array = np.asarray(values) / np.asarray(to) - 1
-    return changes
+def _moved_means(rows: Sequence[Row], passive_rows: Sequence[Row]) -> Array:
+    """Relative changes of the mean force, (windows, rows); of several pantographs the largest in size."""
+    # Pass by pass, with the same line, speed, seed and noise.
+    return np.array(
+        [
+            [
+                max((own / its - 1 for own, its in zip(each.means, passive.means, strict=True)), key=abs)
+                for each, passive in zip(row.windows, passive_row.windows, strict=True)
+            ]
+            for row, passive_row in zip(rows, passive_rows, strict=True)
+        ]
+    ).T
+
+
+def _typical(means: Array) -> float:
+    """Interquartile mean over the rows of (windows, rows) values, of the window where its size is largest."""
+    each = np.array([interquartile_mean(own) for own in means])
+    return float(each[np.argmax(np.abs(each))])  # nan if any is nan
+
+
+def _most(means: Array) -> float:
+    return float(means.ravel()[np.argmax(np.abs(means))])
 
 
 def _beyond(change: float, most: float) -> str:
@@ -360,14 +394,14 @@ def _beyond(change: float, most: float) -> str:
 def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) -> str:
     """Reason why a policy is not ranked; empty if it is.
 
-    means: relative changes of the mean force, (rows,).
+    means: relative changes of the mean force, (windows, rows).
     """
     ended_early = sum(row.terminated for row in rows)
     if ended_early:
         return f"{ended_early} of {len(rows)} runs ended early, outside the plant's range"
     if any(row.terminated for row in passive_rows):
         return "the passive pantograph's runs ended early: there is nothing to compare with"
-    typical, most = interquartile_mean(means), means[np.argmax(np.abs(means))]
+    typical, most = _typical(means), _most(means)
     if abs(typical) > MOVED:
         return f"it moves the mean force by {_beyond(typical, MOVED)}, more than {100 * MOVED:g} % ({ADVICE})"
     if abs(most) > MOVED_AT_MOST:
@@ -375,6 +409,6 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) ->
         return (
             f"it moves the mean force by {moved} in one pass, more than {100 * MOVED_AT_MOST:g} % ({ADVICE})"
         )
-    if any(np.isnan(row.pressed_std) for row in rows):
+    if any(np.isnan(each.pressed_std) for row in rows for each in row.windows):
         return "no passive pantograph can reach its mean force"
     return ""

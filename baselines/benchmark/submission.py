@@ -21,7 +21,7 @@ from panto_env.cluster import spread
 from . import actions
 from .overall import Standing
 from .run import Benchmark, outcome_of, passes_of, run
-from .settings import REFERENCE, TAPE, BenchmarkSettings
+from .settings import REFERENCE, TAPE, BenchmarkSettings, Windows
 from .single_pass import run_pass
 
 
@@ -56,9 +56,9 @@ def replay(
     table = read_checked(result)
     try:
         settings = parse(BenchmarkSettings, table["settings"], str(result))
-        spans = tuple((int(first), int(last)) for first, last in table["spans"])
+        windows = tuple(Windows(*(each and tuple(each) for each in found)) for found in table["windows"])
         rows, expected = table["rows"], table["actions_sha256"]
-        passes = list(passes_of(settings, spans))
+        passes = list(passes_of(settings, windows))
         kept = actions.read(actions.beside(result), expected)
         named = [row["policy"] for row in rows]
         learnt = tuple(table.get("learnt", ()))
@@ -85,7 +85,7 @@ def replay(
     )
     follows = None
     if len(again) == len(rows) and not any(each.difference for each in replayed):
-        outcome = outcome_of(settings, spans, again, learnt).as_dict()
+        outcome = outcome_of(settings, windows, again, learnt).as_dict()
         follows = all(table[part] == outcome[part] for part in ("standings", "cells", "traces"))
     return Replay(replayed, follows)
 

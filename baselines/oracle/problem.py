@@ -279,11 +279,17 @@ class Problem:
     """One pass along one line, and how the contact force over its evaluated spans depends on the knots."""
 
     def __init__(self, given: Mapping[str, Any], seed: int = 0, spans: SpanChoice = None) -> None:
-        """given: settings of a run, by name; by default it goes on until its start has died out.
+        """given: settings of a run, by name; by default it goes on for ten spans after its start.
 
         Raises InputError for settings that are not valid, or if the passive run ends early.
         """
-        settings = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
+
+        def drawn(values: Mapping[str, Any]) -> RunSettings:
+            return far_enough(on_drawn_line(run_settings(values), lambda: np.random.default_rng(seed)))
+
+        if given.get("spans") is not None and given.get("distance") is None:
+            given = {**given, "distance": drawn({**given, "spans": None}).distance}
+        settings = drawn(given)
         if settings.speed_kmh[0] != settings.speed_kmh[1] or settings.run_in:
             raise InputError("An oracle takes one speed, without run_in.")
         if len(settings.controlled) > 1:

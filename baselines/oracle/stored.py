@@ -54,6 +54,9 @@ class OracleSettings(Settings):
     spans: tuple[Span, Span] | None = Field(
         None, description="first and last span over which σ is minimised; by default those after the start"
     )
+    line_spans: Span | None = Field(
+        None, description="number of the line's spans, on which its irregularity depends"
+    )
     starts: tuple[Start, ...] = Field(("zero",), min_length=1, description=f"of {', '.join(STARTS)}")
     hops: int = Field(
         0,
@@ -76,7 +79,7 @@ class OracleSettings(Settings):
 
     def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
         """Settings of a run, by name, for a cell at a speed (km/h)."""
-        own = cell.settings | {"speed_kmh": speed_kmh, "actuator": cell.actuator}
+        own = cell.settings | {"speed_kmh": speed_kmh, "actuator": cell.actuator, "spans": self.line_spans}
         return own | {name: getattr(self, name) for name in CONDITIONS}
 
 
@@ -97,6 +100,8 @@ RESULTS = Path(__file__).parent / "results"
 """Folder of the project's own oracles; the key ``command`` of each file says how they were made."""
 MATTER = (
     "catenary",
+    "distance",  # an irregular line with another number of spans is another line
+    "spans",
     "pantograph",
     "speed_kmh",
     "actuator",
@@ -128,6 +133,8 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     for name in ("catenary", "pantograph"):
         for words in ("description", "sources", "system", "uplift_stop"):  # no force depends on these
             plain[name].pop(words, None)
+    if settings.spans is not None:  # then the number of spans does not come from the distance
+        plain.pop("distance", None)
     plain["kinds"] = [type(one).__name__ for one in (settings.catenary, settings.actuator)]
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 

@@ -21,7 +21,7 @@ from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.actions import Trace
-from ..benchmark.report import LEGEND
+from ..benchmark.report import LEGEND, LEGEND_OF_HARM, harm_table, spans_in_words
 from ..benchmark.run import Result, read_result
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
 from ..benchmark.statistics import Cell
@@ -185,7 +185,8 @@ def _pairs(result: Result) -> dict[str, list[Shade | None]]:
 def _section(result: Result, place: LineAtSpeed) -> Section:
     cells = [cell for cell in result.cells if cell.place == place]
     title = f"{place.pantograph} on {place.catenary} at {place.speed_kmh:g} km/h"
-    first, last = result.spans[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
+    windows = result.windows[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
+    first, last = windows.early
     count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
     points = [
         Point(
@@ -200,7 +201,7 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
     traces = [trace for trace in result.traces if trace.place == place]
     return Section(
         title=title,
-        table=table_of_cells(cells, f"Spans {first}–{last}, {count}"),
+        table=table_of_cells(cells, f"{spans_in_words(windows).capitalize()}, {count}"),
         charts=[
             *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
             *([over_effort] if over_effort else []),
@@ -253,7 +254,7 @@ def page(results: Sequence[Result]) -> str:
     template = page_template("panto_baselines.report", signed=signed)
     return template.render(
         tracks=[track(result) for result in results],
-        legend=LEGEND,
+        legend=f"{LEGEND} {LEGEND_OF_HARM}",
         box={
             "width": WIDTH,
             "height": HEIGHT,
@@ -309,7 +310,8 @@ def report(
             "`panto benchmark --output`."
         )
     if markdown:
-        tables = [summary(read_result(file)) for file in files]
+        results = [read_result(file) for file in files]
+        tables = [table for one in results for table in (summary(one), harm_table(one.title, one.by_rank))]
         print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
         return
     path = with_suffix(files[0], PAGES[0]) if output is None else output

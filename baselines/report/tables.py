@@ -79,6 +79,8 @@ def leaderboard(result: Result) -> PageTable:
         Column("worst quarter, Δσ (%)", lambda one: _signed(one.worst_quarter, 1)),
         Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
         Column("passes improved", lambda one: _share(one.improved)),
+        *_by_window(result.standings),
+        *_HARM,
         Column("better than the next in", lambda one: _better(one, after.get(one.policy))),
         Column("effort (N)", lambda one: _figure(one.effort, 1)),
         Column("mechanical power (W)", lambda one: _figure(one.power, 1)),
@@ -89,6 +91,32 @@ def leaderboard(result: Result) -> PageTable:
     return _table("All lines, speeds and seeds", columns, result.by_rank)
 
 
+def _by_window(rows: Sequence[R]) -> list[Column[R]]:
+    """Columns of the windows, where there are two."""
+    if all(one.late is None for one in rows):
+        return []
+    return [
+        Column("Δσ early (%)", lambda one: _signed(one.early, 1)),
+        Column("Δσ late (%)", lambda one: _signed(nan if one.late is None else one.late, 1)),
+    ]
+
+
+_HARM: list[Column[Standing]] = [
+    Column("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
+    Column("σ higher in", lambda one: _count(one.harm.sigma)),
+    Column("CL higher in", lambda one: _count(one.harm.loss)),
+    Column("contact lost in", lambda one: _count(one.harm.lost)),
+    Column("minimum lower in", lambda one: _count(one.harm.minimum)),
+    Column("at most by (N)", lambda one: _figure(max(0.0, one.harm.lowest_minimum), 0)),
+    Column("uplift higher in", lambda one: _count(one.harm.uplift)),
+    Column("at most by (mm)", lambda one: _figure(max(0.0, 1e3 * one.harm.most_uplift), 1)),
+]
+
+
+def _count(passes: int) -> Entry:
+    return Entry(str(passes), _key(passes))
+
+
 def table_of_cells(cells: Sequence[Cell], caption: str) -> PageTable:
     """Table of all policies on one line at one speed."""
     figures = {name: _of_figure(name, decimals) for name, decimals in FIGURES.items()}
@@ -97,6 +125,8 @@ def table_of_cells(cells: Sequence[Cell], caption: str) -> PageTable:
         *(figures.pop(name) for name in ("std", "contact_loss", "cost_function")),
         Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
         Column("passes improved", lambda one: _share(one.improved)),
+        *_by_window(cells),
+        Column("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
         Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
         Column("mean moved in", lambda one: _moved(one.moved, one.seeds)),
         *figures.values(),

@@ -10,7 +10,7 @@ import pytest
 
 from panto_baselines.benchmark import apart
 from panto_baselines.benchmark.apart import PolicyApart, find_apart
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_env import InputError
 from panto_env.base.settings import parse
@@ -45,7 +45,9 @@ def nothing_left():
 def play(policy, seed=1, **given):
     table = {"actuator": "realistic", "sensors": "realistic", "line_condition": "as-built"} | given
     line = Line(distance=310.0)
-    return run_pass(parse(BenchmarkSettings, table, "the benchmark"), line, (3, 5), policy, 300.0, seed)
+    return run_pass(
+        parse(BenchmarkSettings, table, "the benchmark"), line, Windows((3, 5)), policy, 300.0, seed
+    )
 
 
 def written(folder, body):

@@ -27,6 +27,7 @@ from panto_baselines.benchmark.settings import (
     SEEDS,
     TEST,
     BenchmarkSettings,
+    Windows,
     load_benchmark,
     policy_of,
     salted_seed,
@@ -70,7 +71,7 @@ def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Bench
         *(("passive", 0), ("passive", 1)),
         *((P, 0), (P, 1)),
     ]
-    assert outcome.spans == ((3, 5),)
+    assert outcome.windows == (Windows((3, 5)),)
     run = simulate(policy=P, seed=1, distance=310.0, line_condition="smooth", record_droppers=False)
     assert outcome.rows[3].figures == run.summary((3, 5))
     interval = round(0.01 / run.time_step)
@@ -102,7 +103,7 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
         {"speeds_kmh": [250], "catenary": "periodic-stiffness", "pantograph": "three-mass"},
     ]
     done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
-    assert done.spans == ((10, 19), (10, 19))
+    assert done.windows == (Windows((10, 19)),) * 2
     # That line has no supports: the uplift is nan, which JSON does not know.
     assert math.isnan(done.cells[1].figures["max_uplift"])
     assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
@@ -358,7 +359,9 @@ def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_sa
 
 def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> None:
     track = load_benchmark("benchmark/known-line")
-    rows = [run_pass(track, track.lines[0], (10, 19), ORACLE_TAPE, 300.0, seed).row for seed in (0, 1)]
+    rows = [
+        run_pass(track, track.lines[0], Windows((10, 19)), ORACLE_TAPE, 300.0, seed).row for seed in (0, 1)
+    ]
     cells = [each for each in stored.stored_cells() if each["speed_kmh"] == 300.0]
     best = next(each["passes"][0] for each in cells if each["actuator"]["place"] == "frame")
     assert best["seed"] == 0
@@ -381,7 +384,7 @@ def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, span
     line = {"catenary": source, "speeds_kmh": speeds_kmh}
     given = settings(lines=[line], seeds=[3], policies=["pd"])
     found = benchmark.run(given, workers=1)
-    assert found.spans == (spans,)
+    assert found.windows == (Windows(spans),)
     for row in found.rows:
         policy = None if row.policy == "passive" else row.policy
         alone = simulate(

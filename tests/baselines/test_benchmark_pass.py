@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import drive, run_pass
 from panto_env import simulate
 from panto_env.base.settings import parse
@@ -60,7 +60,7 @@ def test_rate_of_action_is_that_of_the_possible_commands_within_the_spans():
     given = settings(
         actuator={"place": "both", "force_limit": 50.0}, line_condition="new", control_interval=INTERVAL
     )
-    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0).row
+    row = run_pass(given, LINE, Windows((2, 3)), Shouting(), SPEED_KMH, seed=0).row
     asked = 50.0 * np.clip(np.random.default_rng(0).normal(0, 1, (200, 2)), -1, 1)
     # A span of 50 m takes 0.6 s, 30 commands: those of spans 2 and 3 are the 31st to the 90th.
     changes = np.diff(asked[30:90], axis=0) / INTERVAL
@@ -78,14 +78,14 @@ def test_a_pass_that_ends_early_has_no_figures():
             return -np.ones(1)
 
     given = settings(actuator={"force_limit": 1000.0}, line_condition="new")
-    row = run_pass(given, LINE, (2, 3), Down(), SPEED_KMH, seed=0).row
+    row = run_pass(given, LINE, Windows((2, 3)), Down(), SPEED_KMH, seed=0).row
     assert row.terminated
     assert np.isnan([*row.figures.as_dict().values(), row.action_rate, row.power, row.pressed_std]).all()
 
 
 def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
     given = settings(line_condition="new")
-    row = run_pass(given, LINE, (2, 3), "p:gain=0.5", SPEED_KMH, seed=0).row
+    row = run_pass(given, LINE, Windows((2, 3)), "p:gain=0.5", SPEED_KMH, seed=0).row
     arguments = {"distance": 160.0, "line_condition": "new", "control_interval": 0.01}
     passive = simulate(LINE.catenary, LINE.pantograph, SPEED_KMH, **arguments)
     force = load_pantograph(LINE.pantograph).static_force
@@ -101,13 +101,13 @@ def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
     expected = np.interp(row.figures.mean, [one.mean for one in pressed], [one.std for one in pressed])
     assert row.pressed_std == pytest.approx(expected, rel=0.01)
     assert row.pressed_std != pytest.approx(passive.summary((2, 3)).std, rel=1e-3)
-    own = run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0).row
+    own = run_pass(given, LINE, Windows((2, 3)), "passive", SPEED_KMH, seed=0).row
     assert (own.pressed_std, own.pressed_cost_function) == (own.figures.std, own.figures.cost_function)
 
 
 def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
     given = settings(actuator={"force_limit": 50.0}, line_condition="new", control_interval=INTERVAL)
-    row = run_pass(given, LINE, (2, 3), Shouting(), SPEED_KMH, seed=0).row
+    row = run_pass(given, LINE, Windows((2, 3)), Shouting(), SPEED_KMH, seed=0).row
     plan = np.random.default_rng(0).normal(0, 1, (200, 1))
     assert row.saturation == pytest.approx(np.mean(np.abs(plan[30:90]) > 0.999))
     run, _ = drive(given, LINE, Shouting(), SPEED_KMH, seed=0)
@@ -117,7 +117,7 @@ def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
 
 def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     given = settings(line_condition="new")
-    row, _, trace = run_pass(given, LINE, (1, 3), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)
+    row, _, trace = run_pass(given, LINE, Windows((1, 3)), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)
     run, _ = drive(given, LINE, "p:gain=0.5", SPEED_KMH, seed=3)
     assert (trace.policy, trace.catenary, trace.speed_kmh, trace.seed) == (
         *("p:gain=0.5", LINE.catenary, SPEED_KMH, 3),
@@ -135,7 +135,7 @@ def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     raw = run.contact_force[run.position < 150.0]
     _, power = signal.periodogram(raw, 1 / run.time_step, window="hann", scaling="spectrum")
     np.testing.assert_allclose(amplitude, np.sqrt(2 * power[: len(amplitude)]), atol=0.01 * amplitude.max())
-    assert run_pass(given, LINE, (2, 3), "passive", SPEED_KMH, seed=0).trace is None
+    assert run_pass(given, LINE, Windows((2, 3)), "passive", SPEED_KMH, seed=0).trace is None
     assert row.figures.std == run.summary((1, 3)).std
 
 
@@ -149,14 +149,14 @@ def test_where_the_speed_drifts_commands_count_where_the_figures_do():
     begin, end = 20 * 50.0, 24 * 50.0
     counted = (run.position[::steps] >= begin) & (run.position[::steps] < end)
     expected = np.diff(commands[counted], axis=0) / given.control_interval
-    row = run_pass(given, line, (21, 24), "p:gain=0.5", 100.0, seed=5).row
+    row = run_pass(given, line, Windows((21, 24)), "p:gain=0.5", 100.0, seed=5).row
     assert row.action_rate == pytest.approx(np.sqrt(np.mean(expected**2)))
     assert np.sqrt(np.mean(commands[counted] ** 2)) == pytest.approx(row.figures.effort, rel=2e-3)
 
 
 def test_a_slow_train_leaves_points_enough_for_a_peak_at_20_hz():
     given = settings(line_condition="new")
-    trace = run_pass(given, LINE, (2, 2), "passive", 40.0, seed=0, traced=True).trace
+    trace = run_pass(given, LINE, Windows((2, 2)), "passive", 40.0, seed=0, traced=True).trace
     steps = np.diff(trace.position)
     assert steps.max() <= 40 / 3.6 / 80 + 0.011
     assert (trace.position[0], trace.position[-1]) == (50.0, 100.0)

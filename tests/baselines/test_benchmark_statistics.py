@@ -154,7 +154,8 @@ def test_standings_are_over_all_cells():
     assert a.cost_change == pytest.approx(np.mean(costs))
     assert a.contact_loss == ONES.contact_loss
     assert (a.worst_quarter, b.worst_quarter) == (pytest.approx(20.0), pytest.approx(-10.0))
-    assert [found[name].rank for name in ("passive", "a", "b")] == [3, 1, 1]
+    assert [found[name].rank for name in ("passive", "a", "b")] == [2, None, 1]
+    assert "hard at 300 km/h: it changes σ by +20.0 % in one pass (seed 1)" in a.disqualified
     low, high = a.interval
     assert low < a.change < high
     assert found["passive"].interval is None

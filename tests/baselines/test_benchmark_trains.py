@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from panto_baselines.benchmark import apart
-from panto_baselines.benchmark.run import evaluated_spans
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.run import evaluated_windows
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.benchmark.statistics import compare
 from panto_baselines.oracle.stored import fingerprint
@@ -42,7 +42,7 @@ def ended():
 
 def test_figures_are_those_of_the_controlled_pantograph():
     line = Line(**TRAIN, controlled=2)
-    row = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0).row
+    row = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0).row
     run = simulate(**TRAIN, controlled=2, speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
     own = run.train[1]
     assert row.figures == own.summary(SPANS)
@@ -59,13 +59,13 @@ def test_figures_are_those_of_the_controlled_pantograph():
 
 
 def test_its_commands_count_while_it_is_in_the_spans():
-    row = run_pass(settings(), Line(**TRAIN, controlled=2), SPANS, Shaking(), SPEED_KMH, seed=0).row
+    row = run_pass(settings(), Line(**TRAIN, controlled=2), Windows(SPANS), Shaking(), SPEED_KMH, seed=0).row
     assert row.action_rate == pytest.approx(80.0 / 0.01)
 
 
 def test_of_two_the_worst_counts_and_both_play_again():
     line = Line(**TRAIN, controlled=[1, 2])
-    done = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0)
+    done = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0)
     run = simulate(**TRAIN, controlled=[1, 2], speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
     sigmas = [each.summary(SPANS).std for each in run.train]
     assert done.row.figures.std == max(sigmas) > min(sigmas)
@@ -74,13 +74,15 @@ def test_of_two_the_worst_counts_and_both_play_again():
     assert [done.row.as_dict()[name] for name in ("mean_1", "mean_2")] == means
     assert done.played.actions.shape[1] == 2
     assert not np.array_equal(*done.played.actions.T)
-    again = run_pass(settings(), line, SPANS, "pd", SPEED_KMH, seed=0, played=done.played)
+    again = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0, played=done.played)
     assert again.row == done.row
 
 
 def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
     """Passively the second swings more; the policy calms it, and moves the mean of the first."""
-    passive = run_pass(settings(), Line(**TRAIN, controlled=[1, 2]), SPANS, "passive", SPEED_KMH, seed=0).row
+    passive = run_pass(
+        settings(), Line(**TRAIN, controlled=[1, 2]), Windows(SPANS), "passive", SPEED_KMH, seed=0
+    ).row
     first, second = passive.means
     assert passive.figures.mean == second != first
     for moved in ((1.04 * first, second), (0.96 * first, second), (first, 1.04 * second)):
@@ -108,12 +110,12 @@ def test_one_that_learns_does_not_learn_while_it_waits():
 def test_spans_are_those_that_the_last_one_covers():
     asked = settings(lines=[TRAIN | {"controlled": 2, "distance": 900.0}])
     lone = settings(lines=[{"pantograph": "dsa380", "distance": 900.0}])
-    assert evaluated_spans(asked, asked.lines[0]) == evaluated_spans(lone, lone.lines[0])
+    assert evaluated_windows(asked, asked.lines[0]) == evaluated_windows(lone, lone.lines[0])
 
 
 def test_what_cannot_be_a_train_is_refused_in_a_sentence():
     with pytest.raises(InputError, match="names pantograph 2, but the train has only 1"):
-        evaluated_spans(settings(), Line(controlled=2))
+        evaluated_windows(settings(), Line(controlled=2))
     with pytest.raises(InputError, match=r"controlled.*by their numbers, 1 for the first"):
         settings(lines=[TRAIN | {"controlled": 0}])
     with pytest.raises(InputError, match="one for each of the 2 pantographs, not 3"):

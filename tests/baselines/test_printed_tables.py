@@ -10,16 +10,19 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from panto_baselines.benchmark.harm import Harm
 from panto_baselines.benchmark.overall import Standing
 from panto_baselines.benchmark.report import FIGURES, _overall, tables
+from panto_baselines.benchmark.settings import Windows
 from panto_env.terminal import PlainConsole
 
 from ..render.made_up_plots import cells
 
 STORED = Path(__file__).with_name("printed_tables.txt")
+HARM = Harm(24, 2, 3, 0, 7, 1, 4.56, "a, 250 km/h, seed 3, late", 12.3, 0.0021)
 FIRST = Standing(
-    "p", -12.34, (-14.0, -10.5), None, -3.21, -1.05, "a at 250 km/h", 0.957, 4.32, -21.4, 31.4, 2.7,
-    0.01, 0.62, 24, 1, 2.3, "", 1,
+    "p", -12.34, (-14.0, -10.5), None, -14.2, -10.1, -3.21, -1.05, "a at 250 km/h", 0.957, 4.32, -21.4,
+    31.4, 2.7, 0.01, 0.62, 24, 1, 2.3, HARM, "", 1,
     {"lqg": "20 of 24", "passive": "24 of 24"},
 )  # fmt: skip
 STANDINGS = (
@@ -55,7 +58,10 @@ def printed():
     other = [replace(cell, catenary="c", seeds=1, oracle=None) for cell in own]
     settings = SimpleNamespace(title="made up")
     outcome = SimpleNamespace(
-        cells=(*own, *other), spans=((3, 7), (2, 4)), standings=STANDINGS, settings=settings
+        cells=(*own, *other),
+        windows=(Windows((3, 7)), Windows((2, 4), (9, 11))),
+        standings=STANDINGS,
+        settings=settings,
     )
     said = io.StringIO()
     PlainConsole(file=said, width=200).print(tables(outcome))

@@ -15,7 +15,7 @@ from panto_baselines.benchmark import actions
 from panto_baselines.benchmark import command as replay_command
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.actions import Played
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import drive, run_pass
 from panto_baselines.benchmark.submission import replay
 from panto_env import InputError, simulate
@@ -158,7 +158,7 @@ def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
     """An ideal actuator does what it is commanded: its forces in the record are the commands."""
     settings = parse(BenchmarkSettings, {"line_condition": "new", "actuator": "ideal"}, "the benchmark")
     line, spans = Line(**LINE), (3, 5)
-    done = run_pass(settings, line, spans, Leaning(), 300.0, 0)
+    done = run_pass(settings, line, Windows(spans), Leaning(), 300.0, 0)
     _, commands = drive(settings, line, Leaning(), 300.0, 0)
     run = simulate(policy=Leaning(), distance=310.0, line_condition="new", record_droppers=False)
     steps = round(settings.control_interval / run.time_step)
@@ -169,7 +169,7 @@ def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
     expected = np.sqrt(np.mean((np.diff(commands[inside, 0]) / settings.control_interval) ** 2))
     assert done.row.action_rate == pytest.approx(expected)
     assert done.row.saturation == 0.0 < np.mean(np.abs(done.played.actions[inside]) >= 0.999)
-    again = run_pass(settings, line, spans, Leaning(), 300.0, 0, played=done.played)
+    again = run_pass(settings, line, Windows(spans), Leaning(), 300.0, 0, played=done.played)
     assert again.row.figures == done.row.figures
 
 

@@ -31,6 +31,8 @@ VOID = {"meta", "input"}
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 POLICIES = {"passive": (0.0, ""), "p": (-10.0, ""), "pd": (-9.0, ""), HOSTILE: (-20.0, "it cheats")}
 SHARE = {"share": 0.75, "interval": [0.5, 0.9]}
+HARM = {"passes": 2, "sigma": 1, "loss": 0, "lost": 0, "minimum": 1, "uplift": 0, "worst": 4.5}
+HARM |= {"worst_at": "seed 1", "lowest_minimum": 7.0, "most_uplift": -0.001}
 CHROMIUM = [
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"),
     *("--virtual-time-budget=2000", "--dump-dom"),
@@ -50,6 +52,7 @@ def result(**changes):
                 | {"seeds": 2, "nominal_force": 120.0, "figures": figures, "change": change, "interval": None}
                 | {"cost_change": change, "mean_change": 0.5, "improved": 1.0, "disqualified": reason}
                 | {"moved": 1, "most_moved": 2.0, "oracle": None, "oracle_share": None}
+                | {"early": change, "late": None, "harm": HARM}
                 | {"rank": None if reason else rank, "spread": 1.0}
             )
             along = {"position": [0.0, 50.0, 100.0], "force": [100.0, 120.0 + change, 140.0]}
@@ -65,11 +68,12 @@ def result(**changes):
                 "oracle_share": None,
             }
             | {"saturation": 0.25, "worst_quarter": change + 3, "passes": 4, "moved": 2, "most_moved": -1.6}
+            | {"early": change, "late": None, "harm": HARM}
             | {"better_than": {other: SHARE for other in names if other != policy}, "trainings": {}}
             | {"disqualified": reason, "rank": None if reason else 4 - rank}
         )
     settings = BenchmarkSettings(title=HOSTILE).model_dump(mode="json")
-    whole = {"version": "1", "settings": settings, "spans": [[3, 5]], "standings": standings}
+    whole = {"version": "1", "settings": settings, "windows": [[[3, 5], None]], "standings": standings}
     return whole | {"cells": cells, "rows": [], "traces": traces} | changes
 
 
@@ -115,7 +119,8 @@ def test_leaderboard_shows_the_ranked_first_and_why_others_are_not():
     assert [row[0] for row in rows] == ["1", "2", "3", "–"]
     assert [row[1] for row in rows] == ["pd", "p", "passive", f"{HOSTILE}disqualified: it cheats"]
     assert rows[1][2:] == [
-        *("-10.0-11.0 to -9.0", "0.50", "-5", "-7.0", "-10.0at ln2, 250 km/h", "100 %", "75 %50 to 90"),
+        *("-10.0-11.0 to -9.0", "0.50", "-5", "-7.0", "-10.0at ln2, 250 km/h", "100 %"),
+        *("+4.5seed 1", "1", "0", "0", "1", "7", "0", "0.0", "75 %50 to 90"),
         *("10.0", "2.0", "25 %", "2 of 4", "-1.6"),
     ]
     assert rows[2][headings.index("better than the next in")] == "–"  # the last of the ranked
@@ -293,7 +298,7 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
             json.dumps(with_checksum(result(traces=[{"policy": 1}]))),
             "'traces.1.policy' is missing or wrong",
         ),
-        ("out.json", json.dumps(with_checksum(result(spans=[]))), "do not fit together"),
+        ("out.json", json.dumps(with_checksum(result(windows=[]))), "do not fit together"),
     ],
 )
 def test_what_is_no_result_is_refused_in_one_sentence(tmp_path, name, text, words):

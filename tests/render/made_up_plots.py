@@ -9,6 +9,7 @@ from unittest import mock
 import numpy as np
 
 from panto_baselines.benchmark import report as benchmark_report
+from panto_baselines.benchmark.settings import Windows
 from panto_baselines.benchmark.statistics import Cell
 from panto_baselines.oracle import report as oracle_report
 from panto_env.analysis import line_check
@@ -109,6 +110,9 @@ def cells():
         change, interval = -3.0 * k, None if k == 2 else (-3.0 * k - 2, -3.0 * k + 4)
         rest = {"cost_change": 0.0, "mean_change": 0.0, "most_moved": 0.0, "moved": 0, "improved": 1.0}
         rest |= {
+            "early": change,
+            "late": None,
+            "harm": None,
             "spread": 0.0,
             "oracle": None,
             "oracle_share": None,
@@ -128,7 +132,7 @@ def benchmark():
         for policy in ("passive", "p", "q")
     ]
     outcome = SimpleNamespace(
-        settings=settings, spans=((1, 3),), cells=tuple(cells()), rows=rows, played=[None] * 3
+        settings=settings, windows=(Windows((1, 3)),), cells=tuple(cells()), rows=rows, played=[None] * 3
     )
     runs = [(replace(run, speed=300 / 3.6), None) for run in (RUN, OTHER, QUIET)]
     with mock.patch.object(benchmark_report, "drive", side_effect=runs):

@@ -1,0 +1,180 @@
+"""Harm and the late window: what they count, and cheap policies that try to win by one window alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from panto_baselines.benchmark import run as benchmark
+from panto_baselines.benchmark.harm import harm_of, window_changes
+from panto_baselines.benchmark.overall import standings
+from panto_baselines.benchmark.report import harm_table
+from panto_baselines.benchmark.run import evaluated_windows
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows, load_benchmark
+from panto_baselines.benchmark.statistics import compare
+from panto_baselines.oracle.stored import fingerprint
+from panto_env import InputError, simulate
+from panto_env.base.settings import parse
+
+from .test_benchmark_statistics import row
+
+
+def passes(policy, early, late=None, line="line", **given):
+    """A pass for each σ, early and late; the passive pantograph has 1 in both."""
+    return [
+        replace(
+            row(policy, seed, line=line, std=own, **given),
+            late=late and row(policy, seed, line=line, std=late[seed]),
+        )
+        for seed, own in enumerate(early)
+    ]
+
+
+def judged(early, late=None, **given):
+    """Cell and standing of a policy beside the passive pantograph."""
+    ones = [1.0] * len(early)
+    rows = [*passes("passive", ones, late and ones), *passes("a", early, late, **given)]
+    cells = compare(rows)
+    return cells[1], standings(rows, cells)[1]
+
+
+def test_a_pass_has_the_mean_of_its_windows_and_the_rank_follows_it():
+    cell, standing = judged([0.5, 0.6], [0.7, 0.6])
+    assert window_changes(passes("a", [0.5, 0.6], [0.7, 0.6])) == pytest.approx(
+        np.array([[-0.5, -0.4], [-0.3, -0.4]])
+    )
+    assert (cell.change, cell.early, cell.late) == pytest.approx((-40, -45, -35))
+    assert (standing.change, standing.early, standing.late) == pytest.approx((-40, -45, -35))
+    alone, _ = judged([0.5, 0.6])
+    assert (alone.change, alone.early, alone.late) == (pytest.approx(-45), pytest.approx(-45), None)
+
+
+def test_one_pass_far_above_passive_takes_the_rank_in_either_window():
+    """An interquartile mean would not show it."""
+    for early, late in (([0.5] * 7 + [1.11], [0.5] * 8), ([0.5] * 8, [0.5] * 7 + [1.11])):
+        cell, standing = judged(early, late)
+        assert standing.rank is None
+        assert "it changes σ by +11.0 % in one pass (seed 7" in cell.disqualified
+        assert cell.harm.sigma == 1
+    cell, standing = judged([0.5] * 7 + [1.09], [0.5] * 8)
+    assert standing.rank == 1
+    assert cell.harm.worst == pytest.approx(9)
+
+
+def test_a_change_that_grows_along_the_line_takes_the_rank():
+    cell, standing = judged([0.5] * 4, [0.61] * 4)
+    assert standing.rank is None
+    assert "grows along the line by 11.0 points, from -50.0 % to -39.0 %" in cell.disqualified
+    assert judged([0.5] * 4, [0.59] * 4)[1].rank == 1
+    assert judged([0.61] * 4, [0.5] * 4)[1].rank == 1  # it learns
+
+
+def test_contact_lost_where_the_passive_pantograph_keeps_it_takes_the_rank():
+    kept, lost = row(contact_loss=0.0), row(contact_loss=0.2)
+    for passive, own, ranked in (
+        (kept, kept, True),
+        (kept, lost, False),
+        (lost, lost, True),
+        (lost, kept, True),
+    ):
+        rows = [passive, replace(own, policy="a", figures=replace(own.figures, std=0.5))]
+        cells = compare(rows)
+        assert (standings(rows, cells)[1].rank is not None) == ranked
+        assert cells[1].harm.lost == (not ranked)
+
+
+def test_minimum_and_uplift_are_counted_with_the_worst():
+    passive = [row(seed=seed, min=50.0, max_uplift=0.05) for seed in range(3)]
+    own = [
+        row("a", seed, min=low, max_uplift=up)
+        for seed, low, up in ((0, 49.5, 0.0502), (1, 45.0, 0.053), (2, 60.0, 0.04))
+    ]
+    harm = harm_of(own, passive)
+    assert (harm.minimum, harm.uplift, harm.passes) == (1, 1, 3)
+    assert (harm.lowest_minimum, harm.most_uplift) == pytest.approx((5.0, 0.003))
+    rows = [*passive, *own]
+    table = harm_table("track", standings(rows, compare(rows)))
+    assert table.cells[0][-3:] == ("1 (5 N)", "1 (3 mm)", "3")
+
+
+LATE = {"late_spans": (30, 32), "policies": ["passive"], "seeds": 1}
+
+
+def asked(**given):
+    return parse(BenchmarkSettings, LATE | given, "the benchmark")
+
+
+def test_both_windows_are_those_of_one_pass():
+    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built")
+    done = benchmark.run(given, workers=1)
+    assert done.windows == (Windows((10, 19), (30, 32)),)
+    found = done.rows[0]
+    run = simulate(speed_kmh=280, seed=0, spans=44, line_condition="as-built", record_droppers=False)
+    assert found.figures == run.summary((10, 19))
+    assert found.late.figures == run.summary((30, 32))
+    assert found.as_dict()["late_std"] == found.late.figures.std
+
+
+def test_a_line_that_ends_before_has_one_window():
+    given = asked(lines=[{"catenary": "sweden-st15-bridge", "pantograph": "dsa250", "speeds_kmh": [160]}])
+    assert evaluated_windows(given, given.lines[0]).late is None
+    early = asked(late_spans=(15, 20))
+    with pytest.raises(InputError, match="late_spans must come after spans 10 to 19"):
+        evaluated_windows(early, Line())
+
+
+def test_no_oracle_is_that_of_a_line_of_another_length():
+    """An irregular line with more spans is another line under the same seed."""
+    cell = {"speed_kmh": 300.0, "line_condition": "as-built"}
+    found = {fingerprint(cell), fingerprint(cell | {"spans": 122}), fingerprint(cell | {"distance": 3000.0})}
+    assert len(found) == 3
+    assert fingerprint(cell | {"spans": 122}) == fingerprint(cell | {"spans": 122, "distance": 1000.0})
+
+
+def test_headline_tracks_have_two_windows():
+    for track in ("any-line", "high-speed-as-built", "train-both", "train-trailing", "unknown-line"):
+        assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)
+
+
+CHEATS = '''
+import numpy as np
+from panto_baselines.policies.repetitive import Repetitive
+
+class Early(Repetitive):
+    """Acts up to the end of the early window only."""
+    def reset(self, context):
+        super().reset(context)
+        self.step = 0
+    def acts(self, step):
+        return step < 1460
+    def act(self, observation):
+        self.step += 1
+        action = super().act(observation)
+        return action if self.acts(self.step) else np.zeros_like(action)
+
+class Late(Early):
+    """Acts from the late window on only."""
+    def acts(self, step):
+        return step > 2100
+'''
+
+
+@pytest.mark.slow
+def test_who_acts_in_one_window_alone_is_not_ranked_or_loses(tmp_path):
+    """At 280 km/h a span of 60 m takes 77 control steps."""
+    file = tmp_path / "cheats.py"
+    file.write_text(CHEATS)
+    given = asked(
+        policies=["repetitive", f"{file}:Early", f"{file}:Late"],
+        lines=[{"speeds_kmh": [280]}],
+        seeds=2,
+        line_condition="as-built",
+        late_spans=(30, 39),
+    )
+    _, honest, early, late = benchmark.run(given).standings
+    assert honest.rank == 1
+    assert early.rank is None
+    assert "grows along the line" in early.disqualified
+    assert early.early == pytest.approx(honest.early, abs=1.0)
+    assert late.change > honest.change + 5
+    assert late.early == pytest.approx(0, abs=0.5)
