@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import re
 
-from panto_baselines.benchmark.report import harm_table
 from panto_baselines.benchmark.run import read_result
-from panto_baselines.report.tables import summary
+from panto_baselines.report.tables import tables_of
 from panto_env.base.files import write_whole
 from panto_env.base.table import Table
 
@@ -35,13 +34,10 @@ def with_tables(text: str) -> str:
     """The page's text with the tables of the stored results."""
     for path in sorted(RESULTS.glob("*.json.gz")):
         result = read_result(path)
-        blocks = [
-            f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
-            for table in (summary(result), harm_table(result.title, result.by_rank))
-        ]
+        blocks = [f"*{table.title}*\n\n{table.markdown.rstrip()}\n" for table in tables_of(result)]
         block = "\n".join(blocks)
         title = re.escape(result.title)
-        old = rf"^\*{title}: Δσ.*\*\n\n(?:\|.*\n)+(?:\n\*{title}: harm\*\n\n(?:\|.*\n)+)?"
+        old = rf"^\*{title}: Δσ.*\*\n\n(?:\|.*\n)+(?:\n\*{title}: .*\*\n\n(?:\|.*\n)+)*"
         text, found = re.subn(old, lambda _, block=block: block, text, flags=re.MULTILINE)
         text += "" if found else f"\n{block}"
     return text

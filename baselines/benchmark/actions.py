@@ -89,6 +89,7 @@ class Trace:
     catenary: str
     pantograph: str
     speed_kmh: float
+    case: str
     seed: int
     position: tuple[float, ...]  # (n,): equally spaced along the last two evaluated spans (m)
     force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
@@ -98,7 +99,7 @@ class Trace:
     @property
     def place(self) -> LineAtSpeed:
         """Line, pantograph and speed."""
-        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh, self.case)
 
 
 def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
@@ -118,6 +119,7 @@ def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
         catenary=line.catenary,
         pantograph=line.pantograph,
         speed_kmh=run.speed_kmh,
+        case=line.case,
         seed=run.seed,
         position=_rounded(position, 2),
         force=_rounded(np.interp(position, run.position, force), 2),

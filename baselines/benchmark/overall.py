@@ -141,8 +141,9 @@ def next_in_ranking(found: Sequence[Standing]) -> dict[str, str]:
 
 def _clusters(rows: Sequence[Row]) -> Clusters:
     """Lines and seeds of the passes of one policy."""
-    lines = list(dict.fromkeys((row.catenary, row.pantograph) for row in rows))
-    line = [lines.index((row.catenary, row.pantograph)) for row in rows]
+    names = [(row.catenary, row.pantograph, row.case) for row in rows]
+    lines = list(dict.fromkeys(names))
+    line = [lines.index(name) for name in names]
     return Clusters(np.array(line), np.array([row.seed for row in rows]))
 
 
@@ -170,7 +171,7 @@ def _standing(
         late=None if any(row.late is None for row in rows) else in_window(1),
         worst_quarter=100 * worst_quarter(changes),
         worst=worst.change,
-        worst_at=f"{worst.catenary}, {worst.speed_kmh:g} km/h",
+        worst_at=_where(worst),
         improved=float(np.mean([cell.improved for cell in cells])),
         contact_loss=mean("contact_loss"),
         cost_change=float(np.mean([cell.cost_change for cell in cells])),
@@ -181,7 +182,7 @@ def _standing(
         passes=sum(cell.seeds for cell in cells),
         moved=sum(cell.moved for cell in cells),
         most_moved=max((cell.most_moved for cell in cells), key=_size),
-        harm=Harm.over([(f"{cell.catenary}, {cell.speed_kmh:g} km/h", cell.harm) for cell in cells]),
+        harm=Harm.over([(_where(cell), cell.harm) for cell in cells]),
         disqualified=_disqualification(cells),
     )
 
@@ -210,6 +211,10 @@ def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clust
     )
 
 
+def _where(cell: Cell) -> str:
+    return f"{cell.catenary}{cell.case and f', {cell.case}'}, {cell.speed_kmh:g} km/h"
+
+
 def _size(value: float) -> float:
     return np.inf if np.isnan(value) else abs(value)
 
@@ -218,7 +223,8 @@ def _disqualification(cells: Sequence[Cell]) -> str:
     """Reason why a policy is not ranked over all cells; empty if it is."""
     for cell in cells:
         if cell.disqualified:
-            return f"{cell.catenary} at {cell.speed_kmh:g} km/h: {cell.disqualified}"
+            case = cell.case and f", {cell.case},"
+            return f"{cell.catenary}{case} at {cell.speed_kmh:g} km/h: {cell.disqualified}"
     passes, moved = sum(cell.seeds for cell in cells), sum(cell.moved for cell in cells)
     if moved >= MOVED_PASSES * passes:
         return (

@@ -70,15 +70,31 @@ ORACLE = (
 def tables(outcome: Benchmark) -> RenderableType:
     """One table per line, one over all of them, and a legend."""
     parts: list[RenderableType] = []
-    cells = groupby(outcome.cells, key=lambda cell: (cell.catenary, cell.pantograph))
-    for (names, cells_of_line), windows in zip(cells, outcome.windows, strict=True):
-        title = f"{' on '.join(reversed(names))}, {spans_in_words(windows)}"
-        parts += [*_table_of_line(list(cells_of_line), title), ""]
+    cells = groupby(outcome.cells, key=lambda cell: cell.place.line)
+    for (_, grouped), windows in zip(cells, outcome.windows, strict=True):
+        of_line = list(grouped)
+        title = f"{of_line[0].place.name}, {spans_in_words(windows)}"
+        parts += [*_table_of_line(of_line, title), ""]
     out = [each for each in outcome.standings if each.disqualified]
     reasons = [Text(f"{each.policy} is not ranked: {each.disqualified}.", style="red") for each in out]
     legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
     harm = as_rich(harm_table(outcome.settings.title, outcome.standings))
-    return Group(*parts, _overall(outcome), harm, *reasons, Text(f"{legend} {LEGEND_OF_HARM}", style="dim"))
+    along = [as_rich(each) for each in kilometre_tables(outcome.settings.title, outcome.cells)]
+    return Group(
+        *parts, *along, _overall(outcome), harm, *reasons, Text(f"{legend} {LEGEND_OF_HARM}", style="dim")
+    )
+
+
+def kilometre_tables(title: str, cells: Sequence[Cell]) -> list[TextTable]:
+    """A table for each line at each speed whose kilometres were compared: Δσ (%) in each, by policy."""
+    tables = []
+    for place, grouped in groupby(cells, key=lambda cell: cell.place):
+        found = [cell for cell in grouped if cell.kilometres and cell.policy != REFERENCE]
+        if found:
+            headings = ("policy", *(f"km {k}" for k in range(1, 1 + len(found[0].kilometres))))
+            rows = [(cell.policy, *(number(change, 0) for change in cell.kilometres)) for cell in found]
+            tables.append(TextTable(f"{title}: Δσ (%) by kilometre, {place.name}", headings, rows))
+    return tables
 
 
 def spans_in_words(windows: Windows) -> str:
@@ -238,10 +254,12 @@ def plot(outcome: Benchmark) -> Figure:
         above, below = part.subfigures(2, 1)
         forces, (sigmas, changes) = above.subplots(), below.subplots(1, 2)
         _forces(forces, outcome, k, colours)
-        cells = [each for each in outcome.cells if each.place[:2] == (line.catenary, line.pantograph)]
+        cells = [
+            each for each in outcome.cells if each.place.line == (line.catenary, line.pantograph, line.case)
+        ]
         _sigmas(sigmas, cells, colours)
         _changes(changes, cells, colours)
-        where = f"pantograph {line.pantograph}, line {line.catenary}"
+        where = f"pantograph {line.pantograph}, line {line.catenary}{line.case and f', {line.case}'}"
         part.suptitle(
             f"{where}; evaluated spans {in_words(outcome.windows[k].early)}, seeds: {cells[0].seeds}"
         )
@@ -256,11 +274,11 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> 
     first, last = outcome.windows[k].early
     shown = max(first, last - 1), last
     rows = zip(outcome.rows, outcome.played, strict=True)
-    place = (line.catenary, line.pantograph, speed, seed)
+    place = (line.catenary, line.pantograph, line.case, speed, seed)
     actions = {
         row.policy: played
         for row, played in rows
-        if (row.catenary, row.pantograph, row.speed_kmh, row.seed) == place
+        if (row.catenary, row.pantograph, row.case, row.speed_kmh, row.seed) == place
     }
     for policy, colour in colours.items():
         run, _ = drive(settings, line, policy, speed, seed, actions[policy])

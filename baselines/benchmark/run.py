@@ -38,7 +38,7 @@ from .settings import (
     policy_of,
     salt_hash,
 )
-from .single_pass import LATE, ROW_HEADINGS, Pass, Row, along, line_ends, oracle_tape, run_pass
+from .single_pass import LATE, ROW_HEADINGS, Pass, Row, along, at_speed, line_ends, oracle_tape, run_pass
 from .statistics import Cell, compare
 
 SUFFIXES = (*JSON, *TABLES)
@@ -183,8 +183,8 @@ def stored_bounds(
     found = {}
     for line, covered in zip(settings.lines, windows, strict=True):
         for speed in line.speeds_kmh:
-            if changes := stored_changes(along(settings, line) | {"speed_kmh": speed}, covered.early):
-                found[LineAtSpeed(line.catenary, line.pantograph, speed)] = changes
+            if changes := stored_changes(at_speed(along(settings, line), speed), covered.early):
+                found[LineAtSpeed(line.catenary, line.pantograph, speed, line.case)] = changes
     return found
 
 
@@ -206,7 +206,7 @@ def _evaluated(
     settings: BenchmarkSettings, line: Line, given_spans: tuple[int, int] | None
 ) -> tuple[int, int]:
     """First and last span of a window: those given, or from the tenth to the last that a run covers whole."""
-    given = along(settings, line) | {"speed_kmh": (min(line.speeds_kmh), max(line.speeds_kmh))}
+    given = at_speed(along(settings, line), (min(line.speeds_kmh), max(line.speeds_kmh)))
     chosen = run_settings(given)
     task = Task(far_enough(on_example(chosen)))
     last = task.plant.alignment.last_whole_span(task.length.own_distance)
@@ -276,7 +276,7 @@ class Result(BaseModel):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        if not self.cells or len(self.windows) != len({place[:2] for place in self.places}):
+        if not self.cells or len(self.windows) != len({place.line for place in self.places}):
             raise ValueError("must have cells, and spans for each of their lines")
         standing = {one.policy for one in self.standings if not one.trainings}
         if not standing | {one.policy for one in self.traces} <= set(self.policies):

@@ -25,7 +25,7 @@ from panto_env.base.errors import InputError, shown
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.control.observation import Context
-from panto_env.control.settings import ControlInterval, PantographScatter, SpeedDrift
+from panto_env.control.settings import ControlInterval, PantographScatter, RunSettings, SpeedDrift
 from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import Policy, check_named, wishes
@@ -48,11 +48,22 @@ class Windows(NamedTuple):
 
 
 class LineAtSpeed(NamedTuple):
-    """A line, the pantograph on it, and its speed (km/h)."""
+    """A line, the pantograph on it, its speed (km/h), and the case in which they run."""
 
     catenary: str
     pantograph: str
     speed_kmh: float
+    case: str = ""
+
+    @property
+    def line(self) -> tuple[str, str, str]:
+        """Line, pantograph and case, without the speed."""
+        return self.catenary, self.pantograph, self.case
+
+    @property
+    def name(self) -> str:
+        """Pantograph, line and case in words."""
+        return f"{self.pantograph} on {self.catenary}{self.case and f', {self.case}'}"
 
 
 TEST = range(1000)
@@ -169,6 +180,23 @@ class Line(LineAndTrain):
     policies: tuple[str, ...] = Field(
         (), description="policies that run on this line only, in addition to those that run on every line"
     )
+    case: str = Field("", max_length=40, description="name of the case, where one line has several")
+    run: dict[str, Any] = Field(
+        {},
+        description="settings of the runs in this case, by name, that take the place of the benchmark's, "
+        'such as faults = "force-silent", or a speed_profile instead of the speeds',
+    )
+
+    @field_validator("run")
+    @classmethod
+    def _of_runs(cls, value: dict[str, Any]) -> dict[str, Any]:
+        given = {*LineAndTrain.model_fields, "distance", "spans", "speed_kmh", "control_interval"}
+        unknown = next(
+            (name for name in value if name not in RunSettings.model_fields or name in given), None
+        )
+        if unknown is not None:
+            raise ValueError(f"has {shown(unknown)}, which is no setting that a case may change")
+        return value
 
     @field_validator("policies")
     @classmethod
@@ -213,6 +241,9 @@ class BenchmarkSettings(Settings):
         None,
         description="first and last span of a second window that is judged likewise, on lines that go on so "
         "far; passes are as much longer",
+    )
+    by_kilometre: bool = Field(
+        False, description="whether σ is compared with the passive pantograph's in each kilometre, too"
     )
     actuator: Actuator = of_run("actuator")
     sensors: _Sensors = of_run("sensors")
@@ -273,7 +304,8 @@ class BenchmarkSettings(Settings):
     def _with_distinct_names(self) -> Self:
         distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
         # Rows and cells tell lines apart by these.
-        distinct(tuple((line.catenary, line.pantograph) for line in self.lines))
+        distinct(tuple(filter(None, (line.case for line in self.lines))))
+        distinct(tuple((line.catenary, line.pantograph, line.case) for line in self.lines))
         return self
 
 

@@ -22,6 +22,7 @@ from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
 from panto_env.control.state import TaskRow
 from panto_env.metrics.figures import LABELS, Figures, Label
+from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.train import MOST_COLLECTORS
 from panto_env.policies import Policy, PolicyError, wishes
 
@@ -44,32 +45,42 @@ from .settings import (
     policy_of,
 )
 
-NONE = float("nan"), float("nan")
-
 
 def passive_at_mean_of(
     run: Trajectory, spans: tuple[int, int], arguments: dict[str, Any]
-) -> tuple[float, float]:
-    """Sigma (N) and CF (N m) of the passive pantograph on the same line, at the mean force of ``run``.
+) -> Trajectory | None:
+    """Run of the passive pantograph on the same line, at the mean force of ``run`` over the spans.
 
-    Both are nan if no static force gives this mean. Of a train each has the mean force that it had, and the
-    figures are those of the controlled one whose sigma is largest. arguments: those of ``simulate`` that the
-    run was made with, except its policy.
+    None if no static force gives this mean. Of a train each has the mean force that it had, and the run is
+    that of the controlled one whose sigma is largest. arguments: those of ``simulate`` that the run was made
+    with, except its policy.
     """
     means = [own.summary(spans).mean for own in run.train]
     if not min(means) > 0:
-        return NONE
+        return None
     try:
         mean = means if len(means) > 1 else means[0]
         passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
     except InputError:
-        return NONE
-    if passive.terminated:
-        return NONE
-    worst = passive.worst_controlled(spans).summary(spans)
-    return worst.std, worst.cost_function
+        return None
+    return None if passive.terminated else passive.worst_controlled(spans)
 
 
+def by_kilometre(run: Trajectory, passive: Trajectory, spans: tuple[int, int]) -> tuple[float, ...]:
+    """Relative change of sigma from a passive run in each whole kilometre of the spans."""
+    begin, end = run.alignment.limits(spans)
+    forces = [low_pass(own.contact_force, own.time_step) for own in (run, passive)]
+    found = []
+    for place in np.arange(begin, end - KILOMETRE + 1e-6, KILOMETRE):
+        std, than = (
+            force[(own.position >= place) & (own.position < place + KILOMETRE)].std()
+            for force, own in zip(forces, (run, passive), strict=True)
+        )
+        found.append(float(std / than - 1))
+    return tuple(found)
+
+
+KILOMETRE = 1000.0
 FULL = 0.999
 """Share of the actuator's maximum force above which a command counts as saturated."""
 
@@ -112,6 +123,8 @@ class Row:
     pressed_std: float  # sigma of the passive pantograph at the same mean force (N)
     pressed_cost_function: float  # CF of that passive pantograph (N m)
     controlled_means: tuple[float, ...] = ()  # of several controlled pantographs, the first in front (N)
+    case: str = ""
+    kilometres: tuple[float, ...] = ()  # relative change of sigma in each, see ``by_kilometre``
     late: Row | None = field(default=None, repr=False)  # the same pass in the late window, if there is one
 
     @property
@@ -135,10 +148,23 @@ class Row:
         late = {} if self.late is None else self.late.numbers
         return self.figures.as_dict() | own | each | {f"{LATE}{name}": late[name] for name in late}
 
+    @property
+    def _kilometres(self) -> dict[str, float]:
+        return {f"km_{number}": change for number, change in enumerate(self.kilometres, start=1)}
+
     def as_dict(self) -> dict[str, Any]:
         """What identifies the pass, and its figures, in one table."""
-        names = ("policy", "catenary", "pantograph", "speed_kmh", "seed", "nominal_force", "terminated")
-        return {name: getattr(self, name) for name in names} | self.numbers
+        names = (
+            "policy",
+            "catenary",
+            "pantograph",
+            "case",
+            "speed_kmh",
+            "seed",
+            "nominal_force",
+            "terminated",
+        )
+        return {name: getattr(self, name) for name in names} | self.numbers | self._kilometres
 
 
 class Pass(NamedTuple):
@@ -193,20 +219,19 @@ def _judged(
     run = first.worst_controlled(spans)
     recorder = next(each for each, own in zip(recorders, controlled, strict=True) if own is run)
     several = controlled if len(controlled) > 1 else []
-    figures, at_same_mean = Figures.none(), NONE
+    figures, passive = Figures.none(), None
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        commands = _within(recorder.forces(), run, spans, settings.control_interval)
-        changes = np.diff(commands, axis=0) / settings.control_interval
+        interval = along(settings, line)["control_interval"]
+        commands = _within(recorder.forces(), run, spans, interval)
+        changes = np.diff(commands, axis=0) / interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
-        saturation = float(np.mean(np.abs(commands) >= FULL * settings.actuator.force_limit))
+        saturation = float(np.mean(np.abs(commands) >= FULL * recorder.force_limit))
         watts = run.mechanical_power(spans)
-        if policy == REFERENCE:
-            at_same_mean = figures.std, figures.cost_function
-        else:
-            arguments = _arguments(settings, line, speed_kmh, seed)
-            at_same_mean = passive_at_mean_of(first, spans, arguments)
+        arguments = _arguments(settings, line, speed_kmh, seed)
+        passive = run if policy == REFERENCE else passive_at_mean_of(first, spans, arguments)
+    pressed = Figures.none() if passive is None else passive.summary(spans)
     return Row(
         policy=policy,
         catenary=line.catenary,
@@ -219,11 +244,13 @@ def _judged(
         action_rate=action_rate,
         saturation=saturation,
         power=watts,
-        pressed_std=at_same_mean[0],
-        pressed_cost_function=at_same_mean[1],
+        pressed_std=pressed.std,
+        pressed_cost_function=pressed.cost_function,
         controlled_means=tuple(
             float("nan") if first.terminated else own.summary(spans).mean for own in several
         ),
+        case=line.case,
+        kilometres=by_kilometre(run, passive, spans) if settings.by_kilometre and passive else (),
     )
 
 
@@ -287,7 +314,7 @@ def along(settings: BenchmarkSettings, line: Line) -> dict[str, Any]:
     if settings.late_spans is not None and line.distance is None and not line_ends(line.catenary):
         train = int(np.ceil(sum(line.distances) / SHORT_SPAN))
         given["spans"] = settings.late_spans[1] + BEYOND + train
-    return given
+    return given | line.run
 
 
 @cache
@@ -298,7 +325,13 @@ def line_ends(catenary: str) -> bool:
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
     """Arguments of ``simulate`` for a pass, except its policy."""
-    return along(settings, line) | {"speed_kmh": speed_kmh, "seed": seed, "record_droppers": False}
+    own = {"seed": seed, "record_droppers": False}
+    return at_speed(along(settings, line), speed_kmh) | own
+
+
+def at_speed(given: dict[str, Any], speed_kmh: Any) -> dict[str, Any]:
+    """Settings of a run with its speed (km/h), a number or a range, unless they have a speed profile."""
+    return given if given.get("speed_profile") is not None else given | {"speed_kmh": speed_kmh}
 
 
 def _players(
@@ -352,7 +385,7 @@ class _CommandRecorder:
         self._commands: list[Array] = []
 
     def reset(self, context: Context) -> None:
-        self._force_limit, self._washout = context.force_limit, context.washout
+        self.force_limit, self._washout = context.force_limit, context.washout
         self._policy.reset(context)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
@@ -371,7 +404,7 @@ class _CommandRecorder:
 
     def forces(self) -> Array:
         """Commanded forces (N), (control steps, actions)."""
-        return self._force_limit * np.array(self._commands)
+        return self.force_limit * np.array(self._commands)
 
 
 def played_by(recorders: Sequence[_CommandRecorder]) -> Played:

@@ -242,6 +242,7 @@ class Cell:
     policy: str
     catenary: str
     pantograph: str
+    case: str
     speed_kmh: float
     seeds: int
     nominal_force: float  # N
@@ -259,13 +260,14 @@ class Cell:
     oracle: float | None  # change of sigma that the stored oracle reaches (%); None without a pass of both
     oracle_share: float | None  # of the oracle's gain, over early windows that both ran; None likewise
     harm: Harm
+    kilometres: tuple[Number, ...]  # change of sigma in each kilometre (%); empty unless asked for
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
 
     @property
     def place(self) -> LineAtSpeed:
         """Line, pantograph and speed."""
-        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh)
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh, self.case)
 
 
 def mean_range(passive: float) -> tuple[float, float]:
@@ -285,7 +287,7 @@ def compare(
     """
     groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
-        group = groups.setdefault(LineAtSpeed(row.catenary, row.pantograph, row.speed_kmh), {})
+        group = groups.setdefault(LineAtSpeed(row.catenary, row.pantograph, row.speed_kmh, row.case), {})
         group.setdefault(row.policy, []).append(row)
     return tuple(
         cell
@@ -331,6 +333,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         policy=first.policy,
         catenary=first.catenary,
         pantograph=first.pantograph,
+        case=first.case,
         speed_kmh=first.speed_kmh,
         seeds=len(rows),
         nominal_force=first.nominal_force,
@@ -348,6 +351,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         oracle_share=None if bound is None else 100 * reached / bound + 0.0,  # no minus zero
         spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
         harm=harm,
+        kilometres=_by_kilometre(rows),
         disqualified=_disqualification(rows, passive_rows, means) or harmful(harm, early, late),
         rank=None,
     )
@@ -360,6 +364,14 @@ def relative_changes(rows: Sequence[Row]) -> Array:
     """
     # One by one: not all lines need have a late window.
     return np.array([window_changes([row]).mean() for row in rows])
+
+
+def _by_kilometre(rows: Sequence[Row]) -> tuple[float, ...]:
+    """Interquartile means (%) over the rows, for as many kilometres as all of them have."""
+    count = min(len(row.kilometres) for row in rows)
+    return tuple(
+        100 * interquartile_mean(np.array([row.kilometres[k] for row in rows])) for k in range(count)
+    )
 
 
 def _moved_means(rows: Sequence[Row], passive_rows: Sequence[Row]) -> Array:

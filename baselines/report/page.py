@@ -21,13 +21,13 @@ from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.actions import Trace
-from ..benchmark.report import LEGEND, LEGEND_OF_HARM, harm_table, spans_in_words
+from ..benchmark.report import LEGEND, LEGEND_OF_HARM, spans_in_words
 from ..benchmark.run import Result, read_result
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
 from ..benchmark.statistics import Cell
 from ..line import as_toml
 from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Chart, Line, Point, curves, dots
-from .tables import BAR, FAR_OFF, PageTable, leaderboard, signed, summary, table_of_cells
+from .tables import BAR, FAR_OFF, PageTable, leaderboard, signed, table_of_cells, tables_of
 
 CONTROLS = {
     BLIND: "A control: {}, given its first observation at every step.",
@@ -131,7 +131,7 @@ def track(result: Result) -> Track:
         leaderboard=leaderboard(result),
         lines=[
             (places[0], len(places))
-            for places in (list(own) for _, own in groupby(result.places, key=lambda place: place[:2]))
+            for places in (list(own) for _, own in groupby(result.places, key=lambda place: place.line))
         ],
         heat=_heat(result),
         pairs=_pairs(result),
@@ -184,8 +184,8 @@ def _pairs(result: Result) -> dict[str, list[Shade | None]]:
 
 def _section(result: Result, place: LineAtSpeed) -> Section:
     cells = [cell for cell in result.cells if cell.place == place]
-    title = f"{place.pantograph} on {place.catenary} at {place.speed_kmh:g} km/h"
-    windows = result.windows[list(dict.fromkeys(each[:2] for each in result.places)).index(place[:2])]
+    title = f"{place.name} at {place.speed_kmh:g} km/h"
+    windows = result.windows[list(dict.fromkeys(each.line for each in result.places)).index(place.line)]
     first, last = windows.early
     count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
     points = [
@@ -311,7 +311,7 @@ def report(
         )
     if markdown:
         results = [read_result(file) for file in files]
-        tables = [table for one in results for table in (summary(one), harm_table(one.title, one.by_rank))]
+        tables = [table for one in results for table in tables_of(one)]
         print("\n".join(f"*{each.title}*\n\n{each.markdown}" for each in tables))
         return
     path = with_suffix(files[0], PAGES[0]) if output is None else output

@@ -13,8 +13,9 @@ from panto_env.base.table import Table
 from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
-from ..benchmark.report import FIGURES
+from ..benchmark.report import FIGURES, harm_table, kilometre_tables
 from ..benchmark.run import Result
+from ..benchmark.settings import LineAtSpeed
 from ..benchmark.single_pass import ROW_LABELS
 from ..benchmark.statistics import Cell
 from .charts import Scale
@@ -239,6 +240,12 @@ TRAINING = "· "
 """Before the name of a method's training."""
 
 
+def tables_of(result: Result) -> list[Table]:
+    """Tables of a track for a document: summary, harm, and kilometres where they were compared."""
+    along = kilometre_tables(result.title, result.cells)
+    return [summary(result), harm_table(result.title, result.by_rank), *along]
+
+
 def summary(result: Result) -> Table:
     """Table of policies, by rank, over lines and speeds; the best policy of each column is marked with *.
 
@@ -248,11 +255,7 @@ def summary(result: Result) -> Table:
     the policy is better than the next one, with its interval, and in how many it moves the mean by more than
     1.5 %. A method's trainings follow it. CL and the change of CF are means over cells.
     """
-    several = len({place[:2] for place in result.places}) > 1
-    of_places = (
-        f"{at.catenary}, {at.speed_kmh:g}" if several else f"{at.speed_kmh:g} km/h" for at in result.places
-    )
-    headings = ("policy", *of_places, *OVERALL)
+    headings = ("policy", *_headings(result.places), *OVERALL)
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     after = next_in_ranking(result.standings)
     rows = []
@@ -267,6 +270,23 @@ def summary(result: Result) -> Table:
     seeds = result.cells[0].seeds
     title = with_feedback(f"{result.title}: Δσ (%), {seeds} seeds", result.standings)
     return Table(title, headings, tuple(rows))
+
+
+def _headings(places: Sequence[LineAtSpeed]) -> list[str]:
+    """Headings of columns for lines, cases and speeds: what differs between them."""
+    lines, speeds = ({getattr(at, name) for at in places} for name in ("catenary", "speed_kmh"))
+    if len({at.line for at in places}) == 1:
+        return [f"{at.speed_kmh:g} km/h" for at in places]
+    if not any(at.case for at in places):
+        return [f"{at.catenary}, {at.speed_kmh:g}" for at in places]
+    return [
+        ", ".join(
+            [at.catenary] * (len(lines) > 1)
+            + [at.case] * bool(at.case)
+            + [f"{at.speed_kmh:g}"] * (len(speeds) > 1)
+        )
+        for at in places
+    ]
 
 
 def _overall(one: Standing, after: str | None) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ..base.arrays import Array
@@ -256,6 +257,24 @@ class DropperRule(Settings):
     shortest: Length = Field(description="minimum length of a dropper (m)")
 
 
+class Kinds(Settings):
+    """Kinds of line that are joined one after the other: each has its longest span and its droppers."""
+
+    spans: Range[Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)]] = Field(
+        description="number of spans of one kind"
+    )
+    share: Range[Share] = Field(description="longest span of a kind over the base line's span (-)")
+
+    def draw(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.intp], Array]:
+        """Number of each span's kind, (count,), and the share of each kind's longest span, (kinds,)."""
+        found: list[int] = []
+        shares: list[float] = []
+        while len(found) < count:
+            found += [len(shares)] * int(random.integers(self.spans[0], self.spans[1], endpoint=True))
+            shares.append(random.uniform(*self.share))
+        return np.array(found[:count]), np.array(shares)
+
+
 class LineSection(DrawnLines):
     """Ranges of the spans of a line, one by one, on the wires of a line or of a family of lines."""
 
@@ -276,6 +295,7 @@ class LineSection(DrawnLines):
     bridges: Bridges
     overlaps: Overlaps | None = Field(None, description="none by default: wires reach from end to end")
     droppers: DropperRule
+    kinds: Kinds | None = Field(None, description="by default the whole line is of one kind")
     plausible: Bands
 
     @model_validator(mode="after")
@@ -348,6 +368,10 @@ class LineSection(DrawnLines):
         """Values of a line with the wires of ``base``; None where there is no room for its ramps."""
         count = int(random.integers(self.spans[0], self.spans[1], endpoint=True))
         longest = self.curves.draw(random, base.span_length, count) * self.obstacles.draw(random, count)
+        kind = np.zeros(count, dtype=np.intp)
+        if self.kinds is not None:
+            kind, shares = self.kinds.draw(random, count)
+            longest = np.minimum(longest, base.span_length * shares[kind])
         bridges = self.bridges.draw(random, count)
         for bridge in bridges:
             longest[bridge.span] = min(longest[bridge.span], bridge.span_length)
@@ -370,15 +394,17 @@ class LineSection(DrawnLines):
                 encumbrances.round(HEIGHTS).tolist(), heights.round(HEIGHTS).tolist(), strict=True
             )
         ]
+        droppers = [self._droppers(random, base) for _ in range(int(kind[-1]) + 1)]
+        spans = [{"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)]
+        if self.kinds is not None:
+            spans = [span | {"droppers": droppers[of]} for span, of in zip(spans, kind.tolist(), strict=True)]
         return table | {
             "name": self.full_name,
             "description": f"Drawn from a section. {self.description}",
             "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
-            "droppers": self._droppers(random, base),
+            "droppers": droppers[0],
             "overlaps": self._overlaps(random, lengths, heights, bridges),
-            "sequence": [
-                {"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)
-            ],
+            "sequence": spans,
             "end_support": at[-1],
         }
 

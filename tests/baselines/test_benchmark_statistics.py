@@ -8,6 +8,7 @@ from scipy import stats
 
 from panto_baselines.benchmark import statistics
 from panto_baselines.benchmark.overall import standings, without_feedback
+from panto_baselines.benchmark.settings import LineAtSpeed
 from panto_baselines.benchmark.single_pass import Row
 from panto_baselines.benchmark.statistics import Clusters, interval_for_lines, interval_of_mean
 from panto_env.metrics.figures import Figures
@@ -191,13 +192,13 @@ def test_share_of_a_stored_oracle():
         row("a", line="easy", std=0.8),
         row("a", line="hard", std=0.9),
     ]
-    cells = statistics.compare(rows, {("easy", "pantograph", 300.0): {0: -40.0}})
+    cells = statistics.compare(rows, {LineAtSpeed("easy", "pantograph", 300.0): {0: -40.0}})
     found = {(cell.policy, cell.catenary): cell.oracle_share for cell in cells}
     assert found["a", "easy"] == pytest.approx(0.5)
     assert found["passive", "easy"] == 0.0
     assert found["a", "hard"] is None
     assert [each.oracle_share for each in standings(rows, cells)] == [None, None]
-    both = {(line, "pantograph", 300.0): {0: -40.0} for line in ("easy", "hard")}
+    both = {LineAtSpeed(line, "pantograph", 300.0): {0: -40.0} for line in ("easy", "hard")}
     assert standings(rows, statistics.compare(rows, both))[1].oracle_share == pytest.approx(0.375)
 
 
@@ -207,7 +208,7 @@ def test_the_share_of_an_oracle_is_over_the_passes_that_it_ran():
         *(row(seed=k) for k in range(3)),
         *(row("a", k, std=std) for k, std in enumerate((0.8, 0.6, 2.0))),
     ]
-    place = ("easy", "pantograph", 300.0)
+    place = LineAtSpeed("easy", "pantograph", 300.0)
     rows = [replace(each, catenary="easy") for each in rows]
     found = statistics.compare(rows, {place: {0: -40.0, 1: -60.0, 7: -99.0}})[1]
     assert found.oracle_share == pytest.approx(30 / 50)

@@ -8,7 +8,7 @@ import pytest
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.harm import harm_of, window_changes
 from panto_baselines.benchmark.overall import standings
-from panto_baselines.benchmark.report import harm_table
+from panto_baselines.benchmark.report import harm_table, kilometre_tables
 from panto_baselines.benchmark.run import evaluated_windows
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows, load_benchmark
 from panto_baselines.benchmark.statistics import compare
@@ -134,6 +134,51 @@ def test_no_oracle_is_that_of_a_line_of_another_length():
 def test_headline_tracks_have_two_windows():
     for track in ("any-line", "high-speed-as-built", "train-both", "train-trailing", "unknown-line"):
         assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)
+
+
+def test_a_case_changes_the_runs_of_its_line_and_keeps_its_rows_apart():
+    line = {"catenary": "en50318-2002", "speeds_kmh": [280], "distance": 900.0, "spans": (5, 12)}
+    cases = [line, line | {"case": "weak", "run": {"faults": "actuator-weak"}}]
+    slow = line | {"case": "slow", "run": {"speed_profile": "place:0=280,500=240"}, "distance": 900.0}
+    given = asked(policies=["pd:washout=1"], lines=[*cases, slow], late_spans=None)
+    done = benchmark.run(given, workers=1)
+    assert [cell.case for cell in done.cells] == ["", "", "weak", "weak", "slow", "slow"]
+    assert [cell.place.name for cell in done.cells[::2]] == [
+        "en50318-2002 on en50318-2002",
+        "en50318-2002 on en50318-2002, weak",
+        "en50318-2002 on en50318-2002, slow",
+    ]
+    passive, full, alike, weak, slower, _ = (row.figures for row in done.rows)
+    assert passive == alike != slower
+    assert weak.effort == pytest.approx(0.5 * full.effort, rel=0.1)
+    run = simulate(
+        policy="pd:washout=1",
+        distance=900.0,
+        seed=0,
+        line_condition="smooth",
+        faults="actuator-weak",
+        speed_kmh=280,
+    )
+    assert weak == run.summary((5, 12))
+
+
+@pytest.mark.parametrize("run", [{"speed_kmh": 200}, {"catenary": "re330"}, {"wind": 3}, {"spans": 50}])
+def test_a_case_changes_no_setting_that_names_its_row(run):
+    with pytest.raises(InputError, match="which is no setting that a case may change"):
+        asked(lines=[{"case": "a", "run": run}])
+
+
+def test_kilometres_are_compared_one_by_one():
+    line = {"speeds_kmh": [280], "distance": 2900.0, "case": "long"}
+    given = asked(policies=["pd:washout=1"], lines=[line], late_spans=None, by_kilometre=True)
+    done = benchmark.run(given, workers=1)
+    passive, active = done.rows
+    assert passive.kilometres == (0.0, 0.0)
+    assert len(active.kilometres) == 2
+    assert np.mean(active.kilometres) == pytest.approx(active.figures.std / active.pressed_std - 1, abs=0.02)
+    assert done.rows[1].as_dict()["km_2"] == active.kilometres[1]
+    (table,) = kilometre_tables("track", done.cells)
+    assert table.cells == [("pd:washout=1", *(f"{100 * change:.0f}" for change in active.kilometres))]
 
 
 CHEATS = '''
