@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, lfilter_zi
 
 from panto_env.control.entries import (
     AVERAGED,
@@ -58,12 +59,18 @@ SHIFT, SHIFT_WINDOW = 0.03, 5.0
 mean (s)."""
 LOW = 0.2
 """Share of the nominal force below which the command may not take more away."""
-FADE_OUT, FADE_IN = 0.2, 0.5
-"""Times (s) in which the command fades out and in."""
+FADE_OUT, FADE_IN, PROBE = 0.2, 0.5, 3.0
+"""Times (s) in which the command fades out; in, after readings were held; and in after a pause, so slowly
+that harm is seen while it is small."""
+HIGHEST = 20.0
+"""Frequency (Hz) up to which the force's spread is compared, as in figures."""
 PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
 """First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
 GOOD = 20.0
 """Time (s) of control without harm after which the next pause is the first again."""
+FASTER = 1.2
+"""Ratio of speeds, of now and of when it last listened, from which on it listens anew. Up to it the spread
+that it heard is taken to grow with the square of the speed."""
 
 
 class Guarded:
@@ -81,8 +88,9 @@ class Guarded:
       and where the mean force is moved (``SHIFT``).
     - where the force is low and control has taken some away, the command takes no more (``LOW``).
 
-    It comes back by itself after a pause, each longer than the one before. Where the speed or the line
-    changes, the spread that was heard while passive is out of date; then it pauses, and listens anew.
+    It comes back by itself after a pause. If the force varied less in the pause than before, control did
+    harm, and the next pause is longer; if not, the line or the speed has changed, and the next is as short as
+    the first. Where the speed is another one (``FASTER``), it pauses and listens anew.
     """
 
     AROUND_ANOTHER = True  # the other's name follows its own: "guarded:pd"
@@ -214,9 +222,15 @@ class Monitor:
         self._means = np.zeros((2, 2))  # over both windows: of the force, and without control
         self._squares, self._added = np.zeros((2, 2)), 0.0
         self._begun = False
+        self._low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
+        self._at_rest = lfilter_zi(*self._low_pass)
         self.gate, self.low = 0.0, False
         self._waits, self._pause, self._acted, self._passive_for = LISTENING, PAUSE, 0.0, 0.0
-        self._heard = math.inf  # standard deviation while passive (N)
+        self._heard, self._heard_at = math.inf, context.speed  # spread while passive (N), at a speed (m/s)
+        self._fade_in = PROBE
+        self._before = math.inf  # spread when it last faded (N)
+        self._speed = names.index("speed") if "speed" in names else None
+        self._to_speed = layout.entries[self._speed] if self._speed is not None else None
 
     def __call__(self, seen: Observation, readings: Readings) -> float:
         """Gate for this control step; seen: the checked observation."""
@@ -231,17 +245,27 @@ class Monitor:
             self._add(force, added)
         deviations = np.sqrt(np.maximum(self._squares, 1e-9))
         self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
+        speed = self._speed_of(seen)
         if self._passive_for > SETTLED:
-            self._heard = float(deviations[0, 0])
+            self._heard, self._heard_at = float(deviations[0, 0]), speed
         self._acted = self._acted + self._interval if self.gate == 1.0 else 0.0
         if self._acted > GOOD:
             self._pause = PAUSE
         if readings.held > PATIENCE:
+            if self._waits == 0.0:
+                self._fade_in = FADE_IN
             self._waits = max(self._waits, RETURN)
-        elif self.gate > 0.0 and self._waits == 0.0 and self._does_harm(deviations):
-            self._waits, self._pause = self._pause, min(GROWTH * self._pause, LONGEST_PAUSE)
+        elif self.gate > 0.0 and self._waits == 0.0:
+            if self._does_harm(deviations, speed):
+                self._before, self._waits, self._fade_in = float(deviations[0, 0]), self._pause, PROBE
+                self._pause = min(GROWTH * self._pause, LONGEST_PAUSE)
+            elif not 1 / FASTER < speed / self._heard_at < FASTER:
+                self._before, self._waits = 0.0, PAUSE
+                self._fade_in = FADE_IN
+        if 0.0 < self._waits <= self._interval and self._heard > self._before:
+            self._pause = PAUSE  # it was no better without
         self._waits = max(self._waits - self._interval, 0.0)
-        step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / FADE_IN
+        step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / self._fade_in
         self.gate = min(max(self.gate + step, 0.0), 1.0)
         self.low = self._absolute and force < LOW * self._nominal and added < 0.0
         return self.gate
@@ -250,17 +274,28 @@ class Monitor:
         now = np.array([force, force - added])
         if not self._begun:
             self._means[:], self._begun = now, True
+            self._past = np.multiply.outer(self._at_rest, now)
+        (b0, b1, b2), (_, a1, a2) = self._low_pass
+        first, second = self._past
+        passed = b0 * now + first
+        self._past = np.array([b1 * now - a1 * passed + second, b2 * now - a2 * passed])
+        now = passed
         shares = self._shares[:2, None]
         self._means += shares * (now - self._means)
         self._squares += shares * ((now - self._means) ** 2 - self._squares)
         self._added += self._shares[2] * (added - self._added)
 
-    def _does_harm(self, deviations: Array) -> bool:
+    def _speed_of(self, seen: Observation) -> float:
+        if self._to_speed is None:
+            return self._heard_at
+        return float(self._to_speed.centre + self._to_speed.scale * seen[self._speed])
+
+    def _does_harm(self, deviations: Array, speed: float) -> bool:
         (acted, without), (acted_lately, without_lately) = deviations
         settled = self._acted > SETTLED  # what was heard at first is of waves that still build up
         return bool(
             acted > (HARM if settled else EARLY_HARM) * without
             or acted_lately > SHORT_HARM * without_lately
-            or (settled and acted > SPREAD * self._heard)
+            or (settled and acted > SPREAD * self._heard * max(1.0, speed / self._heard_at) ** 2)
             or abs(self._added) > SHIFT * self._nominal
         )
