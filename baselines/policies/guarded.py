@@ -51,9 +51,11 @@ SETTLED = 1.0
 HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
 """Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
 ``SETTLED``, before, and over the short window."""
-SPREAD = 1.1
-"""Ratio of the force's standard deviation to that last heard while passive above which control fades,
-whatever the model says."""
+SPREAD, SHORT_SPREAD = 1.1, 1.3
+"""Ratios of the force's standard deviation, over the long window and the short one, to that last heard while
+passive above which control fades, whatever the model says."""
+PEAK = 1.3
+"""Ratio of the force's distance from its mean to the largest one heard while passive above which it fades."""
 SHIFT, SHIFT_WINDOW = 0.03, 5.0
 """Share of the nominal force by which control may move the mean force, by the model; time constant of that
 mean (s)."""
@@ -66,6 +68,8 @@ HIGHEST = 20.0
 """Frequency (Hz) up to which the force's spread is compared, as in figures."""
 PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
 """First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
+CALMER = 0.85
+"""Ratio of the spread heard in a pause to that over the short window before, above which it was no harm."""
 GOOD = 20.0
 """Time (s) of control without harm after which the next pause is the first again."""
 FASTER = 1.2
@@ -85,7 +89,7 @@ class Guarded:
       control has added to the contact force. If the force would vary less without (``HARM``), the command
       fades out.
     - so it does where the force varies more than it did while passive (``SPREAD``), which needs no model,
-      and where the mean force is moved (``SHIFT``).
+      where it is farther off than it was then (``PEAK``), and where the mean force is moved (``SHIFT``).
     - where the force is low and control has taken some away, the command takes no more (``LOW``).
 
     It comes back by itself after a pause. If the force varied less in the pause than before, control did
@@ -228,6 +232,7 @@ class Monitor:
         self._waits, self._pause, self._acted, self._passive_for = LISTENING, PAUSE, 0.0, 0.0
         self._heard, self._heard_at = math.inf, context.speed  # spread while passive (N), at a speed (m/s)
         self._fade_in = PROBE
+        self._listened, self._most, self._deviation = 0.0, math.inf, 0.0  # from the mean (N)
         self._before = math.inf  # spread when it last faded (N)
         self._speed = names.index("speed") if "speed" in names else None
         self._to_speed = layout.entries[self._speed] if self._speed is not None else None
@@ -246,8 +251,13 @@ class Monitor:
         deviations = np.sqrt(np.maximum(self._squares, 1e-9))
         self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
         speed = self._speed_of(seen)
+        if self._passive_for == 0.0:
+            self._listened = 0.0
+        else:
+            self._listened = max(self._listened, abs(self._deviation))
         if self._passive_for > SETTLED:
             self._heard, self._heard_at = float(deviations[0, 0]), speed
+            self._most = self._listened
         self._acted = self._acted + self._interval if self.gate == 1.0 else 0.0
         if self._acted > GOOD:
             self._pause = PAUSE
@@ -257,12 +267,12 @@ class Monitor:
             self._waits = max(self._waits, RETURN)
         elif self.gate > 0.0 and self._waits == 0.0:
             if self._does_harm(deviations, speed):
-                self._before, self._waits, self._fade_in = float(deviations[0, 0]), self._pause, PROBE
+                self._before, self._waits, self._fade_in = float(deviations[1, 0]), self._pause, PROBE
                 self._pause = min(GROWTH * self._pause, LONGEST_PAUSE)
             elif not 1 / FASTER < speed / self._heard_at < FASTER:
                 self._before, self._waits = 0.0, PAUSE
                 self._fade_in = FADE_IN
-        if 0.0 < self._waits <= self._interval and self._heard > self._before:
+        if 0.0 < self._waits <= self._interval and self._heard > CALMER * self._before:
             self._pause = PAUSE  # it was no better without
         self._waits = max(self._waits - self._interval, 0.0)
         step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / self._fade_in
@@ -281,6 +291,7 @@ class Monitor:
         self._past = np.array([b1 * now - a1 * passed + second, b2 * now - a2 * passed])
         now = passed
         shares = self._shares[:2, None]
+        self._deviation = float(now[0] - self._means[0, 0])
         self._means += shares * (now - self._means)
         self._squares += shares * ((now - self._means) ** 2 - self._squares)
         self._added += self._shares[2] * (added - self._added)
@@ -293,9 +304,12 @@ class Monitor:
     def _does_harm(self, deviations: Array, speed: float) -> bool:
         (acted, without), (acted_lately, without_lately) = deviations
         settled = self._acted > SETTLED  # what was heard at first is of waves that still build up
+        faster = max(1.0, speed / self._heard_at) ** 2
         return bool(
             acted > (HARM if settled else EARLY_HARM) * without
             or acted_lately > SHORT_HARM * without_lately
-            or (settled and acted > SPREAD * self._heard * max(1.0, speed / self._heard_at) ** 2)
+            or (settled and acted > SPREAD * self._heard * faster)
+            or acted_lately > SHORT_SPREAD * self._heard * faster
+            or abs(self._deviation) > PEAK * self._most * faster
             or abs(self._added) > SHIFT * self._nominal
         )
