@@ -56,6 +56,9 @@ SPREAD, SHORT_SPREAD = 1.1, 1.3
 passive above which control fades, whatever the model says."""
 PEAK = 1.3
 """Ratio of the force's distance from its mean to the largest one heard while passive above which it fades."""
+STRONG = 0.3
+"""Ratio of what control adds, by the model, to the spread heard while passive, below which neither the short
+window nor a single peak is control's doing."""
 SHIFT, SHIFT_WINDOW = 0.03, 5.0
 """Share of the nominal force by which control may move the mean force, by the model; time constant of that
 mean (s)."""
@@ -223,8 +226,8 @@ class Monitor:
         self._to_force = force.scale * newtons, (force.centre + of_nominal) * newtons
         self._absolute = layout.kind != DEVIATIONS
         self._shares = 1 - np.exp(-self._interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW]))
-        self._means = np.zeros((2, 2))  # over both windows: of the force, and without control
-        self._squares, self._added = np.zeros((2, 2)), 0.0
+        self._means = np.zeros((2, 3))  # over both windows: of the force, without control, and what that adds
+        self._squares, self._added = np.zeros((2, 3)), 0.0
         self._begun = False
         self._low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
         self._at_rest = lfilter_zi(*self._low_pass)
@@ -266,7 +269,9 @@ class Monitor:
                 self._fade_in = FADE_IN
             self._waits = max(self._waits, RETURN)
         elif self.gate > 0.0 and self._waits == 0.0:
-            if self._does_harm(deviations, speed):
+            if abs(self._added) > SHIFT * self._nominal:
+                self._before, self._waits = 0.0, PAUSE
+            elif self._does_harm(deviations, speed):
                 self._before, self._waits, self._fade_in = float(deviations[1, 0]), self._pause, PROBE
                 self._pause = min(GROWTH * self._pause, LONGEST_PAUSE)
             elif not 1 / FASTER < speed / self._heard_at < FASTER:
@@ -281,7 +286,7 @@ class Monitor:
         return self.gate
 
     def _add(self, force: float, added: float) -> None:
-        now = np.array([force, force - added])
+        now = np.array([force, force - added, added])
         if not self._begun:
             self._means[:], self._begun = now, True
             self._past = np.multiply.outer(self._at_rest, now)
@@ -302,14 +307,14 @@ class Monitor:
         return float(self._to_speed.centre + self._to_speed.scale * seen[self._speed])
 
     def _does_harm(self, deviations: Array, speed: float) -> bool:
-        (acted, without), (acted_lately, without_lately) = deviations
+        (acted, without, _), (acted_lately, without_lately, added) = deviations
+        strong = added > STRONG * self._heard  # else what is heard is not of control
         settled = self._acted > SETTLED  # what was heard at first is of waves that still build up
         faster = max(1.0, speed / self._heard_at) ** 2
         return bool(
             acted > (HARM if settled else EARLY_HARM) * without
             or acted_lately > SHORT_HARM * without_lately
             or (settled and acted > SPREAD * self._heard * faster)
-            or acted_lately > SHORT_SPREAD * self._heard * faster
-            or abs(self._deviation) > PEAK * self._most * faster
-            or abs(self._added) > SHIFT * self._nominal
+            or (strong and acted_lately > SHORT_SPREAD * self._heard * faster)
+            or (strong and abs(self._deviation) > PEAK * self._most * faster)
         )

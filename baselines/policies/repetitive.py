@@ -77,6 +77,10 @@ LISTENING = 3.0
 """Spans without control at the start; the last two give the approximate passive sigma."""
 TOLERATED = 1.05
 """Ratio of a span's sigma to the passive one above which the control backs off."""
+ANOTHER = 0.03
+"""Relative change of the measured speed from which on it learns at another speed; a train's drift is less."""
+SMOOTHED = 0.5
+"""Time constant (s) of the measured speed."""
 BACK_OFF, RECOVERY = 0.5, 1.05
 """Factor on the learnt force and on the speed of learning after a span in which the control backs off; factor
 by which learning recovers after any other span, up to its full speed."""
@@ -133,13 +137,29 @@ class SpanLearner:
         actuator's force (N).
         """
         learning, forgetting, response = np.abs(np.array(pace))
+        self._pace, self._limit = (learning, forgetting, response), OVER * limit
+        self._learnt: NDArray[np.complex128] = np.zeros((lanes, 0), dtype=complex)
+        self._ledger, self._trust = _Ledger(lanes), np.ones(lanes)
+        self._tune(numbers, answers, share)
+
+    def _tune(self, numbers: Array, answers: NDArray[np.complex128], share: float) -> None:
+        learning, forgetting, response = self._pace
         self._towards = share * learning * 2 * np.conj(answers) / (np.abs(answers) ** 2 + response**2)
-        self._kept, self._share, self._limit = 1 - share * forgetting, share, OVER * limit
+        self._kept, self._share = 1 - share * forgetting, share
         self._numbers = numbers
-        self._learnt: NDArray[np.complex128] = np.zeros((lanes, len(numbers)), dtype=complex)
         around = np.linspace(0, 2 * np.pi, PEAKS, endpoint=False)
         self._around = np.exp(1j * np.multiply.outer(numbers, around))
-        self._ledger, self._trust = _Ledger(lanes), np.ones(lanes)
+        learnt, common = self._learnt, min(self._learnt.shape[1], len(numbers))
+        self._learnt = np.zeros((len(learnt), len(numbers)), dtype=complex)
+        self._learnt[:, :common] = learnt[:, :common]
+
+    def at_another_speed(self, numbers: Array, answers: NDArray[np.complex128], share: float) -> None:
+        """Go on at another speed with what is learnt; arguments as at the start.
+
+        The sigma of the first spans says nothing here, so only the model tells whether to back off.
+        """
+        self._tune(numbers, answers, share)
+        self._ledger.forget_first()
 
     def __call__(self, error: Array, own: Array, angle: Array) -> Array:
         """Force (N) of each lane, (lanes,), at these angles (rad).
@@ -175,6 +195,10 @@ class _Ledger:
         self._count = 0
         self._first: list[Array] = []
 
+    def forget_first(self) -> None:
+        """Compare no more with the first spans."""
+        self._first = [np.full(self._sums.shape[1], np.inf)]
+
     def add(self, error: Array, free: Array, share: float) -> NDArray[np.bool_] | None:
         """Add a control step; at the end of a span, return which lanes, (lanes,), the control makes worse."""
         self._sums += np.stack([error, error**2, free, free**2])
@@ -209,7 +233,7 @@ class Repetitive(TunableLaw):
     spans of the mean length: it learns what stands at the same share of most spans, such as what supports
     do, and takes the rest for noise. Where no sensor measures the place, ``place="counted"`` goes by the
     measured speed: what repeats is learnt wherever the count begins, and learning follows the drift of a
-    speed that is slightly wrong.
+    speed that is slightly wrong. Where the measured speed changes it learns on at that speed.
     """
 
     TUNED: ClassVar[Mapping[str, Gain]] = {
@@ -233,19 +257,34 @@ class Repetitive(TunableLaw):
         """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
         model = line_model(context, mean_line(context), *self._delays)
-        span_rate, interval = context.speed / context.alignment.mean_length, context.control_interval
-        numbers, limit = harmonics(span_rate), context.force_limit
-        answers = self.answers(model, numbers * span_rate)
+        interval, limit = context.control_interval, context.force_limit
         pace = Pace(*self.gains[-len(Pace._fields) :])
-        self._learner = SpanLearner(pace, numbers, answers, interval * span_rate, limit, lanes)
+        self._model, self._speed, self._learns_at = model, context.speed, context.speed
+        self._learner = SpanLearner(pace, *self._at(context.speed), limit, lanes)
+        span_rate = context.speed / context.alignment.mean_length
         self._sampled = Sampled(model, interval)
         self._state = np.zeros((self._sampled.size, lanes))
         self._from_average = FromAverage(interval, 1 / span_rate)
         self._washout = Washout(WASHED, interval, limit, (lanes,))
         self._counted = np.zeros(lanes)
 
+    def _at(self, speed: float) -> tuple[Array, NDArray[np.complex128], float]:
+        """Numbers of the harmonics, responses to them, and spans per control step, at a speed (m/s)."""
+        span_rate = speed / self.context.alignment.mean_length
+        numbers = harmonics(span_rate)
+        answers = self.answers(self._model, numbers * span_rate)
+        return numbers, answers, self.context.control_interval * span_rate
+
+    def _follow(self, speed: float) -> None:
+        """Learn at the measured speed (m/s) where it is another one."""
+        self._speed += self.context.control_interval / SMOOTHED * (speed - self._speed)
+        if abs(self._speed / self._learns_at - 1) > ANOTHER and self._speed > 0:
+            self._learns_at = self._speed
+            self._learner.at_another_speed(*self._at(self._speed))
+
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
+        self._follow(float(self.read(observations, "speed").mean()))
         error = self._from_average(self.read(observations, "contact force"))
         if self._counts:
             way = self.read(observations, "speed") * self.context.control_interval

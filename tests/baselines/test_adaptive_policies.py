@@ -19,7 +19,7 @@ from panto_baselines.policies.feedback import ProportionalDerivative, TunedPropo
 from panto_baselines.policies.line_model import OUTPUTS, Sampled
 from panto_baselines.policies.repetitive import LISTENING, Repetitive
 from panto_baselines.tuning.tune import MEAN_TOLERANCE, Still, run_batch
-from panto_env import InputError
+from panto_env import InputError, simulate
 from panto_env.control.settings import run_settings
 
 from .laws import CONTEXT, MODEL, repeated, seen
@@ -133,3 +133,16 @@ def test_tuned_fb_ff_is_fb_ff_with_its_amplitude_and_phase() -> None:
         observation = seen(angle=angle, contact_force=force)
         expected = plain.force(observation[0]) + 2.0
         assert tuned.forces(observation)[0] == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_learning_goes_on_at_another_speed() -> None:
+    """By the sigma of its first spans, at a lower speed, it would back off for ever."""
+    given = {"speed_profile": "place:0=200,1500=280", "distance": 3600.0, "line_condition": "as-built"}
+    passive, learnt = (
+        simulate("re330", "dsa380", policy=policy, seed=1, record_droppers=False, **given)
+        .summary((40, 49))
+        .std
+        for policy in (None, "repetitive")
+    )
+    assert learnt < 0.75 * passive

@@ -20,6 +20,9 @@ BUILT = {
 FIRST, LATE = (10, 19), (40, 49)
 
 
+RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK"]
+
+
 def changes(line, pantograph, speed_kmh, policy, seed=0, late=True, **more):
     """Change of sigma (%) from passive in the first window, and in one that is far behind."""
     windows = (FIRST, LATE) if late else (FIRST,)
@@ -89,7 +92,7 @@ def test_it_listens_first_and_then_does_what_the_policy_does():
         **BUILT | {"actuator": "ideal"},
     )
     assert not run.frame_force[run.time < guarded.LISTENING - 0.05].any()
-    acted = run.time > guarded.LISTENING + guarded.FADE_IN + 0.05
+    acted = run.time > guarded.LISTENING + guarded.PROBE + 0.05
     assert np.abs(run.frame_force[acted]).max() == pytest.approx(10.0)
 
 
@@ -111,8 +114,11 @@ def test_a_policy_that_diverges_far_behind_the_window_is_stopped_and_comes_back(
 @pytest.mark.slow
 @pytest.mark.parametrize("policy", ["agent-any-line", "agent-any-pantograph"])
 def test_at_home_it_costs_little(policy):
-    plain, own = (changes("en50318-2002", "dsa380", 280.0, each) for each in (policy, f"guarded:{policy}"))
-    assert own[0] < plain[0] + 3.0  # the first seconds are listened to, and an early pause may follow
+    plain, own = (
+        np.mean([changes("en50318-2002", "dsa380", 280.0, each, seed) for seed in range(3)], axis=0)
+        for each in (policy, f"guarded:{policy}")
+    )
+    assert own[0] < plain[0] + 2.5  # the first seconds are listened to and probed, and a pause may follow
     assert own[1] < plain[1] + 1.0
 
 
@@ -132,11 +138,8 @@ def test_it_is_better_under_silent_sensors(fault):
 @pytest.mark.parametrize(
     ("rules", "case"),
     [
-        (["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD"], ("ln2", "dsa250", 220.0, "guarded:pd")),
-        (
-            ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHIFT"],
-            ("sweden-st15", "dsa250", 160.0, "guarded:agent-any-line"),
-        ),
+        (RULES, ("ln2", "dsa250", 220.0, "guarded:pd")),
+        ([*RULES, "SHIFT"], ("sweden-st15", "dsa250", 160.0, "guarded:agent-any-line")),
     ],
 )
 def test_without_its_rules_it_fails(rules, case, monkeypatch):
@@ -164,3 +167,14 @@ def test_a_file_cannot_name_code_within_another_policy_s_parameters(name):
 def test_a_line_without_wires_is_refused():
     with pytest.raises(InputError, match="has no wires with mass and tension"):
         simulate("periodic-stiffness", "three-mass", 200.0, policy="guarded:pd", distance=300.0)
+
+
+@pytest.mark.slow
+def test_a_changing_speed_is_no_harm():
+    """What it heard while passive at a lower speed is no measure of a higher one."""
+    given = BUILT | {"speed_profile": "place:0=160,2500=280", "distance": 3600.0, "seed": 1}
+    passive, alone, guarded_too = (
+        simulate("re330", "dsa380", policy=policy, **given).summary((20, 54)).std
+        for policy in (None, "agent-any-pantograph", "guarded:agent-any-pantograph")
+    )
+    assert alone < guarded_too < passive - 0.7 * (passive - alone)
