@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import groupby
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby, pairwise
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +80,9 @@ def tables(outcome: Benchmark) -> RenderableType:
     legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
     harm = as_rich(harm_table(outcome.settings.title, outcome.standings))
     along = [as_rich(each) for each in kilometre_tables(outcome.settings.title, outcome.cells)]
+    lines = [line.model_dump() for line in outcome.settings.lines]
+    if (margins := margins_table(outcome.settings.title, lines, outcome.cells)) is not None:
+        along.append(as_rich(margins))
     return Group(
         *parts, *along, _overall(outcome), harm, *reasons, Text(f"{legend} {LEGEND_OF_HARM}", style="dim")
     )
@@ -95,6 +98,38 @@ def kilometre_tables(title: str, cells: Sequence[Cell]) -> list[TextTable]:
             rows = [(cell.policy, *(number(change, 0) for change in cell.kilometres)) for cell in found]
             tables.append(TextTable(f"{title}: Δσ (%) by kilometre, {place.name}", headings, rows))
     return tables
+
+
+def margins_table(title: str, lines: Sequence[Mapping[str, Any]], cells: Sequence[Cell]) -> TextTable | None:
+    """Table of the values of each sweep at which policies meet the passive pantograph; None without sweeps.
+
+    A value is linear between two cases; one that no case reaches is behind a >. lines: of the settings, as
+    plain data.
+    """
+    names = list(dict.fromkeys(name for line in lines for name in line.get("sweep", {})))
+    if not names:
+        return None
+    policies = list(dict.fromkeys(cell.policy for cell in cells if cell.policy != REFERENCE))
+    of_case = {(cell.policy, cell.case): cell.change for cell in cells}
+    rows = []
+    for policy in policies:
+        row = [policy]
+        for name in names:
+            found = sorted(
+                (line["sweep"][name], line["case"]) for line in lines if name in line.get("sweep", {})
+            )
+            changes = [of_case[policy, case] for _, case in found]
+            row.append(_crossing([value for value, _ in found], changes))
+        rows.append(tuple(row))
+    return TextTable(f"{title}: where Δσ is 0", ("policy", *names), rows)
+
+
+def _crossing(values: Sequence[float], changes: Sequence[float]) -> str:
+    """The value at which changes, in the order of the values, first rise above 0."""
+    for (low, before), (high, after) in pairwise(zip(values, changes, strict=True)):
+        if after > 0:
+            return f"{low:g}" if before > 0 else f"{low + (high - low) * before / (before - after):.3g}"
+    return f"> {values[-1]:g}"
 
 
 def spans_in_words(windows: Windows) -> str:

@@ -187,6 +187,12 @@ class Line(LineAndTrain):
         'such as faults = "force-silent", or a speed_profile instead of the speeds',
     )
 
+    sweep: dict[str, float] = Field(
+        {},
+        description="what the case changes and its value, such as { 'delay (ms)' = 20 }: from cases of one "
+        "name a table has the value at which a policy meets the passive pantograph",
+    )
+
     @field_validator("run")
     @classmethod
     def _of_runs(cls, value: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from panto_env.base.table import Table
 from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
-from ..benchmark.report import FIGURES, harm_table, kilometre_tables
+from ..benchmark.report import FIGURES, harm_table, kilometre_tables, margins_table
 from ..benchmark.run import Result
 from ..benchmark.settings import LineAtSpeed
 from ..benchmark.single_pass import ROW_LABELS
@@ -241,9 +241,11 @@ TRAINING = "· "
 
 
 def tables_of(result: Result) -> list[Table]:
-    """Tables of a track for a document: summary, harm, and kilometres where they were compared."""
+    """Tables of a track for a document: summary and harm, and kilometres and margins where it has them."""
     along = kilometre_tables(result.title, result.cells)
-    return [summary(result), harm_table(result.title, result.by_rank), *along]
+    margins = margins_table(result.title, result.settings.get("lines", ()), result.cells)
+    harm = harm_table(result.title, result.by_rank)
+    return [summary(result), harm, *along, *([] if margins is None else [margins])]
 
 
 def summary(result: Result) -> Table:

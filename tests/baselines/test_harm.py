@@ -8,7 +8,7 @@ import pytest
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.harm import harm_of, window_changes
 from panto_baselines.benchmark.overall import standings
-from panto_baselines.benchmark.report import harm_table, kilometre_tables
+from panto_baselines.benchmark.report import harm_table, kilometre_tables, margins_table
 from panto_baselines.benchmark.run import evaluated_windows
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows, load_benchmark
 from panto_baselines.benchmark.statistics import compare
@@ -179,6 +179,24 @@ def test_kilometres_are_compared_one_by_one():
     assert done.rows[1].as_dict()["km_2"] == active.kilometres[1]
     (table,) = kilometre_tables("track", done.cells)
     assert table.cells == [("pd:washout=1", *(f"{100 * change:.0f}" for change in active.kilometres))]
+
+
+def test_margins_are_where_a_policy_meets_the_passive_pantograph():
+    lines = [
+        {"case": "none", "sweep": {"delay (ms)": 0, "gain": 1}},
+        {"case": "a", "sweep": {"delay (ms)": 20}},
+    ]
+    lines += [{"case": "b", "sweep": {"delay (ms)": 40}}, {"case": "c", "sweep": {"gain": 2}}, {"case": "d"}]
+    stds = {"none": 0.8, "a": 0.9, "b": 1.05, "c": 0.9, "d": 2.0}
+    rows = [
+        replace(row(name, std=std), case=case)
+        for case, own in stds.items()
+        for name, std in (("passive", 1), ("p", own))
+    ]
+    table = margins_table("track", lines, compare(rows))
+    assert table.headings == ("policy", "delay (ms)", "gain")
+    assert table.cells == [("p", f"{20 + 20 * 10 / 15:.3g}", "> 2")]
+    assert margins_table("track", [{"case": "d"}], compare(rows)) is None
 
 
 CHEATS = '''

@@ -56,7 +56,7 @@ def printed():
     made = sorted(cells(), key=lambda cell: cell.speed_kmh)
     own = [with_figures(cell, number) for number, cell in enumerate(made)]
     other = [replace(cell, catenary="c", seeds=1, oracle=None) for cell in own]
-    settings = SimpleNamespace(title="made up")
+    settings = SimpleNamespace(title="made up", lines=())
     outcome = SimpleNamespace(
         cells=(*own, *other),
         windows=(Windows((3, 7)), Windows((2, 4), (9, 11))),
