@@ -45,14 +45,14 @@ def result(**changes):
     cells, traces, standings = [], [], []
     for speed in (250.0, 300.0):
         for rank, (policy, (change, reason)) in enumerate(POLICIES.items(), 1):
-            where = {"policy": policy, "catenary": "ln2", "pantograph": "cx", "speed_kmh": speed}
+            where = {"policy": policy, "catenary": "ln2", "pantograph": "cx", "speed_kmh": speed, "case": ""}
             figures = {"std": 30 + change, "effort": abs(change), "mean": None}
             cells.append(
                 where
                 | {"seeds": 2, "nominal_force": 120.0, "figures": figures, "change": change, "interval": None}
                 | {"cost_change": change, "mean_change": 0.5, "improved": 1.0, "disqualified": reason}
                 | {"moved": 1, "most_moved": 2.0, "oracle": None, "oracle_share": None}
-                | {"early": change, "late": None, "harm": HARM}
+                | {"early": change, "late": None, "harm": HARM, "kilometres": []}
                 | {"rank": None if reason else rank, "spread": 1.0}
             )
             along = {"position": [0.0, 50.0, 100.0], "force": [100.0, 120.0 + change, 140.0]}

@@ -113,22 +113,23 @@ def cells():
             "early": change,
             "late": None,
             "harm": None,
+            "kilometres": (),
             "spread": 0.0,
             "oracle": None,
             "oracle_share": None,
             "disqualified": "moved" * (k == 5),
             "rank": None,
         }
-        yield Cell(policy, "a", "b", speed, 4, 120.0, figures, change, interval, **rest)
+        yield Cell(policy, "a", "b", "", speed, 4, 120.0, figures, change, interval, **rest)
 
 
 def benchmark():
-    line = SimpleNamespace(catenary="a", pantograph="b", speeds_kmh=(250.0, 300.0))
+    line = SimpleNamespace(catenary="a", pantograph="b", case="", speeds_kmh=(250.0, 300.0))
     settings = SimpleNamespace(
         lines=(line,), drawn_seeds=(3, 4), policies_on=lambda line: ("passive", "p", "q")
     )
     rows = [
-        SimpleNamespace(policy=policy, catenary="a", pantograph="b", speed_kmh=300.0, seed=3)
+        SimpleNamespace(policy=policy, catenary="a", pantograph="b", case="", speed_kmh=300.0, seed=3)
         for policy in ("passive", "p", "q")
     ]
     outcome = SimpleNamespace(
