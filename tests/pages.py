@@ -67,3 +67,29 @@ def number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return math.nan
+
+
+def nearest(headings: list[str], shown: list[str], printed: list[list[str]]) -> list[str]:
+    """The printed row that a page's row is of: most alike from the left, then nearest in numbers."""
+
+    def distance(other: list[str]) -> tuple[int, float]:
+        pairs = list(zip(shown, other, strict=True))
+        alike = next((k for k, (a, b) in enumerate(pairs) if a != b), len(pairs))
+        numbers = [(number(a), number(b)) for a, b in pairs]
+        return -alike, sum(abs(a - b) / (abs(a) + abs(b) + 1e-9) for a, b in numbers if a == a and b == b)
+
+    return min(printed, key=distance)
+
+
+def rewrite(page: str, printed: dict[str, Table]) -> None:
+    """Write a page's tables anew, row by row, from those of its study. Look at what changed."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    for title, (headings, rows) in tables_of(page).items():
+        columns = [printed[title].headings.index(heading) for heading in headings]
+        found = [[row[column] for column in columns] for row in printed[title].cells]
+        for row in rows:
+            if not any(same_row(title, headings, row, other) for other in found):
+                old, new = (f"| {' | '.join(cells)} |" for cells in (row, nearest(headings, row, found)))
+                assert old in text, old
+                text = text.replace(old, new)
+    (DOCS / page).write_text(text, encoding="utf-8")
