@@ -141,7 +141,7 @@ def next_in_ranking(found: Sequence[Standing]) -> dict[str, str]:
 
 def _clusters(rows: Sequence[Row]) -> Clusters:
     """Lines and seeds of the passes of one policy."""
-    names = [(row.catenary, row.pantograph, row.case) for row in rows]
+    names = [(row.catenary, row.pantograph) for row in rows]  # a seed is one line in all cases
     lines = list(dict.fromkeys(names))
     line = [lines.index(name) for name in names]
     return Clusters(np.array(line), np.array([row.seed for row in rows]))

@@ -107,6 +107,8 @@ MATTER = (
     "actuator",
     "line_condition",
     "speed_drift",
+    "speed_profile",
+    "faults",
     "mean_force",
     "run_in",
     "pantograph_scatter",

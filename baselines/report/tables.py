@@ -315,6 +315,7 @@ def _text(cells: Sequence[Cell]) -> str:
     change, moved = mean(cell.change for cell in cells), mean(cell.mean_change for cell in cells)
     if isnan(change):
         return "ended early"
-    if any(cell.disqualified for cell in cells):
-        return f"({change:.1f}; mean {moved:+.1f})"
+    reasons = [cell.disqualified for cell in cells if cell.disqualified]
+    if reasons:
+        return f"({change:.1f}; mean {moved:+.1f})" if "mean force" in reasons[0] else f"({change:.1f})"
     return f"{change:.1f}{' *' if cells[0].rank == 1 and len(cells) == 1 else ''}"
