@@ -117,12 +117,13 @@ class _Hashed(tuple[Any, ...]):
         return self._hash
 
 
-def remembered(function: F) -> F:
+def remembered(function: F, most: int = KEPT) -> F:
     """Cache a function's results, which must not be changed, for calls with equal arguments.
 
-    A call with arguments that have no hash, such as data with a list, is not cached.
+    A call with arguments that have no hash, such as data with a list, is not cached. most: number of results
+    that are kept.
     """
-    kept = lru_cache(maxsize=KEPT)(lambda arguments: function(*arguments))
+    kept = lru_cache(maxsize=most)(lambda arguments: function(*arguments))
 
     @wraps(function)
     def look_up(*arguments: Any) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -335,7 +335,11 @@ class Layout:
         return all_of_them.some(order, carrying)
 
 
-@remembered
+LAYOUTS = 64
+"""Layouts that are kept: a line of thirty kilometres has some 25 tension lengths, each with its own."""
+
+
+@partial(remembered, most=LAYOUTS)
 def layout_of(line: FlexibleCatenaryData, spans: int) -> Layout:
     """The layout of a line of its sequence, or of a number of equal spans.
 
