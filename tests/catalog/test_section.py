@@ -12,7 +12,7 @@ from panto_env import InputError, simulate
 from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
-from panto_env.catalog.section import Bridge, Masts, lowered
+from panto_env.catalog.section import Bridge, Kinds, Masts, lowered
 from panto_env.plant.catenary.flexible.static import hang
 
 NAMES = ("main-line", "fast-line")
@@ -314,3 +314,23 @@ def test_on_the_ramps_of_the_bridge_the_damper_to_the_ground_changes_the_mean_fo
     down, up = run.summary((bridge - 3, bridge - 1)).mean, run.summary((bridge + 1, bridge + 3)).mean
     climbed, damping = 0.25 / 165.0, load_pantograph("dsa250").dampings[-1]
     assert down - up == pytest.approx(2 * damping * run.speed * climbed, abs=2.0)
+
+
+def test_kinds_that_are_joined_have_spans_and_droppers_of_their_own():
+    plain = load_section("main-line")
+    kinds = Kinds(spans=(8, 12), share=(0.8, 1.0))
+    random = np.random.default_rng(3)
+    number, shares = kinds.draw(random, 40)
+    lengths = np.bincount(number)
+    assert lengths.sum() == 40
+    assert lengths[:-1].min() >= 8
+    assert lengths.max() <= 12
+    assert ((shares >= 0.8) & (shares <= 1.0)).all()
+    joined = plain.model_copy(update={"kinds": kinds})
+    for seed in range(3):
+        line = joined.draw(np.random.default_rng(seed))[0]
+        firsts = [span.droppers.positions[0] for span in line.layout().spans]
+        assert 3 <= len(set(firsts)) <= 6  # one for each of some 36 to 48 spans' kinds
+        assert sum(a != b for a, b in pairwise(firsts)) == len(set(firsts)) - 1
+        alone = plain.draw(np.random.default_rng(seed))[0]
+        assert len({span.droppers.positions[0] for span in alone.layout().spans}) == 1
