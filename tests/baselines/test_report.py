@@ -354,7 +354,7 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
     table = result()
     table["cells"][1] |= {"oracle": -20.0, "oracle_share": 0.5}
     table["standings"][2]["interval_for_lines"] = [-20.0, 2.0]
-    table["cells"][2] |= {"disqualified": "it presses", "mean_change": 3.2}  # pd at 250 km/h
+    table["cells"][2] |= {"disqualified": "it moves the mean force", "mean_change": 3.2}  # pd at 250 km/h
     made = summary(parse_result(table, "it"))
     overall = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
     assert made.headings == ("policy", "250 km/h", "300 km/h", *overall)
