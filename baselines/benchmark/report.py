@@ -103,14 +103,16 @@ def kilometre_tables(title: str, cells: Sequence[Cell]) -> list[TextTable]:
 def margins_table(title: str, lines: Sequence[Mapping[str, Any]], cells: Sequence[Cell]) -> TextTable | None:
     """Table of the values of each sweep at which policies meet the passive pantograph; None without sweeps.
 
-    A value is linear between two cases; one that no case reaches is behind a >. lines: of the settings, as
-    plain data.
+    A value is linear between two cases, each the mean over its speeds; one that no case reaches is behind
+    a >. lines: of the settings, as plain data.
     """
     names = list(dict.fromkeys(name for line in lines for name in line.get("sweep", {})))
     if not names:
         return None
     policies = list(dict.fromkeys(cell.policy for cell in cells if cell.policy != REFERENCE))
-    of_case = {(cell.policy, cell.case): cell.change for cell in cells}
+    of_case: dict[tuple[str, str], list[float]] = {}
+    for cell in cells:
+        of_case.setdefault((cell.policy, cell.case), []).append(cell.change)
     rows = []
     for policy in policies:
         row = [policy]
@@ -118,7 +120,7 @@ def margins_table(title: str, lines: Sequence[Mapping[str, Any]], cells: Sequenc
             found = sorted(
                 (line["sweep"][name], line["case"]) for line in lines if name in line.get("sweep", {})
             )
-            changes = [of_case[policy, case] for _, case in found]
+            changes = [float(np.mean(of_case[policy, case])) for _, case in found]
             row.append(_crossing([value for value, _ in found], changes))
         rows.append(tuple(row))
     return TextTable(f"{title}: where Δσ is 0", ("policy", *names), rows)

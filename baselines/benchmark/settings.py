@@ -186,7 +186,6 @@ class Line(LineAndTrain):
         description="settings of the runs in this case, by name, that take the place of the benchmark's, "
         'such as faults = "force-silent", or a speed_profile instead of the speeds',
     )
-
     sweep: dict[str, float] = Field(
         {},
         description="what the case changes and its value, such as { 'delay (ms)' = 20 }: from cases of one "

@@ -1,6 +1,5 @@
 """The guard's promise: python -m tests.baselines.guard [POLICY ...] [--seeds N] [--tracks T ...] [--alone].
 
-
 Policies behind the guard, on all lines, speeds, cases and journeys of the benchmark's tracks, under seeds
 that nothing was tuned on. Over any ten spans of a pass σ is to be at most 5 % above that of the passive
 pantograph, and no contact is to be lost that this keeps. --without: rules of the guard that are left out, by
@@ -65,20 +64,21 @@ def judge(policies, without, track, number, speed, seed):
     """
     warnings.simplefilter("ignore")
     for rule in without:
-        setattr(guarded, rule, 0.0 if rule in ("LOW",) else math.inf)
+        setattr(guarded, rule, 0.0 if rule == "LOW" else math.inf)
     settings = load_benchmark(f"benchmark/{track}")
     arguments = _arguments(settings, settings.lines[number], speed, seed)
     passive, *runs = (simulate(policy=each, **arguments) for each in (None, *policies))
     found = []
     for run in runs:
-        worst = (-math.inf, 0, 0)
+        worst, lost_alone = (-math.inf, 0), 0
         for own, than in zip(run.train, passive.train, strict=True):
             (std, lost), (quiet, lost_too) = sliding(own), sliding(than)
             length = min(len(std), len(quiet))
             changes = 100 * (std[:length] / quiet[:length] - 1)
-            most, lost_alone = int(np.argmax(changes)), int(np.sum(lost[:length] & ~lost_too[:length]))
-            worst = max(worst, (float(changes[most]), most + 3, lost_alone))
-        found.append(worst)
+            most = int(np.argmax(changes))
+            worst = max(worst, (float(changes[most]), most + 3))
+            lost_alone += int(np.sum(lost[:length] & ~lost_too[:length]))  # of any pantograph of a train
+        found.append((*worst, lost_alone))
     return found
 
 
