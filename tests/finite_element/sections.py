@@ -149,7 +149,9 @@ def sections() -> dict[str, Section]:
         "bridge": Section(line_of("benchmark-2015", BRIDGE), pantograph("dsa380"), 250.0),
         "both": Section(line_of("re330", BOTH), pantograph("cx"), 250.0),
         "stitched-330": Section(stitched("re330", STITCHED_330), pantograph("cx"), 300.0, spans=(4, 9)),
-        "stitched-250": Section(stitched("re250", STITCHED_250), pantograph("dsa250"), 200.0, spans=(4, 9)),
+        "stitched-250": Section(
+            stitched("re250", STITCHED_250), pantograph("dsa250"), 200.0, spans=(4, 9), element=0.35
+        ),
         "some-stitched": Section(line_of("re330", SOME_STITCHED), pantograph("cx"), 250.0),
         "overlap-2002": Section(
             line_of("en50318-2002", overlap(6, 0.1, 0.5)), pantograph("en50318-2002"), 250.0
