@@ -1,7 +1,9 @@
-"""Types of numeric arrays in signatures; shapes are given in docstrings and comments."""
+"""Types of numeric arrays in signatures; shapes are given in docstrings and comments. Sparse zeros."""
 
 from __future__ import annotations
 
+import math
+import mmap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -42,3 +44,20 @@ def one_thread() -> Iterator[None]:
     """
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+SPARSE = 1 << 24
+"""Bytes from which on zeros are sparse."""
+
+
+def sparse_zeros(shape: tuple[int, ...]) -> Array:
+    """Zeros that take memory only where they are written to, in pages of some kilobytes.
+
+    NumPy asks the system for pages of two megabytes, of which one number that is written takes all.
+    """
+    size = math.prod(shape) * np.dtype(float).itemsize
+    if size < SPARSE or not hasattr(mmap, "MADV_NOHUGEPAGE"):
+        return np.zeros(shape)
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    memory.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.ndarray(shape, buffer=memory)

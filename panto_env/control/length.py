@@ -43,8 +43,8 @@ class Cost(NamedTuple):
     def of(cls, lanes: int, steps: float, supports: int, droppers: int, moving: float, record: bool) -> Cost:
         """Cost of a run in all lanes.
 
-        steps: time steps. supports, droppers: numbers of those recorded. moving: numbers in the state of all
-        lanes together. record: whether all steps are recorded.
+        steps: time steps. supports, droppers: numbers of those recorded in each step. moving: numbers in
+        the state of all lanes together. record: whether all steps are recorded.
         """
         columns = SAMPLE_ROWS + supports + droppers
         memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize

@@ -89,9 +89,8 @@ def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int,
         row = np.array([lane * task.agents])
         if diverged(task, row, deviation[None], highest[None])[0]:
             raise InputError(divergence(task, lane))
-    uplift, tension = (
-        each[lane, 1 : steps + 1][on_line] for each in (task.samples.uplift, task.samples.tension)
-    )
+    uplift = task.samples.uplift[lane, :, 1 : steps + 1][:, on_line].T
+    tension = task.samples.tension[lane, 1 : steps + 1][on_line]
     controlled, several = collector in task.episode.controlled, task.settings.pantographs
     design: dict[str, Any] = {"catenary": by_value(plant.catenary), "pantograph": by_value(pantograph)}
     target = target_mean(task.settings, float(task.speed[lane]), collector)

@@ -134,8 +134,8 @@ def add_sample_to_figures(running, samples, own, task, now, lane, own_peak):
     highest = 0.0
     filtered, nominal_force = low_pass(running, task, own[ROW.CONTACT_FORCE]), own[ROW.NOMINAL_FORCE]
     if running.peak.shape[1] > 0:
-        row = min(int(own[ROW.STEP]), samples.uplift.shape[1] - 1) & NOT_NEGATIVE
-        peak, uplift = running.peak[own_peak], samples.uplift[lane, row]
+        row = min(int(own[ROW.STEP]), samples.uplift.shape[2] - 1) & NOT_NEGATIVE
+        peak, uplift = running.peak[own_peak], samples.uplift[lane, :, row]
         for s in range(peak.size):
             peak[s] = max(peak[s], uplift[s])
             highest = max(highest, uplift[s])

@@ -128,10 +128,13 @@ class Task:
 
     def _cost(self, plant: Plant, lanes: int) -> Cost:
         steps, supports = self.length.most_plant_steps, len(plant.model.supports)
+        window = plant.model.grid.get("window", supports)
+        near = min(supports, int(window) + 2)  # those of the others take no memory
         droppers = len(plant.model.droppers) if self.record_droppers else 0
         moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
-        cost = Cost.of(lanes, steps, supports, droppers, moving, self.keep_samples)
-        cost.check(f"{steps:,.0f} time steps with {supports} supports")
+        cost = Cost.of(lanes, steps, near, droppers, moving, self.keep_samples)
+        remedy = ", or keep no dropper's tension (record_droppers=False)" if droppers else ""
+        cost.check(f"{steps:,.0f} time steps with {supports} supports and {droppers} droppers", remedy)
         return cost
 
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:

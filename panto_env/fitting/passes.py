@@ -274,7 +274,7 @@ class Passes:
     def _samples(self, plant: Plant) -> Samples:
         return Samples(
             rows=np.zeros((plant.lanes, self.steps + 1, 1, SAMPLE_ROWS)),
-            uplift=np.zeros((plant.lanes, self.steps + 1, 0)),
+            uplift=np.zeros((plant.lanes, 0, self.steps + 1)),
             tension=np.zeros((plant.lanes, self.steps + 1, 0), dtype=np.float32),
         )
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..backend import aligned_zeros, bind, copy_whole, pack
-from ..base.arrays import Array, Index, Lanes
+from ..base.arrays import Array, Index, Lanes, sparse_zeros
 from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
 from .catenary.flexible.scattered_build import slots_of_links
@@ -247,13 +247,14 @@ class Plant:
         droppers = len(self.model.droppers) if tension else 0
         return Samples(
             rows=np.zeros((self.lanes, rows, len(self.train.collectors), SAMPLE_ROWS)),
-            uplift=np.zeros((self.lanes, rows, len(self.model.supports))),
+            uplift=sparse_zeros((self.lanes, len(self.model.supports), rows)),
             tension=np.zeros((self.lanes, rows, droppers), dtype=np.float32),
         )
 
     def clear(self, samples: Samples, lanes: Array) -> None:
         """Reset the samples of lanes, (n,), to rest: kernels write only what lies within the window."""
-        samples.uplift[lanes] = 0.0
+        used = lanes if samples.rows.shape[1] == 1 else lanes[samples.rows[lanes, 1].any(axis=(1, 2))]
+        samples.uplift[used] = 0.0  # memory that is fresh stays untouched
         if samples.tension.shape[2]:
             for lane in lanes.tolist():
                 samples.tension[lane] = self.model.rest_tension(lane)

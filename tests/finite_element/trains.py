@@ -72,7 +72,7 @@ class Case:
                 middle * plant.time_step,
                 plant.position(0, middle, number),
                 samples.rows[0, 1:, number, Row.CONTACT_FORCE],
-                samples.uplift[0, 1:],
+                samples.uplift[0, :, 1:].T,
                 np.asarray(plant.model.supports),
             )
             for number in range(len(self.collectors))

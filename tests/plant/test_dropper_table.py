@@ -82,7 +82,7 @@ def test_tension_is_recorded_of_every_dropper_and_only_on_request(name):
     assert (droppers > 0) == (name == "en50318-2002")
     assert plant.samples(5).tension.shape == (2, 5, 0)
     assert plant.samples(5, tension=True).tension.shape == (2, 5, droppers)
-    assert plant.samples(5).uplift.shape == (2, 5, len(plant.model.supports))
+    assert plant.samples(5).uplift.shape == (2, len(plant.model.supports), 5)
     assert plant.samples(5).rows.shape[:2] == (2, 5)
     if name != "periodic-stiffness":  # a massless line keeps no tension at all
         plant.start(np.arange(2), 50.0)

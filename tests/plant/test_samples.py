@@ -144,7 +144,7 @@ def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
         plant.start(0, speed)
         plant.clear(samples, np.array([0]))
         plant.advance_passively(steps, samples)
-        return samples.uplift[0, 1 : steps + 1].copy()
+        return samples.uplift[0, :, 1 : steps + 1].T.copy()
 
     steps = 400
     used, fresh = (

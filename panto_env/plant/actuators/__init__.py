@@ -1,7 +1,7 @@
 """Actuators on the pantograph: one kind per file, found by ``kind`` in its table.
 
 A new kind is a module here, with its settings, its arrays, its source of ``drive`` and a ``KIND``; and its
-name in ``KINDS``.
+name in ``KINDS``. ``ACTUATOR_PRESETS`` has the names that users give instead of a table.
 """
 
 from __future__ import annotations
