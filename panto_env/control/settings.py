@@ -5,6 +5,7 @@ The arguments in Python, the tables of trainings and benchmarks, and the command
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -22,7 +23,7 @@ from ..catalog import load_lines, load_pantograph
 from ..catalog.loader import Lines
 from ..estimation.model import ESTIMATORS, EstimatorSettings
 from ..metrics.figures import LAST_USUAL
-from ..plant.actuators import ActuatorSettings, actuator_settings
+from ..plant.actuators import ACTUATOR_PRESETS, ActuatorSettings, actuator_settings
 from ..plant.catenary import CATENARIES, CatenaryData
 from ..plant.catenary.schema import check_span_count
 from ..plant.line_condition import LINE_CONDITIONS, LineCondition, together
@@ -224,7 +225,8 @@ class RunSettings(Numerics):
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
         validate_default=True,
-        description='actuator: "ideal", "realistic", "head-motor", one with values such as '
+        description="actuator: "
+        f"{', '.join(map(json.dumps, ACTUATOR_PRESETS))}, one with values such as "
         '"realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(

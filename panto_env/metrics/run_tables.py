@@ -24,15 +24,6 @@ from .low_pass import low_pass
 from .trajectory import SERIES, Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"
-UNITS = {
-    "time": "s",
-    "contact_force": "N",
-    "frame_force": "N",
-    "head_force": "N",
-    "head_velocity": "m/s",
-    "frame_velocity": "m/s",
-}
-"""Units of ``SERIES``; of others, m."""
 RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")
 """What identifies a run in a table of several."""
 
@@ -56,7 +47,7 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
         last = f"{FILTERED}@{number}" if behind else FILTERED
         columns |= series | {last: filtered}
         headings |= {
-            key: f"{name}{whose} ({UNITS.get(name, 'm')})" for key, name in zip(series, SERIES, strict=True)
+            key: f"{name}{whose} ({unit})" for key, (name, unit) in zip(series, SERIES.items(), strict=True)
         }
         headings[last] = f"{FILTERED}{whose} to 20 Hz (N)"
     measured = [("uplift", run.support_position, "m")]

@@ -149,7 +149,7 @@ def read(path: str | Path) -> Trajectory:
 
 def _follower_of(first: Trajectory, columns: Mapping[str, Array], number: int, facts: Any) -> Trajectory:
     """The inverse: the record from a file's columns, and what it has of its own."""
-    on_line = ~np.isnan(columns[f"{SERIES[0]}@{number}"])
+    on_line = ~np.isnan(columns[f"time@{number}"])
     series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
     shared = {name: getattr(first, name)[on_line] for name in OF_PLACES}
     own: dict[str, Any] = {**series, **shared, **facts}

@@ -27,8 +27,19 @@ SUFFIXES = (".parquet",)
 """Suffixes of the file of a saved run, which can be read again."""
 OUTPUTS = (*SUFFIXES, ".csv", ".xlsx")
 """Suffixes of files that a run can be written to."""
-SERIES: tuple[str, ...] = ("time", "position", "contact_force", "head", "frame", "wire")
-SERIES += ("head_velocity", "frame_velocity", "frame_force", "head_force")
+SERIES = {
+    "time": "s",
+    "position": "m",
+    "contact_force": "N",
+    "head": "m",
+    "frame": "m",
+    "wire": "m",
+    "head_velocity": "m/s",
+    "frame_velocity": "m/s",
+    "frame_force": "N",
+    "head_force": "N",
+}
+"""Units of the series of a run, in the order of a file's columns."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +146,8 @@ class Trajectory:
         force = self.contact_force[inside]
         found = statistics(low_pass(self.contact_force, self.time_step)[inside])
         near = (self.support_position > begin - 1e-6) & (self.support_position < end + 1e-6)
-        uplift = self.uplift[: np.flatnonzero(inside)[-1] + 1, near]
+        until = np.flatnonzero(inside)[-1] + 1
+        uplifts = [self.uplift[:until, k].max() for k in np.flatnonzero(near[: self.uplift.shape[1]])]
         frame, head = self.frame_force[inside], self.head_force[inside]
         frame_change, head_change = np.diff(frame), np.diff(head)
         ways = np.diff(self.position[inside]) if self.identity.drifts else self.stride
@@ -144,7 +156,7 @@ class Trajectory:
             **found,
             statistical_max=found["mean"] + 3 * found["std"],
             statistical_min=found["mean"] - 3 * found["std"],
-            max_uplift=float(uplift.max()) if uplift.size else float("nan"),
+            max_uplift=float(max(uplifts, default=math.nan)),
             contact_loss=contact_loss(force),
             cost_function=cost_function(force, self.lift[inside], ways),
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
