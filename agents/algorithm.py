@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive, Settings
+from panto_env.policies import find_policy
 
 from .model_file import Actor, RecurrentActor
 
@@ -53,6 +54,8 @@ class CloningError(Settings):
 class Algorithm(Settings, ABC):
     """Hyperparameters, named as in Stable-Baselines3; a subclass is an algorithm."""
 
+    takes_over: ClassVar[bool] = False  # whether a new learner begins as the network that it starts from
+
     learning_rate: Positive | tuple[Positive, Positive] = Field(
         3e-4, description="step of the optimiser; two numbers: linearly from the first to the second"
     )
@@ -76,7 +79,11 @@ class Algorithm(Settings, ABC):
         """The learner's deterministic policy."""
 
     def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
-        """Fit a new learner to a policy's demonstrations, unless ``check`` refuses it."""
+        """Fit a new learner to a policy's demonstrations, unless it takes over the network."""
+        raise NotImplementedError
+
+    def begin_as(self, model: Any, agent: str) -> None:
+        """Give a new learner the network of an agent, of which ``check`` made sure that it fits."""
         raise NotImplementedError
 
     def check(self, training: Training) -> None:
@@ -235,6 +242,8 @@ class APG(Algorithm):
     not the reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
     """
 
+    takes_over: ClassVar[bool] = True
+
     updates: Count = Field(100, description="steps of the optimiser in a round")
     rounds_kept: Count = Field(4, description="rounds whose passes are learnt from")
     rate_weight: NonNegative = Field(
@@ -267,15 +276,45 @@ class APG(Algorithm):
 
     def check(self, training: Training) -> None:
         """Raise InputError for parts of a training that passes have no use for."""
-        if training.start_from:
-            raise InputError(
-                "apg starts from nothing; leave out start_from, or add to a policy by residual_of"
-            )
+        if training.start_from is not None:
+            self._check_shape(training.start_from)
         if (training.lines, training.episodes_per_line) != (None, 1):
             raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
+
+    def _check_shape(self, agent: str) -> None:
+        """Raise InputError unless an agent's network has the shape of a learner's."""
+        actor = _actor_of(agent)
+        cell = actor.cell if isinstance(actor, RecurrentActor) else None
+        units = 0 if cell is None else cell.weight_state.shape[1]
+        widths = tuple(len(each) for each in actor.biases[:-1])
+        if (widths, units, actor.activation) != (self.net_arch, self.recurrent_units, self.activation):
+            raise InputError(
+                f"the network of '{agent}' has another shape; set net_arch = {list(widths)}, "
+                f'recurrent_units = {units} and activation = "{actor.activation}"'
+            )
+
+    def begin_as(self, model: Any, agent: str) -> None:
+        """Give a new learner the network of an agent."""
+        actor = _actor_of(agent)
+        pairs = [each for pair in zip(actor.weights, actor.biases, strict=True) for each in pair]
+        cell = actor.cell if isinstance(actor, RecurrentActor) else ()
+        model.network.take([*pairs[:2], *cell, *pairs[2:]])
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""
         plain = self.actor_from_layers(model.network.first, model.network.rest).squash()
         cell = model.network.arrays()
         return plain if cell is None else RecurrentActor(**vars(plain), cell=cell)
+
+
+def _actor_of(agent: str) -> Actor:
+    """Network of an agent. Raises InputError for a policy that is not one network alone."""
+    from .policy import TrainedPolicy
+
+    found = find_policy(agent)
+    if isinstance(found, TrainedPolicy) and found.facts.residual_of is None and not found.facts.steps_before:
+        return found.actor
+    raise InputError(
+        f"apg starts from the network of an agent that acts alone, which '{agent}' is not; or it adds to a "
+        "policy by residual_of"
+    )

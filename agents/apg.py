@@ -74,6 +74,12 @@ class Network(nn.Module):  # type: ignore[misc]
         rest = tuple(others[::2]), tuple(others[1::2])
         return Weights(first, first_bias, cell[0], biases[0], cell[1], biases[1], *rest, relu)
 
+    def take(self, arrays: Sequence[Numbers]) -> None:
+        """Set all parameters, in their order."""
+        with torch.no_grad():
+            for own, given in zip(self.parameters(), arrays, strict=True):
+                own.copy_(torch.from_numpy(given))
+
     def arrays(self) -> Cell | None:
         """The cell's arrays, if it has one."""
         if self.cell is None:

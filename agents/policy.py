@@ -69,7 +69,7 @@ class TrainedPolicy:
         """path: of the model file. Raises InputError where its base policy would run code from a path."""
         if facts.residual_of is not None:
             check_named(facts.residual_of, path)
-        self.path, self.facts = path, facts
+        self.path, self.facts, self.actor = path, facts, actor
         self._policy = policy_of(actor, facts)
         for name in SETTINGS:
             setattr(self, name, getattr(facts.needs, name))

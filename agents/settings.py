@@ -73,7 +73,9 @@ class Training(Settings):
     )
     evaluation: Evaluation
     start_from: str | None = Field(
-        None, description="policy whose actions the agent learns before it learns from rewards"
+        None,
+        description="policy whose actions the agent learns before it learns from rewards; with algorithm apg "
+        "an agent whose network it takes over and trains further",
     )
     cloning: Cloning = Field(Cloning(), description="how it learns them")
     residual_of: str | None = Field(None, description="policy that the agent's action is added to")
@@ -175,7 +177,7 @@ def _check(training: Training) -> None:
         raise InputError(f"[environment]: {error}") from error
     if training.start_from is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
-    if training.start_from is not None and training.variants:
+    if training.start_from is not None and training.variants and not training.hyperparameters.takes_over:
         raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)
     for name in (training.start_from, training.residual_of):

@@ -200,9 +200,12 @@ class Run:
         self.model.get_env().seed(lane_seeds(self.training, self.model.num_timesteps)[0])
 
     def begin_with_policy(self) -> None:
-        """Fit a new learner to the policy that it starts from, and store the error."""
+        """Give a new learner the network it starts from, or fit it to that policy and store the error."""
         training, name = self.training, self.training.start_from
         if name is None or self.model.num_timesteps > 0:
+            return
+        if training.hyperparameters.takes_over:
+            training.hyperparameters.begin_as(self.model, name)
             return
         native, steps = self.model.get_env().unwrapped.env, training.cloning.steps
         seeds = lane_seeds(training)

@@ -236,10 +236,33 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     assert second.updates / first.updates == second.steps / first.steps  # all rounds are alike
 
 
+@pytest.mark.parametrize("units", [0, 4])
+def test_a_training_goes_on_with_the_network_that_it_starts_from(units, tmp_path):
+    shape = {"updates": 2, "batch_size": 2, "net_arch": [16, 8], "recurrent_units": units}
+    first = train(settings(total_steps=40_000, hyperparameters=shape), tmp_path / "first", progress=False)
+    again = settings(start_from=str(first.model), hyperparameters=shape)
+    learner = again.hyperparameters.make_learner(PassLanes(again, ALONE), 1)
+    again.hyperparameters.begin_as(learner, again.start_from)
+    actor, known = again.hyperparameters.actor(learner), load(first.model).actor
+    for own, other in zip((*actor.weights, *actor.biases), (*known.weights, *known.biases), strict=True):
+        np.testing.assert_array_equal(own, other)
+    if units:
+        for own, other in zip(actor.cell, known.cell, strict=True):
+            np.testing.assert_array_equal(own, other)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"start_from": "repetitive"}, "apg starts from nothing"),
+        ({"start_from": "repetitive"}, "an agent that acts alone, which 'repetitive' is not"),
+        (
+            {"start_from": "agent-train"},
+            "an agent that acts alone, which 'agent-train' is not",
+        ),
+        (
+            {"start_from": "agent-any-line"},
+            r"another shape; set net_arch = .96, 96., recurrent_units = 64 and",
+        ),
         ({"lines": 2}, "apg draws a line for each pass"),
         (
             {"hyperparameters": {"gamma": 0.9}},
