@@ -67,7 +67,7 @@ def benchmark(
             "--trusted", help="Run installed policies in the process of the plant: faster by little."
         ),
     ] = False,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; two per core by default.")] = None,
     ray: RayAddress = None,
     output: Annotated[
         str | None,

@@ -38,11 +38,24 @@ from .settings import (
     policy_of,
     salt_hash,
 )
-from .single_pass import LATE, ROW_HEADINGS, Pass, Row, along, at_speed, line_ends, oracle_tape, run_pass
+from .single_pass import (
+    LATE,
+    ROW_HEADINGS,
+    Pass,
+    Row,
+    along,
+    at_speed,
+    check_beginnings,
+    line_ends,
+    oracle_tape,
+    run_pass,
+)
 from .statistics import Cell, compare
 
 SUFFIXES = (*JSON, *TABLES)
 """Suffixes of the files that an outcome can be saved to."""
+PER_CORE = 2
+"""Processes per core: a plant waits while its policy acts, in a process of its own, and vice versa."""
 
 
 @dataclass(frozen=True)
@@ -99,18 +112,20 @@ def run(
 ) -> Benchmark:
     """Run every policy on every line at every speed under every seed.
 
-    workers: number of processes, by default one per core; the outcome does not depend on it. With more
+    workers: number of processes, by default two per core; the outcome does not depend on it. With more
     than one, a script must call this under ``if __name__ == "__main__":``. progress: called with the
     number of passes done and the total number. ray: address of a Ray cluster that runs the passes instead.
     Raises InputError for invalid settings, and for a policy that fails, which it names.
     """
     if ray is None and workers is None:
-        workers = cores()
+        workers = PER_CORE * cores()
     count = sum(len(line.speeds_kmh) * len(settings.policies_on(line)) for line in settings.lines)
     check_passes(count * len(settings.seeds), "This benchmark")
     try:
         _check_policies(settings)
         windows = tuple(evaluated_windows(settings, line) for line in settings.lines)
+        for line in settings.lines:
+            check_beginnings(settings, line)
         first = settings.drawn_seeds[0]
         jobs = [
             partial(run_pass, settings, line, covered, policy, speed, seed, traced=seed == first)

@@ -7,12 +7,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
+from panto_env.analysis.simulation import ready_pass
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task
@@ -344,6 +346,22 @@ def _players(
         _, recorders = _record(settings, line, policy_of(policy), speed_kmh, seed + OTHER_SEED)
         return tapes(played_by(recorders), line)
     return [_player(settings, policy, number) for number in range(len(line.controlled))]
+
+
+def check_beginnings(settings: BenchmarkSettings, line: Line) -> None:
+    """Let every policy prepare for passes at a line's lowest and highest speed.
+
+    One that refuses does so before any pass is run. Raises InputError, which names it.
+    """
+    names = sorted({policy_of(each) for each in settings.policies_on(line) if each != ORACLE_TAPE})
+    contexts: dict[str, Context] = {}  # by the settings of their task
+    for name, speed in product(names, sorted({min(line.speeds_kmh), max(line.speeds_kmh)})):
+        player = _player(settings, name, 0)
+        given = wishes(player) | at_speed(along(settings, line), speed)
+        key = repr(sorted(given.items()))
+        if key not in contexts:
+            contexts[key] = ready_pass(player, given, settings.drawn_seeds[0])[0].context(0)
+        player.reset(contexts[key])
 
 
 def tapes(played: Played, line: Line) -> list[Tape]:

@@ -164,6 +164,14 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"lines": [{"distance": 200.0}]}, "no spans 10 to 3 to evaluate"),
         ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
         ({"lines": [{"speed": 300}]}, "key 'lines.1.speed'"),
+        (
+            {"policies": [P, "adaptive"], "lines": [LINE | {"pantograph": "dsa250"}]},
+            "The policy 'adaptive' failed in reset",
+        ),
+        (
+            {"policies": ["tape of tuned-pd"], "lines": [LINE | {"speeds_kmh": [300, 120]}]},
+            "not for 120 km/h",
+        ),
         ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
         ({"control_interval": 0.0}, "must be a number from 0.0001 to 10 s"),
