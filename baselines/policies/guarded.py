@@ -11,8 +11,11 @@ import math
 import re
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
+import gymnasium
 import numpy as np
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter_zi
 
@@ -114,17 +117,65 @@ class Guarded:
     def reset(self, context: Context) -> None:
         """Prepare for an episode. Raises InputError for a line without wires."""
         self._policy.reset(context)
-        self._readings = Readings(context)
-        self._monitor = Monitor(context, *self._delays)
+        self._guard = Guard(context, *self._delays)
 
     def act(self, observation: Observation) -> Array:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
-        seen = self._readings.checked(observation)
-        action = np.clip(np.asarray(self._policy.act(seen), dtype=float), -1.0, 1.0)
-        gate = self._monitor(seen, self._readings)
+        seen = self._guard.checked(observation)
+        return self._guard.limited(self._policy.act(seen))
+
+
+class GuardedEnv(gymnasium.Wrapper[Observation, Any, Observation, Any], RecordConstructorArgs):
+    """An environment behind the guard: who acts in it sees held readings, and actions fade that do harm.
+
+    ``info["gate"]`` is the factor of the last action, 0 to 1. Rewards are those of what was done. For one
+    pantograph: ``gymnasium.make_vec`` with ``vectorization_mode="sync"`` takes it among its ``wrappers``.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], delay: float = DELAY, lag: float = LAG) -> None:
+        """delay, lag: as ``Guarded`` takes them."""
+        RecordConstructorArgs.__init__(self, delay=delay, lag=lag)
+        gymnasium.Wrapper.__init__(self, env)
+        self._delays = delay, lag
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Begin an episode; as the environment's own."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._guard = Guard(self.get_wrapper_attr("context"), *self._delays)
+        return self._guard.checked(observation), info | {"gate": 0.0}
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """One control step; as the environment's own."""
+        limited = self._guard.limited(action).astype(np.float32)
+        observation, reward, terminated, truncated, info = self.env.step(limited)
+        seen = self._guard.checked(observation)
+        return seen, reward, terminated, truncated, info | {"gate": self._guard.gate}
+
+
+class Guard:
+    """The guard of one pantograph in an episode: in each control step what is seen, then what may be done."""
+
+    def __init__(self, context: Context, delay: float, lag: float) -> None:
+        self._readings = Readings(context)
+        self._monitor = Monitor(context, delay, lag)
+
+    def checked(self, observation: Observation) -> Observation:
+        """The observation with held values for those that cannot be."""
+        self._seen = self._readings.checked(observation)
+        return self._seen
+
+    def limited(self, action: Any) -> Array:
+        """Action, (actions,), each in -1..1, as far as it may be done after what was seen last."""
+        given = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        gate = self._monitor(self._seen, self._readings)
         if self._monitor.low:
-            action = np.maximum(action, 0.0)
-        return np.asarray(gate * action)
+            given = np.maximum(given, 0.0)
+        return np.asarray(gate * given)
+
+    @property
+    def gate(self) -> float:
+        """Factor of the last action, 0 to 1."""
+        return self._monitor.gate
 
 
 class Readings:

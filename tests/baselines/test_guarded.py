@@ -1,10 +1,12 @@
 """The guard around a policy: what it shows of faulty readings, when it fades to passive, what it costs."""
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 
 from panto_baselines.policies import guarded
-from panto_baselines.policies.guarded import Guarded
+from panto_baselines.policies.guarded import Guarded, GuardedEnv
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary
 from panto_env.policies import check_named, find_policy, wishes
@@ -178,3 +180,42 @@ def test_a_changing_speed_is_no_harm():
         for policy in (None, "agent-any-pantograph", "guarded:agent-any-pantograph")
     )
     assert alone < guarded_too < passive - 0.7 * (passive - alone)
+
+
+def test_an_environment_behind_the_guard_does_what_the_guarded_policy_does():
+    """Readings of a second in four are silent, and `pd` is driven at a gain at which the guard fades it."""
+    given = BUILT | {
+        "faults": "readings-silent",
+        "speed_kmh": 280.0,
+        "distance": 500.0,
+        "run_in": 2,
+        "settle": 0,
+    }
+    given |= {"observation": "measured"}
+    del given["record_droppers"]
+    env = gymnasium.make("panto_env:Pantograph-v0", pantograph="dsa380", **given)
+    outcomes = []
+    for acting, driver in ((GuardedEnv(env), "pd:gain=2"), (env, "guarded:pd:gain=2")):
+        policy, forces, gates = find_policy(driver), [], []
+        observation, info = acting.reset(seed=1)
+        policy.reset(env.unwrapped.context)
+        over = False
+        while not over:
+            observation, _, terminated, truncated, info = acting.step(
+                policy.act(observation).astype(np.float32)
+            )
+            over = terminated or truncated
+            forces.append(info["contact_force"])
+            gates.append(info.get("gate"))
+        outcomes.append((forces, gates))
+    (forces, gates), (others, _) = outcomes
+    np.testing.assert_allclose(forces, others, atol=0.02)  # actions of an environment have single precision
+    assert min(gates) == 0.0
+    assert max(gates) == 1.0
+
+
+def test_the_environment_behind_the_guard_keeps_gymnasiums_rules():
+    check_env(
+        GuardedEnv(gymnasium.make("panto_env:Pantograph-v0", distance=300.0).unwrapped),
+        skip_render_check=True,
+    )
