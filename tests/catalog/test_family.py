@@ -22,7 +22,12 @@ from panto_env.plant.catenary.flexible.static import hang
 from ..command import panto
 
 FAMILY = load_family("high-speed")
-DRAWN = {"family:high-speed": (200, 350), "section:main-line": (120, 160), "section:fast-line": (250, 300)}
+DRAWN = {
+    "family:high-speed": (200, 350),
+    "family:conventional": (130, 220),
+    "section:main-line": (120, 160),
+    "section:fast-line": (250, 300),
+}
 """Descriptions to draw from, with speeds (km/h) for their lines."""
 drawn = pytest.mark.parametrize("source", DRAWN)
 
