@@ -5,10 +5,11 @@ from typing import Any
 from .analysis.simulation import simulate
 from .base.checksums import __version__
 from .base.errors import InputError
+from .catalog import line, pantograph
 from .envs import register
 from .metrics.trajectory import Trajectory
 
-__all__ = ["InputError", "Trajectory", "__version__", "parallel_env", "simulate"]
+__all__ = ["InputError", "Trajectory", "__version__", "line", "pantograph", "parallel_env", "simulate"]
 
 register()
 

@@ -51,24 +51,94 @@ def available(family: str) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDERS[family].glob("*.toml")))
 
 
-def load_catenary(source: str | Path | CatenaryData) -> CatenaryData:
-    """Line from a catalogue name, a TOML file, or an entry that is already loaded.
+def load_catenary(source: str | Path | Mapping[str, Any] | CatenaryData) -> CatenaryData:
+    """Line from a catalogue name, a TOML file, a table as ``line`` takes it, or an entry already loaded.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid. Warns of values
     far from the catalogue's.
     """
     if drawn := drawn_kind(source):
         raise InputError(f"One line is needed here, not the {drawn[0]} '{source}' to draw from; name a line.")
+    if isinstance(source, Mapping):
+        return line(source)
     return _checked(source if isinstance(source, CatenaryData) else _load("catenary", source), source)
 
 
-def load_pantograph(source: str | Path | PantographData) -> PantographData:
-    """Pantograph from a catalogue name, a TOML file, or an entry that is already loaded.
+def load_pantograph(source: str | Path | Mapping[str, Any] | PantographData) -> PantographData:
+    """Pantograph from a catalogue name, a TOML file, a table, or an entry already loaded, as lines are.
 
     Raises InputError, naming the file and the key, where it cannot be read or is not valid. Warns of values
     far from the catalogue's.
     """
+    if isinstance(source, Mapping):
+        return pantograph(source)
     return _checked(source if isinstance(source, PantographData) else _load("pantograph", source), source)
+
+
+def line(
+    table: Mapping[str, Any], like: str | Path | CatenaryData | None = None, name: str | None = None
+) -> CatenaryData:
+    """A line in memory, from a table such as a TOML file has, or from changes of another line.
+
+    table: values, plain or with their sources, in tables or by dotted names: ``{"contact_wire.tension":
+    27e3}``; droppers by ``spacing`` take the place of those by ``positions``, and the other way round. like:
+    name, file or entry of the line whose values all others are. name: of the line, in tables and plots.
+    Raises InputError, and warns, as ``load_catenary`` does.
+    """
+    return parse_catenary(*_changed("catenary", table, like, name))
+
+
+def pantograph(
+    table: Mapping[str, Any], like: str | Path | PantographData | None = None, name: str | None = None
+) -> PantographData:
+    """A pantograph in memory, as ``line`` makes lines; lists such as ``masses`` are given whole."""
+    return parse_pantograph(*_changed("pantograph", table, like, name))
+
+
+def _changed(
+    family: str, table: Mapping[str, Any], like: Any, name: str | None
+) -> tuple[dict[str, Any], Path]:
+    """Table of a new entry and the path that names it."""
+    nested: dict[str, Any] = {}
+    for key, value in table.items():
+        nested = _merged(nested, _nested(str(key), value))
+    like, base = nested.pop("like", like), dict[str, Any]()
+    if isinstance(like, Settings):
+        base = like.model_dump(mode="json", exclude_none=True, exclude_unset=True, exclude={"sources"})
+        base["kind"] = getattr(like, "kind", family)
+    elif like is not None:
+        base = read_toml(file_of(like, family))
+    usual = f"like {getattr(like, 'name', Path(str(like)).stem)}" if like is not None else f"own {family}"
+    base.pop("name", None)
+    named = {"name": name or nested.pop("name", usual)}
+    return _merged(base, nested | named), Path(named["name"])
+
+
+def _nested(key: str, value: Any) -> dict[str, Any]:
+    """The tables that a dotted name stands for."""
+    first, _, others = key.partition(".")
+    return {first: _nested(others, value) if others else value}
+
+
+IN_TURN = (
+    ({"spacing", "first", "pre_sag"}, {"positions", "sag"}),
+    ({"stiffness"}, {"axial_stiffness"}),
+    ({"sequence"}, {"spans"}),
+)
+"""Keys that exclude each other: where one is given, those of the other kind are no longer what they were."""
+
+
+def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with the values of another one in the place of its own, table by table."""
+    found = dict(base)
+    for some, others in IN_TURN:
+        for given, dropped in ((some, others), (others, some)):
+            if given & changes.keys() and not dropped & changes.keys():
+                found = {key: value for key, value in found.items() if key not in dropped}
+    for key, value in changes.items():
+        tables = isinstance(value, Mapping) and isinstance(found.get(key), Mapping) and "value" not in value
+        found[key] = _merged(found[key], value) if tables else value
+    return found
 
 
 def load_family(source: str | Path | LineFamily) -> LineFamily:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError, beside
@@ -66,6 +66,29 @@ class Criterion:
     def as_dict(self) -> dict[str, Any]:
         """The criterion as plain data, with its margin and whether it is kept."""
         return vars(self) | {"margin": self.margin, "kept": self.kept}
+
+
+class Requirement(NamedTuple):
+    """A criterion of a train: that of the pantograph with the smallest margin."""
+
+    pantograph: int  # its number, from 1
+    criterion: Criterion
+
+
+def of_train(each: Sequence[Sequence[Criterion]]) -> list[Requirement]:
+    """The criteria with limits of a train, from those of each of its pantographs."""
+    found: dict[str, Requirement] = {}
+    for number, own in enumerate(each, start=1):
+        for criterion in filter(lambda one: one.limited, own):
+            known = found.get(criterion.key)
+            # One that cannot be judged (nan) hides none that can.
+            if (
+                known is None
+                or math.isnan(known.criterion.margin)
+                or criterion.margin < known.criterion.margin
+            ):
+                found[criterion.key] = Requirement(number, criterion)
+    return list(found.values())
 
 
 def worst(runs: Sequence[Sequence[Criterion]]) -> list[Criterion]:

@@ -16,7 +16,7 @@ from ..base.errors import InputError
 from ..base.files import check_output
 from ..plant.alignment import Alignment, Spans
 from .by_span import evaluated, near_train
-from .compliance import SLOW, Criterion, LineFacts, compliance
+from .compliance import SLOW, Criterion, LineFacts, Requirement, compliance, of_train
 from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function, statistics
 from .identity import Design, Identity
 from .low_pass import low_pass
@@ -182,6 +182,14 @@ class Trajectory:
             tension[near_train(self, spans)] if tension.size else tension,
             self.static_force,
         )
+
+    def requirements(self, spans: SpanChoice = None) -> list[Requirement]:
+        """Criteria with limits of the whole train: of each that of the pantograph with the smallest margin.
+
+        Over the spans that the last one covers. Raises InputError as ``summary`` does.
+        """
+        covered = self.common_spans(spans)
+        return of_train([own.compliance(covered) for own in self.train])
 
     @property
     def static_force(self) -> float | None:
