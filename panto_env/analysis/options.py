@@ -138,8 +138,10 @@ def parse_spans(text: str | None) -> SpanChoice:
 
 
 def _riding(settings: dict[str, Any]) -> dict[str, Any]:
-    """Settings in which a pantograph that is named once is the only one, and several are a train."""
+    """Settings in which several pantographs are a train, and one with distances is one of equal ones."""
     named = settings.pop("pantograph", None) or []
+    if len(named) == 1:
+        named = named * (1 + len(settings.get("distances") or ()))
     if len(named) > 1:
         settings["pantographs"] = named
     elif named:

@@ -1,0 +1,117 @@
+"""Permissible speeds: what a scan says of passes whose requirements are known, and its command."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+from panto_env import InputError, simulate
+from panto_env.cli import make_app
+from panto_env.cli.permissible import parse_speeds
+from panto_env.studies.permissible import PASSIVE, Scan, scan, verified
+from panto_env.studies.permissible.scan import WAVES, Broken, Pass
+from panto_env.studies.permissible.shown import answers_table
+
+FORCE, SPEED = (
+    Broken("max", "maximum", 2, 360.0, "at most 350 N"),
+    Broken(WAVES, "v/c", 1, 0.8, "at most 0.7"),
+)
+KEPT = Pass(PASSIVE, 200.0, 0, False, "", (), "σ", 20.0, 0.2, 250.0, 40.0, 0.05, 0.0, *[math.nan] * 3)
+
+
+def made(broken_at: dict[str, dict[float, tuple]], speeds=(200.0, 210.0, 220.0, 230.0)) -> Scan:
+    """A scan under two seeds; broken_at: requirements broken under the second one, by policy and speed."""
+    passes = [
+        replace(
+            KEPT,
+            policy=policy,
+            speed_kmh=speed,
+            seed=seed,
+            failing=failing,
+            broken=broken.get(speed, ()) if seed else (),
+        )
+        for policy, broken in broken_at.items()
+        for speed in speeds
+        for seed in range(2)
+        for failing in ([False] if policy == PASSIVE else [False, True])
+    ]
+    return Scan(speeds, tuple(broken_at), tuple(passes))
+
+
+def test_forbidden_speeds_come_in_bands_and_the_first_of_them_counts():
+    answer = made({PASSIVE: {210.0: (FORCE,)}}).answer(PASSIVE)
+    assert (answer.limit, answer.beyond, answer.bands) == (200.0, 210.0, [(200.0, 200.0), (220.0, 230.0)])
+    assert answer.reason == "maximum of pantograph 2: 360, at most 350 N (1 of 2 passes)"
+
+
+def test_the_rule_of_the_wave_speed_is_told_apart():
+    answer = made({PASSIVE: {220.0: (SPEED,), 230.0: (SPEED,)}}).answer(PASSIVE)
+    assert (answer.limit, answer.with_waves) == (230.0, 210.0)
+    assert math.isnan(answer.beyond)
+    assert math.isnan(answer.fallback)
+
+
+def test_nothing_is_permissible_where_the_lowest_speed_is_forbidden():
+    found = made({PASSIVE: {200.0: (FORCE,)}, "pd": {}})
+    assert math.isnan(found.answer(PASSIVE).limit)
+    assert found.answer("pd").limit == found.answer("pd").fallback == 230.0
+    assert [row[1] for row in answers_table(found).cells] == ["none", "230"]
+    again = made({PASSIVE: {}, "pd": {220.0: (FORCE,)}})
+    assert verified(found, again)["pd"] == 210.0
+    assert math.isnan(verified(found, again)[PASSIVE])
+
+
+TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [200], "controlled": [1, 2]}
+
+
+def test_a_scan_says_what_its_passes_do():
+    """At 245 km/h the second pantograph alone breaks a requirement, that of σ."""
+    ideal = {"line_condition": "new", "pantograph_scatter": 0.0, "speed_drift": 0.0, "sensors": "ideal"}
+    found = scan([150, 245], ["repetitive"], seeds=[3], workers=1, catenary="en50318-2002", **TRAIN, **ideal)
+    (passive,) = found.at(PASSIVE, 245.0)
+    assert [(each.key, each.pantograph) for each in passive.broken] == [("std", 2)]
+    run = simulate("en50318-2002", speed_kmh=245, record_droppers=False, mean_force="en50367", **TRAIN)
+    ratios = [own.std / own.mean for own in (each.summary(run.common_spans()) for each in run.train)]
+    assert ratios[0] < 0.3 < ratios[1] == pytest.approx(passive.std_ratio, rel=1e-9)
+    assert (found.answer(PASSIVE).limit, found.answer(PASSIVE).beyond) == (150.0, 245.0)
+    (controlled,), (failed,) = (found.at("repetitive", 245.0, failing) for failing in (False, True))
+    assert controlled.std_ratio < failed.std_ratio
+    assert 0 < failed.rms < controlled.rms <= controlled.peak <= 100.0
+    assert 0 < controlled.watts < 50
+
+
+def test_a_policy_that_refuses_a_speed_forbids_it():
+    found = scan([200, 300], ["tuned-pd"], seeds=[0], workers=1, catenary="en50318-2002", distance=700)
+    assert math.isnan(found.answer("tuned-pd").limit)
+    assert "not for 200 km/h" in found.answer("tuned-pd").reason
+
+
+def test_its_command_prints_what_it_writes(tmp_path):
+    page, picture = tmp_path / "page.html", tmp_path / "speeds.png"
+    given = ["permissible-speed", "re330", "--pantograph", "dsa380", "--speeds", "250:260:10", "--seeds", "1"]
+    given += ["--distance", "900", "--workers", "1", "--verify"]
+    told = CliRunner().invoke(make_app(), [*given, "--html", str(page), "--plot", str(picture)])
+    assert told.exit_code == 0, told.output
+    assert picture.stat().st_size > 10_000
+    assert "Permissible speeds on re330" in page.read_text(encoding="utf-8")
+    data = json.loads(CliRunner().invoke(make_app(), [*given, "--json"]).stdout)
+    assert data["speeds_kmh"] == [250, 260]
+    assert data["verification"]["speeds_kmh"] == [250, 255, 260]
+    limit = data["answers"][PASSIVE]["limit"]
+    assert f"{limit:g}" if limit else "none" in told.output
+
+
+@pytest.mark.parametrize(
+    ("text", "speeds"),
+    [("200:220:10", [200, 210, 220]), ("200:205:2.5", [200, 202.5, 205]), ("90:90:5", [90])],
+)
+def test_speeds_have_a_step(text, speeds):
+    assert parse_speeds(text) == speeds
+
+
+@pytest.mark.parametrize("text", ["200", "200:100:5", "200:300:0", "a:b:c", "0:100:5", "1:300:0.01"])
+def test_other_speeds_are_refused(text):
+    with pytest.raises(InputError, match=r"--speeds (must read first:last:step|has [\d,]+ speeds)"):
+        parse_speeds(text)
