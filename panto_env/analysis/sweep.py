@@ -49,7 +49,7 @@ FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 
 
 @dataclass(frozen=True)
-class _Pass:
+class OnePass:
     """One pass to run: the swept values, the policy's name, and the arguments of ``simulate``."""
 
     values: dict[str, float]
@@ -95,11 +95,11 @@ def sweep(
     checked: RunSettings = run_settings(settings)
     if len(checked.line_condition) != 1:
         raise InputError("A sweep takes one condition of the line, not a list of them.")
-    entries = _entries(checked)
+    entries = entries_of(checked)
     given = {**settings, "seed": seed}
     _check(parameters, entries, policies)
     passes = [
-        _prepare(dict(zip(parameters, values, strict=True)), policy, entries, given)
+        prepare(dict(zip(parameters, values, strict=True)), policy, entries, given)
         for values in product(*parameters.values())
         for policy in policies
     ]
@@ -127,7 +127,7 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
     """Label of each parameter, with its unit, for the axes of a plot; settings: those of ``sweep``."""
     first = {"pantograph": train[0]} if (train := riding(settings)) else {}
     given = {name: settings[name] for name in FAMILIES if name in settings}
-    entries = _entries(run_settings(given | first))
+    entries = entries_of(run_settings(given | first))
     found = {SPEED: "speed of the train (km/h)"}
     for name in parameters:
         family, _, rest = name.partition(".")
@@ -139,7 +139,8 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
     return found
 
 
-def _entries(settings: RunSettings) -> dict[str, Settings]:
+def entries_of(settings: RunSettings) -> dict[str, Settings]:
+    """Settings whose values can be swept, by their family."""
     entries: dict[str, Settings] = {family: getattr(settings, family) for family in FAMILIES[:-1]}
     return entries | {"catenary": settings.line, "line_condition": settings.line_condition[0]}
 
@@ -169,13 +170,13 @@ def _check(
     check_passes(len(policies) * math.prod(len(values) for values in parameters.values()), "This sweep")
 
 
-def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
+def _check_memory(passes: Sequence[OnePass], workers: int | None) -> None:
     """Raise InputError where the records of the passes that run at once do not fit into memory.
 
     The longest pass is built, not run: it needs the most memory.
     """
 
-    def seconds(one_pass: _Pass) -> float:
+    def seconds(one_pass: OnePass) -> float:
         line, distance = one_pass.arguments["catenary"], one_pass.arguments.get("distance")
         length = distance or line.alignment().length
         return float(length) / max(speed_range(one_pass.arguments["speed_kmh"])[0], 1e-9)
@@ -189,7 +190,7 @@ def _check_memory(passes: Sequence[_Pass], workers: int | None) -> None:
 
 
 @contextmanager
-def _named(one_pass: _Pass) -> Iterator[None]:
+def _named(one_pass: OnePass) -> Iterator[None]:
     try:
         yield
     except InputError as error:
@@ -213,12 +214,13 @@ def _check_name(name: str, entries: Mapping[str, Settings]) -> None:
     )
 
 
-def _prepare(
+def prepare(
     values: dict[str, float],
     policy: str | Path | None,
     entries: Mapping[str, Settings],
     settings: dict[str, Any],
-) -> _Pass:
+) -> OnePass:
+    """The pass with these values. Raises InputError for a value that its schema refuses."""
     changed: dict[str, Any] = dict(entries)
     speed_kmh = settings.get(SPEED, default(SPEED))
     of_policy: list[str] = []
@@ -244,10 +246,10 @@ def _prepare(
     if source is not None:
         find_policy(source)
     label = "passive" if policy is None else str(policy)
-    return _Pass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
+    return OnePass(values, label, {**settings, **changed, "speed_kmh": speed_kmh, "policy": source})
 
 
-def _rows(one_pass: _Pass, spans: SpanChoice) -> list[Row]:
+def _rows(one_pass: OnePass, spans: SpanChoice) -> list[Row]:
     with _named(one_pass):
         run = simulate(**one_pass.arguments)
         train = run.train

@@ -93,7 +93,20 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
-    from . import catalogue, diagnose, estimate, fit, identify, lines, records, simulate, studies, sweep
+    from . import (
+        catalogue,
+        design,
+        diagnose,
+        estimate,
+        fit,
+        identify,
+        lines,
+        permissible,
+        records,
+        simulate,
+        studies,
+        sweep,
+    )
 
     app = typer.Typer(
         name="panto",
@@ -109,7 +122,8 @@ def make_app() -> typer.Typer:
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
     for command in (
-        *(simulate.simulate, simulate.film, sweep.sweep, lines.family, lines.line, studies.validate),
+        *(simulate.simulate, simulate.film, sweep.sweep, permissible.permissible_speed, design.design),
+        *(lines.family, lines.line, studies.validate),
         *(identify.identify, estimate.estimate, diagnose.diagnose, records.record, records.compare),
         *(fit.fit, fit.drift, studies.speed, studies.reproduce, studies.rig),
     ):

@@ -1,0 +1,179 @@
+"""A search for a line: optima that are known, what is refused, what is kept, and what is written."""
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from panto_env import InputError, simulate
+from panto_env.base.errors import AccuracyWarning
+from panto_env.catalog import load_catenary
+from panto_env.cli import make_app
+
+pytest.importorskip("optuna")
+
+from panto_env.studies.design import Design, read_design, search
+from panto_env.studies.design.check import candidates_of, check, text_of
+from panto_env.studies.design.search import TRIED, arguments_of, best_of, in_words, tried
+
+RUN = {"catenary": "benchmark-2015", "pantograph": "dsa380", "distance": 700.0}
+TENSION = {"catenary.contact_wire.tension": (18e3, 27e3)}
+FOUR = TENSION | {
+    "catenary.messenger_wire.tension": (12e3, 20e3),
+    "catenary.droppers.spacing": (4.5, 9.0),
+    "catenary.droppers.pre_sag": (0.0, 0.05),
+}
+
+
+def design(**given) -> Design:
+    return Design.model_validate({"variables": TENSION, "speeds_kmh": [160], "run": RUN} | given)
+
+
+@pytest.mark.slow
+def test_the_least_tension_is_the_lower_end_where_nothing_forbids_it(tmp_path):
+    wanted = design(objectives=["tension"], designs=60)
+    found = search(wanted, tmp_path)
+    (best,) = best_of(wanted, found)
+    messenger = load_catenary("benchmark-2015").messenger_wire.tension
+    assert best.value == pytest.approx(18e3 + messenger, rel=0.01)
+    assert in_words(wanted, found).endswith("all requirements kept")
+
+
+def test_figures_of_a_design_are_those_of_its_passes(tmp_path):
+    wanted = design(speeds_kmh=[160, 280], seeds=2, run=RUN | {"line_condition": "as-built"})
+    values = {"catenary.contact_wire.tension": 20e3}
+    ((objectives, found),) = tried(wanted, [values])
+    line = load_catenary("benchmark-2015").model_copy(deep=True)
+    line = line.model_copy(update={"contact_wire": line.contact_wire.model_copy(update={"tension": 20e3})})
+    given = RUN | {"catenary": line, "mean_force": "en50367", "line_condition": "as-built"}
+    runs = [
+        simulate(**given, speed_kmh=v, seed=s, record_droppers=False).summary()
+        for v in (160, 280)
+        for s in (0, 1)
+    ]
+    assert objectives == [found.std_ratio]
+    assert found.std_ratio == pytest.approx(max(run.std / run.mean for run in runs), rel=1e-12)
+    assert found.excess == 0 or found.broken
+
+
+def test_a_search_goes_on_where_it_was_broken_off_and_refuses_another_one(tmp_path):
+    first = search(design(designs=12), tmp_path)
+    known = [trial.values for trial in first.trials]
+    again = search(design(designs=18), tmp_path)
+    assert [trial.values for trial in again.trials][:12] == known
+    assert len(again.trials) == 18
+    with pytest.raises(InputError, match="has a search with other speeds_kmh; choose another folder"):
+        search(design(speeds_kmh=[200]), tmp_path)
+
+
+@pytest.mark.slow
+def test_threads_do_not_change_what_is_found(tmp_path):
+    one, two = (search(design(designs=24), tmp_path / f"{k}", workers=k) for k in (1, 2))
+    assert [trial.values for trial in one.trials] == [trial.values for trial in two.trials]
+
+
+def random_designs(count: int, seed: int) -> None:
+    """Designs of the prototype's ranges are run, or refused in a sentence."""
+    random = np.random.default_rng(seed)
+    wanted = design(variables=FOUR, speeds_kmh=[250])
+    values = [
+        {name: float(random.uniform(low, high)) for name, (low, high) in FOUR.items()} for _ in range(count)
+    ]
+    for objectives, found in tried(wanted, values):
+        assert np.isfinite(objectives).all()
+        assert found.refused.endswith(".") if math.isnan(found.std_ratio) else 0 < found.std_ratio < 2
+
+
+def test_random_designs_are_run_or_refused():
+    random_designs(16, 1)
+
+
+@pytest.mark.study
+def test_two_thousand_random_designs_are_run_or_refused():
+    random_designs(2000, 2)
+
+
+def test_a_line_is_written_as_it_was_run(tmp_path):
+    wanted = design(variables=FOUR)
+    values = {name: 0.4 * low + 0.6 * high for name, (low, high) in FOUR.items()}
+    line = arguments_of(wanted, values, "passive")["catenary"]
+    path = tmp_path / "line.toml"
+    path.write_text(text_of(line), encoding="utf-8")
+    again = load_catenary(path)
+    left_out = {"name", "sources"}
+    assert again.model_dump(exclude=left_out) == line.model_dump(exclude=left_out)
+
+
+@pytest.mark.slow
+def test_control_and_other_speeds_are_checked(tmp_path):
+    wanted = design(speeds_kmh=[240, 280], policy="passive", check_policies=["repetitive"], designs=12)
+    found = search(wanted, tmp_path)
+    checked = check(wanted, candidates_of(wanted, found))
+    assert [(one.design, one.policy) for one in checked] == [
+        (name, policy) for name in ("start", "best") for policy in ("passive", "repetitive")
+    ]
+    for one in checked:
+        assert list(one.by_speed) == [240, 260, 280]
+        assert one.searched.std_ratio == max(one.by_speed[v] for v in (240, 280))
+        assert one.held_out.std_ratio == one.by_speed[260]
+    best = checked[2]
+    assert best.searched.std_ratio == pytest.approx(
+        best_of(wanted, found)[0].user_attrs["std_ratio"], rel=1e-12
+    )
+    assert checked[1].searched.std_ratio < checked[0].searched.std_ratio
+
+
+STUDY = """
+speeds_kmh = [200, 220, 240, 260, 280]
+objectives = ["std_ratio", "tension"]
+designs = 12
+[variables]
+"catenary.contact_wire.tension" = [18e3, 27e3]
+[run]
+catenary = "benchmark-2015"
+pantograph = "dsa380"
+distance = 600
+"""
+
+
+def test_the_command_writes_what_it_found(tmp_path):
+    file, folder = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(STUDY, encoding="utf-8")
+    told = CliRunner().invoke(make_app(), ["design", str(file), "--output", str(folder)])
+    assert told.exit_code == 0, told.output
+    assert "front 1" in told.output
+    assert (folder / TRIED).is_file()
+    assert (folder / "design.png").stat().st_size > 10_000
+    assert load_catenary(folder / "front-1-catenary.toml").contact_wire.tension < 27e3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[18e3, 27e3]", "[27e3, 18e3]", "must have a range, the smaller value first"),
+        (
+            "contact_wire.tension",
+            "contact_wire.tensions",
+            "Unknown parameter 'catenary.contact_wire.tensions'",
+        ),
+        ('"std_ratio", "tension"', '"cost"', "objectives.1"),
+        ("distance = 600", "speed_kmh = 200", "run must not have speed_kmh"),
+        ("distance = 600", "length = 600", "'length' of run is no setting of a run"),
+        ("designs = 12", 'policy = "nobody"', "Unknown policy 'nobody'"),
+    ],
+)
+def test_a_wrong_study_is_refused(old, new, message, tmp_path):
+    file = tmp_path / "study.toml"
+    assert old in STUDY
+    file.write_text(STUDY.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=r"study\.toml: ") as caught:
+        read_design(file)
+    assert message in str(caught.value)
+
+
+def test_few_speeds_are_warned_of(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY.replace("200, 220, ", ""), encoding="utf-8")
+    with pytest.warns(AccuracyWarning, match="with 3 speeds a design fits these"):
+        read_design(file)
