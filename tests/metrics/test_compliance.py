@@ -18,6 +18,7 @@ from panto_env.metrics.compliance import (
     criteria_table,
     limits_in_words,
     margin_in_words,
+    of_train,
     remarks,
     value_in_words,
     worst,
@@ -398,3 +399,22 @@ def test_text_says_whether_a_limit_is_kept(value, highest, texts):
     assert lowest.kept == found.kept
     limit = float(limits_in_words(lowest).removeprefix("at least "))
     assert found.kept is None or (float(value_in_words(lowest)) >= limit) == found.kept
+
+
+def test_requirements_of_a_train_are_those_of_the_pantograph_with_the_smallest_margin():
+    def own(std, arcing, room):
+        return [
+            Criterion("std", "σ", "N", std, None, 30.0),
+            Criterion("arcing", "NQ", "%", arcing, None, 0.1),
+            Criterion("uplift", "uplift", "mm", room, None, 100.0),
+            Criterion("doppler", "Doppler factor", "", 0.5),
+        ]
+
+    found = of_train([own(20.0, 0.3, math.nan), own(25.0, 0.2, 40.0), own(22.0, math.nan, math.nan)])
+    assert [(one.criterion.key, one.pantograph) for one in found] == [
+        ("std", 2),
+        ("arcing", 1),
+        ("uplift", 2),
+    ]
+    (alone,) = of_train([own(math.nan, math.nan, math.nan)[:1]])
+    assert (alone.pantograph, alone.criterion.kept) == (1, None)
