@@ -91,6 +91,15 @@ def any_pantograph(seed: int = 0) -> TrainedPolicy:
     return _trained("any-pantograph", seed)
 
 
+def robust(seed: int = 0) -> TrainedPolicy:
+    """Agent for any line, section and place in a train, with sensors and actuators that fail.
+
+    It is agent-any-pantograph, trained further by the analytic policy gradient on lines for 120 to 350 km/h,
+    under five pantographs, alone and in trains, with faults and delays that are drawn; it is told of none.
+    """
+    return _trained("robust", seed)
+
+
 def trailing(seed: int = 0) -> TrainedPolicy:
     """Agent for the second of two dsa380, 200 m apart on en50318-2002, 190 to 310 km/h, as built.
 

@@ -27,6 +27,7 @@ AGENTS = {
     "train": ("agent-train", 0.55),
     "any-line": ("agent-any-line", 0.6),
     "any-pantograph": ("agent-any-pantograph", 0.6),
+    "robust": ("agent-robust", 0.6),
     "trailing": ("agent-trailing", 0.6),
     "trailing-alone": ("agent-trailing-alone", 0.6),
 }
