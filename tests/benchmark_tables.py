@@ -21,7 +21,6 @@ BEGIN, END = "<!-- python -m tests.benchmark_tables -->", "<!-- end -->"
 TRACK = "unknown-line"
 SHOWN = {
     "agent-any-pantograph": "learned, for four pantographs",
-    "agent-robust": "learned, also with faults",
     "agent-any-line": "learned",
     "repetitive": "learns during the run",
     "fb+ff:gain=0.3,washout=1": "paper 1's",
