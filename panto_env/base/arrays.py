@@ -48,6 +48,8 @@ def one_thread() -> Iterator[None]:
 
 SPARSE = 1 << 24
 """Bytes from which on zeros are sparse."""
+NORESERVE = getattr(mmap, "MAP_NORESERVE", 0x4000)
+"""Linux's flag, which Python names from 3.13 on."""
 
 
 def sparse_zeros(shape: tuple[int, ...]) -> Array:
@@ -58,6 +60,7 @@ def sparse_zeros(shape: tuple[int, ...]) -> Array:
     size = math.prod(shape) * np.dtype(float).itemsize
     if size < SPARSE or not hasattr(mmap, "MADV_NOHUGEPAGE"):
         return np.zeros(shape)
-    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    # Not reserved: the system would refuse more than it has, of which nearly all is never written to.
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | NORESERVE)
     memory.madvise(mmap.MADV_NOHUGEPAGE)
     return np.ndarray(shape, buffer=memory)

@@ -31,3 +31,10 @@ def test_zeros_are_zeros_of_any_size(rows):
     assert not array.any()
     array[:] = 2.0
     assert (array == 2.0).all()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux gives more than it has")
+def test_more_than_the_machine_has_is_given_where_little_is_written():
+    array = sparse_zeros((20_000, 1 << 20))  # 168 GB
+    array[::1000, 5] = 1.0
+    assert array[::1000].sum() == 20.0
