@@ -202,10 +202,10 @@ class _Group:
         self._controlled = settings.controlled[0] - 1
         check_record(8.0 * lanes * (rows - self._first) * collectors * SAMPLE_ROWS, "the lanes of an oracle")
         # Rows before the stretch are never written, so they take no memory.
-        self._samples = task.plant.samples(rows)._replace(uplift=np.zeros((lanes, rows, 0)))
+        self._samples = task.plant.samples(rows)._replace(uplift=np.zeros((lanes, 0, rows)))
         # One that rides behind others begins where it comes onto the line.
         rest = self._first - int(task.plant.of(0, Row.STEP, self._controlled))
-        self._plant.advance_passively(rest, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 1, 0))))
+        self._plant.advance_passively(rest, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 0, 1))))
         moving = self._plant.model.wire, self._plant.actuators, self._plant.run
         self._moving = list(arrays_of(moving))
         self._start = [(array, array.copy()) for array in self._moving]

@@ -8,6 +8,7 @@ from typing import Annotated
 import rich.progress
 from typer import Argument, Option
 
+from ..base.files import make_folder
 from ..studies.design.check import (
     candidates_of,
     check,
@@ -32,6 +33,7 @@ def design(
     json: Json = False,
 ) -> None:
     """Search for values of a line or a pantograph that keep all requirements, and check what was found."""
+    make_folder(output)  # before hours of work
     wanted = read_design(study)
     if designs is not None:
         wanted = wanted.model_copy(update={"designs": designs})

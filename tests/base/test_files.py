@@ -130,6 +130,7 @@ OF_FOLDERS = {
     "train": ("ppo",),
     "trainings": ("ppo",),
     "ablation": ("ablation",),
+    "design": ("file",),
     "dataset episodes": ("dataset-known-line",),
     "dataset designs": (),
 }

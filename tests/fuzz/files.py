@@ -65,6 +65,14 @@ catenary = "periodic-stiffness"
 pantograph = "three-mass"
 speeds_kmh = [300]
 """
+STUDY = """
+speeds_kmh = [250]
+[variables]
+"catenary.contact_wire.tension" = [20e3, 27e3]
+[run]
+catenary = "re330"
+distance = 900
+"""
 DESIGNS = """
 title = "some"
 catenary = "periodic-stiffness"
@@ -121,6 +129,7 @@ def write_files(folder: Path) -> None:
         "small.toml": f'policies = ["passive"]\nseeds = 1\n{TRACK}',
         "episodes.toml": EPISODES,
         "designs.toml": DESIGNS,
+        "study.toml": STUDY,
         "policies.py": POLICIES,
         "bad.toml": "kind = [",
         "bad.json": "{",

@@ -34,6 +34,8 @@ USUAL = {
         "diagnose": PASSES,
         "speed": "speed.json",
         "reproduce": "paper3-parameters",
+        "permissible-speed": f"re330 --distance 900 --speeds 250:250:10 {ONE}",
+        "design": "study.toml --designs 1 --workers 1 --output design",
         "rig": "rig --reference periodic-stiffness --spans 1-2",
         "ablation": "ablation.toml --workers 1",
         "benchmark": f"passive {LINE} --speed 300 {ONE}",
