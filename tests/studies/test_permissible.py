@@ -88,6 +88,11 @@ def test_a_policy_that_refuses_a_speed_forbids_it():
     assert "not for 200 km/h" in found.answer("tuned-pd").reason
 
 
+def test_a_policy_that_is_not_there_is_refused_before_any_pass():
+    with pytest.raises(InputError, match="Unknown policy 'nobody'"):
+        scan([200], ["nobody"], seeds=[0], workers=1, catenary="en50318-2002")
+
+
 def test_its_command_prints_what_it_writes(tmp_path):
     page, picture = tmp_path / "page.html", tmp_path / "speeds.png"
     given = ["permissible-speed", "re330", "--pantograph", "dsa380", "--speeds", "250:260:10", "--seeds", "1"]

@@ -22,6 +22,7 @@ from ...control.arguments import check_arguments
 from ...control.settings import RunSettings
 from ...metrics.compliance import Requirement
 from ...metrics.trajectory import Trajectory
+from ...policies import find_policy
 
 USUAL: dict[str, Any] = {
     "actuator": "realistic",
@@ -198,6 +199,8 @@ def scan(
     given = USUAL | settings
     if (behind := settings.get("distances")) is not None:
         given.setdefault("controlled", list(range(1, len(behind) + 2)))
+    for policy in names[1:]:
+        find_policy(policy)
     # One pass here first: what is wrong with all of them is refused at once.
     simulate(policy=None, speed_kmh=speeds[0], seed=seeds[0], record_droppers=False, **given)
     jobs = [partial(_passes, names, given, speed, seed) for speed in reversed(speeds) for seed in seeds]
