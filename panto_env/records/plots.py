@@ -149,7 +149,7 @@ def save_record_page(found: Judgement, title: str, path: str | Path) -> None:
     ]
     whole = whole_table(found, "Figures of the whole record")
     shown = [whole, requirements_table(found), *part_tables(found)]
-    _save(title, FILTER, found.notes, charts, shown, requirement_remarks(found), path)
+    save_page(title, FILTER, found.notes, charts, shown, requirement_remarks(found), path)
 
 
 def save_comparison_page(found: Comparison, title: str, path: str | Path) -> None:
@@ -163,10 +163,10 @@ def save_comparison_page(found: Comparison, title: str, path: str | Path) -> Non
     ]
     shown = [acceptance_table(found), figures_table(found), spans_table(found)]
     words = f"The simulation is {found.verdict}. {shift_sentence(found)} {FILTER}"
-    _save(title, words, found.notes, charts, shown, criterion_notes(found), path)
+    save_page(title, words, found.notes, charts, shown, criterion_notes(found), path)
 
 
-def _save(
+def save_page(
     title: str,
     introduction: str,
     notes: Sequence[str],
@@ -175,6 +175,10 @@ def _save(
     sentences: Sequence[str],
     path: str | Path,
 ) -> None:
+    """Write a page of an introduction, notes, charts as SVG with their captions, tables and sentences.
+
+    Whole or not at all. Raises InputError for a name with another suffix.
+    """
     check_output(path, PAGES)
     template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
     text = template.render(

@@ -16,6 +16,7 @@ from .findings import Findings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 HIGHEST = 25.0
 """Maximum frequency of the spectra (Hz)."""
@@ -23,6 +24,17 @@ HIGHEST = 25.0
 
 P = ParamSpec("P")
 Draw = Callable[Concatenate["Axes", P], None]
+
+
+def svg_of(figure: Figure) -> str:
+    """A figure as SVG, always as the same text."""
+    import matplotlib as mpl
+
+    file = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": "panto-env"}):
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    text = file.getvalue()
+    return text[text.index("<svg") :]
 
 
 def as_svg(height: float = 3.2, *, along_line: bool = False) -> Callable[[Draw[P]], Callable[P, str]]:
@@ -34,17 +46,11 @@ def as_svg(height: float = 3.2, *, along_line: bool = False) -> Callable[[Draw[P
     def decorate(draw: Draw[P]) -> Callable[P, str]:
         @wraps(draw)
         def svg(*given: P.args, **named: P.kwargs) -> str:
-            import matplotlib as mpl
-
             figure, axes = panels((9, height))
             draw(axes, *given, **named)
             axes.grid(color="0.92", axis="y" if along_line else "both")
             axes.set_axisbelow(True)
-            file = io.StringIO()
-            with mpl.rc_context({"svg.hashsalt": "panto-env"}):
-                figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-            text = file.getvalue()
-            return text[text.index("<svg") :]
+            return svg_of(figure)
 
         return svg
 

@@ -7,21 +7,17 @@ from panto_env import InputError, line, pantograph, simulate
 from panto_env.catalog import available, load_catenary, load_pantograph
 from panto_env.catalog.loader import text_of
 
+MADE = {"catenary": (line, load_catenary), "pantograph": (pantograph, load_pantograph)}
 
-@pytest.mark.parametrize("name", available("catenary"))
-def test_a_line_without_changes_is_the_one_that_it_is_like(name):
-    left_out = {"name", "sources"}
-    usual = load_catenary(name)
+
+@pytest.mark.parametrize(
+    ("family", "name"), [(family, name) for family in MADE for name in available(family)]
+)
+def test_an_entry_without_changes_is_the_one_that_it_is_like(family, name):
+    make, load = MADE[family]
+    left_out, usual = {"name", "sources"}, load(name)
     for like in (name, usual):
-        assert line({}, like=like).model_dump(exclude=left_out) == usual.model_dump(exclude=left_out)
-
-
-@pytest.mark.parametrize("name", available("pantograph"))
-def test_so_is_a_pantograph(name):
-    left_out = {"name", "sources"}
-    usual = load_pantograph(name)
-    for like in (name, usual):
-        assert pantograph({}, like=like).model_dump(exclude=left_out) == usual.model_dump(exclude=left_out)
+        assert make({}, like=like).model_dump(exclude=left_out) == usual.model_dump(exclude=left_out)
 
 
 def test_dotted_names_and_tables_say_the_same():

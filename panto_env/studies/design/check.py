@@ -44,7 +44,7 @@ def check(design: Design, candidates: Mapping[str, Mapping[str, float]]) -> list
     found = []
     for name, values in candidates.items():
         for policy in dict.fromkeys((PASSIVE, design.policy, *design.check_policies)):
-            own = arguments_of(design, {k: v for k, v in values.items() if k}, policy)
+            own = arguments_of(design, values, policy)
             own.pop("accuracy", None)
             searched, seeds = sorted(design.speeds_kmh), range(design.seeds)
             others = range(VERIFIED_FROM, VERIFIED_FROM + design.seeds)

@@ -194,7 +194,7 @@ def worst(found: Sequence[Found]) -> Found:
 
 
 def objectives_of(design: Design, arguments: Mapping[str, Any], found: Found) -> list[float]:
-    """Values of the objectives, each larger by the excess over limits where there is only one."""
+    """Values of the objectives, ``REFUSED`` for one that has none."""
     wires = [getattr(arguments["catenary"], name, None) for name in ("contact_wire", "messenger_wire")]
     known = {
         "std_ratio": found.std_ratio,

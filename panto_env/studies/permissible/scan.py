@@ -19,6 +19,7 @@ from ...base.errors import InputError
 from ...base.files import finite
 from ...cluster import spread
 from ...control.arguments import check_arguments
+from ...control.faults import faults_of
 from ...control.settings import RunSettings
 from ...metrics.compliance import Requirement
 from ...metrics.trajectory import Trajectory
@@ -218,7 +219,7 @@ def _passes(policies: tuple[str, ...], settings: Mapping[str, Any], speed: float
             more: dict[str, Any] = {}
             if failing:
                 silent = {"part": "actuator", "kind": "silent", "begin": half}
-                more = {"faults": [*_listed(given.get("faults", ())), silent]}
+                more = {"faults": [*faults_of(given.get("faults", ())), silent]}
             try:
                 run = simulate(policy=None if policy == PASSIVE else policy, **(given | more))
                 ending = run.ending
@@ -228,10 +229,6 @@ def _passes(policies: tuple[str, ...], settings: Mapping[str, Any], speed: float
                 half = 0.5 * float(run.time[-1])
             found.append(_judged(run, ending, policy, speed, seed, failing))
     return found
-
-
-def _listed(faults: Any) -> list[Any]:
-    return list(faults) if isinstance(faults, list | tuple) else [faults]
 
 
 def _judged(run: Trajectory | None, ending: str, policy: str, speed: float, seed: int, failing: bool) -> Pass:

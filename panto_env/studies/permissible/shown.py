@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.arrays import from_kmh
-from ...base.checksums import __version__
-from ...base.files import PAGES, check_output, write_text
 from ...base.plotting import LIMIT, series_colour, stacked
 from ...base.table import Alarm, Table
 from ...metrics.compliance import STD_OF_MEAN, arcing_limit, maximum_limit, uplift_factor
 from ...plant.catenary.schema import CatenaryData
-from ...report.page import page_template
+from ...records.plots import save_page
+from ...report.charts import svg_of
 from ...terminal import number
-from .scan import PASSIVE, Scan
+from .scan import PASSIVE, Scan, verified
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,7 +38,7 @@ def answers_table(scan: Scan, again: Scan | None = None) -> Table:
     for policy in scan.policies:
         found, acts = scan.answer(policy), policy != PASSIVE
         limits = [found.limit] if again is None else [found.limit, again.limit(policy)]
-        lowest = math.nan if any(map(math.isnan, limits)) else min(limits)
+        lowest = found.limit if again is None else verified(scan, again)[policy]
         rows.append(
             (
                 policy,
@@ -128,22 +126,12 @@ def write_page(
     scan: Scan, again: Scan | None, line: CatenaryData, settings: Mapping[str, Any], path: str | Path
 ) -> None:
     """Write the page of a scan, whole or not at all. Raises InputError for a name with another suffix."""
-    check_output(path, PAGES)
-    import matplotlib as mpl
-
-    file = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "panto-env"}):
-        plot_scan(scan, line).savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-    svg = file.getvalue()
-    template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
-    given = ", ".join(f"{name} {value}" for name, value in settings.items())
-    text = template.render(
-        version=__version__,
-        title=f"Permissible speeds on {line.name}",
-        introduction=f"Settings: {given}.",
-        notes=[],
-        charts=[("Over speed, with the limits of EN 50367 and EN 50119 (dashed)", svg[svg.index("<svg") :])],
-        tables=[answers_table(scan, again)],
-        remarks=[*reasons(scan), *NOTES],
+    save_page(
+        f"Permissible speeds on {line.name}",
+        f"Settings: {', '.join(f'{name} {value}' for name, value in settings.items())}.",
+        [],
+        [("Over speed, with the limits of EN 50367 and EN 50119 (dashed)", svg_of(plot_scan(scan, line)))],
+        [answers_table(scan, again)],
+        [*reasons(scan), *NOTES],
+        path,
     )
-    write_text(path, text)
