@@ -51,6 +51,10 @@ RULES = (
     Rule("panto fit", f"{MINUTES}; tests/fitting/test_commands.py has short ones"),
     Rule("panto simulate --catenary found.toml", "of a fit; tests/fitting/test_fitted_line.py has one"),
     Rule("panto compare month1-220.csv", "of a fitted line's run; tests/records/test_compare.py has others"),
+    Rule(
+        "panto design",
+        f"a search {MINUTES}, of a file that the page shows; tests/studies/test_design.py has short ones",
+    ),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),
     Rule("panto oracle --stored", "as it stands", ""),
     Rule("panto reproduce", f"a study {MINUTES}; each has a test file of its own"),
