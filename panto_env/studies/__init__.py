@@ -27,6 +27,7 @@ STUDIES: tuple[str, ...] = (
     "paper2",
     "paper3-parameters",
     "spacing",
+    "permissible",
 )
 """Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""
 

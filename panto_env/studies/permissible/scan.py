@@ -125,8 +125,6 @@ class Scan:
     def answer(self, policy: str) -> Answer:
         """What the scan says of a policy."""
         kept, limit = self.kept(policy), self.limit(policy)
-        edges = np.flatnonzero(np.diff([False, *kept, False])).reshape(-1, 2)
-        bands = [(self.speeds_kmh[begin], self.speeds_kmh[end - 1]) for begin, end in edges.tolist()]
         beyond = self.speeds_kmh[kept.index(False)] if False in kept else math.nan
         there = self.at(policy, limit)
         tight = min(there, key=lambda each: each.margin, default=None)
@@ -136,7 +134,7 @@ class Scan:
 
         return Answer(
             limit,
-            bands,
+            bands_of(self.speeds_kmh, kept),
             beyond,
             "" if math.isnan(beyond) else self._why(policy, beyond),
             self.limit(policy, waves=True),
@@ -282,6 +280,12 @@ def _broken(one: Requirement) -> Broken:
     limit = f"at most {criterion.highest:.3g}" if beyond else f"at least {criterion.lowest:.3g}"
     unit = f" {criterion.unit}" if criterion.unit else ""
     return Broken(criterion.key, criterion.name, one.pantograph, criterion.value, f"{limit}{unit}")
+
+
+def bands_of(speeds_kmh: Sequence[float], kept: Sequence[bool]) -> list[tuple[float, float]]:
+    """First and last speed of each row of neighbouring speeds that are kept."""
+    edges = np.flatnonzero(np.diff([False, *kept, False])).reshape(-1, 2)
+    return [(speeds_kmh[begin], speeds_kmh[end - 1]) for begin, end in edges.tolist()]
 
 
 def verified(first: Scan, again: Scan) -> dict[str, float]:

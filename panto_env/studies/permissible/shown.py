@@ -68,7 +68,7 @@ def reasons(scan: Scan) -> list[str]:
     sentences = []
     for policy in scan.policies:
         found = scan.answer(policy)
-        words = f"{policy}: kept at {_bands(found.bands)} km/h"
+        words = f"{policy}: kept at {in_words(found.bands)} km/h"
         if not math.isnan(found.beyond):
             words += f"; forbidden at {found.beyond:g} by {found.reason}"
         if found.tightest:
@@ -83,7 +83,8 @@ def _speed(value: float) -> str:
     return Alarm("none") if math.isnan(value) else f"{value:g}"
 
 
-def _bands(bands: Sequence[tuple[float, float]]) -> str:
+def in_words(bands: Sequence[tuple[float, float]]) -> str:
+    """Bands of speeds (km/h)."""
     return ", ".join(f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in bands) or "none"
 
 
