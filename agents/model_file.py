@@ -86,10 +86,12 @@ class Cell(NamedTuple):
 
     def following(self, values: NDArray[np.float32], state: NDArray[np.float32]) -> NDArray[np.float32]:
         """State after the present one (Cho et al., EMNLP 2014, as torch has it)."""
-        given = np.split(self.weight_input @ values + self.bias_input, 3)
-        kept = np.split(self.weight_state @ state + self.bias_state, 3)
-        reset, update = (1 / (1 + np.exp(-(given[k] + kept[k]))) for k in (0, 1))
-        new = np.tanh(given[2] + reset * kept[2])
+        given = self.weight_input @ values + self.bias_input
+        kept = self.weight_state @ state + self.bias_state
+        units = state.size
+        gates = 1 / (1 + np.exp(-(given[: 2 * units] + kept[: 2 * units])))
+        reset, update = gates[:units], gates[units:]
+        new = np.tanh(given[2 * units :] + reset * kept[2 * units :])
         following: NDArray[np.float32] = (1 - update) * new + update * state
         return following
 

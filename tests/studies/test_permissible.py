@@ -10,9 +10,11 @@ from typer.testing import CliRunner
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 from panto_env.cli.permissible import parse_speeds
-from panto_env.studies.permissible import PASSIVE, Scan, scan, verified
+from panto_env.studies import write
+from panto_env.studies.permissible import PASSIVE, Scan, scan, study, verified
 from panto_env.studies.permissible.scan import WAVES, Broken, Pass
 from panto_env.studies.permissible.shown import answers_table
+from panto_env.studies.permissible.study import Case
 
 FORCE, SPEED = (
     Broken("max", "maximum", 2, 360.0, "at most 350 N"),
@@ -105,7 +107,7 @@ def test_its_command_prints_what_it_writes(tmp_path):
     assert data["speeds_kmh"] == [250, 260]
     assert data["verification"]["speeds_kmh"] == [250, 255, 260]
     limit = data["answers"][PASSIVE]["limit"]
-    assert f"{limit:g}" if limit else "none" in told.output
+    assert (f"{limit:g}" if limit else "none") in told.output
 
 
 @pytest.mark.parametrize(
@@ -120,3 +122,27 @@ def test_speeds_have_a_step(text, speeds):
 def test_other_speeds_are_refused(text):
     with pytest.raises(InputError, match=r"--speeds (must read first:last:step|has [\d,]+ speeds)"):
         parse_speeds(text)
+
+
+@pytest.mark.slow
+def test_the_study_of_the_catalogue_tells_gains_bands_and_what_fell(monkeypatch, tmp_path):
+    short = Case("en50318-2002", "dsa380", (220.0, 240.0, 260.0, 280.0))
+    for name, value in {
+        "CASES": (short,),
+        "DISTANCES": (200.0,),
+        "SEEDS": 1,
+        "POLICIES": ("repetitive",),
+    }.items():
+        monkeypatch.setattr(study, name, value)
+    outcome = study.run(lambda what, share: None)
+    limits, gains, _ = outcome.tables
+    (row,) = limits.cells
+    found = outcome.numbers["cases"][0]["policies"]
+    assert row[:3] == ("en50318-2002", "dsa380", "307")
+    for column, policy in ((3, PASSIVE), (4, "repetitive")):
+        both = [found[policy][which]["limit"] for which in ("first", "again")]
+        assert row[column].removeprefix("≥ ") == ("none" if any(map(math.isnan, both)) else f"{min(both):g}")
+    assert found["repetitive"]["std_reduction"] > 20  # as everywhere on this line
+    assert float(gains.cells[0][4]) == pytest.approx(-found["repetitive"]["std_reduction"], abs=0.6)
+    assert len(outcome.rows["permissible-speeds"]) == 2 * 4 * 3  # seeds, speeds; passive, acting, failing
+    assert {path.suffix for path in write(outcome, tmp_path)} == {".json", ".png", ".csv"}

@@ -103,8 +103,11 @@ def run(report: Report) -> Outcome:
     return Outcome(
         title="Permissible speeds with control and without",
         comparisons=(),
-        tables=tuple(limits_table(found, distance) for distance in DISTANCES)
-        + (gains_table(found), fell_table(found)),
+        tables=(
+            *(limits_table(found, distance) for distance in DISTANCES),
+            gains_table(found),
+            fell_table(found),
+        ),
         plots={"permissible-speeds": plot_bands([one for one in found if one.distance == SHOWN])},
         numbers={"cases": [as_dict(one) for one in found]},
         rows={"permissible-speeds": [row for one in found for row in rows_of(one)]},
