@@ -27,7 +27,7 @@ demo: $(READY)
 	@echo "The page is $(DEMO)/benchmark.html, the picture $(DEMO)/benchmark.png; every figure is in $(DEMO)/benchmark.json."
 
 # All tracks of the benchmark, with the agents that come with the project, the page of all, and the documents' tables.
-TRACKS := any-line train-trailing train-both known-line as-built without-position head high-speed high-speed-as-built unknown-line unknown-section faults margins journey
+TRACKS := any-line train-trailing train-both known-line as-built without-position head high-speed high-speed-as-built unknown-line unknown-section faults margins long journey
 RESULTS := docs/benchmark
 benchmark: $(READY)
 	mkdir -p $(RESULTS)

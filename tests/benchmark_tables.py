@@ -19,6 +19,8 @@ README = ROOT / "README.md"
 RESULTS = ROOT / "docs" / "benchmark"
 BEGIN, END = "<!-- python -m tests.benchmark_tables -->", "<!-- end -->"
 TRACK = "unknown-line"
+CHECKS = ("as-built", "head", "high-speed", "known-line", "without-position")
+"""Tracks that check single abilities, whose tables the page leaves to `panto report --markdown`."""
 SHOWN = {
     "agent-any-pantograph": "learned, for four pantographs",
     "agent-any-line": "learned",
@@ -33,6 +35,8 @@ SHOWN = {
 def with_tables(text: str) -> str:
     """The page's text with the tables of the stored results."""
     for path in sorted(RESULTS.glob("*.json.gz")):
+        if path.name.partition(".")[0] in CHECKS:
+            continue
         result = read_result(path)
         blocks = [f"*{table.title}*\n\n{table.markdown.rstrip()}\n" for table in tables_of(result)]
         block = "\n".join(blocks)

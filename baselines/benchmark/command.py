@@ -64,7 +64,7 @@ def benchmark(
     trusted: Annotated[
         bool,
         typer.Option(
-            "--trusted", help="Run installed policies in the process of the plant: faster by little."
+            "--trusted", help="Run installed policies in the process of the plant, which is faster."
         ),
     ] = False,
     workers: Annotated[int | None, typer.Option(help="Processes; two per core by default.")] = None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from math import isfinite, isnan, nan
 from statistics import mean
 from types import MappingProxyType
@@ -13,7 +14,7 @@ from panto_env.base.table import Table
 from panto_env.terminal import number
 
 from ..benchmark.overall import Standing, next_in_ranking, with_feedback
-from ..benchmark.report import FIGURES, harm_table, kilometre_tables, margins_table
+from ..benchmark.report import FIGURES, kilometre_tables, margins_table
 from ..benchmark.run import Result
 from ..benchmark.settings import LineAtSpeed
 from ..benchmark.single_pass import ROW_LABELS
@@ -241,11 +242,54 @@ TRAINING = "· "
 
 
 def tables_of(result: Result) -> list[Table]:
-    """Tables of a track for a document: summary and harm, and kilometres and margins where it has them."""
+    """Tables of a track for a document: the ranking, then cases, kilometres and margins where it has them."""
     along = kilometre_tables(result.title, result.cells)
     margins = margins_table(result.title, result.settings.get("lines", ()), result.cells)
-    harm = harm_table(result.title, result.by_rank)
-    return [summary(result), harm, *along, *([] if margins is None else [margins])]
+    by_case = [summary(result)] if any(place.case for place in result.places) else []
+    return [ranking(result), *by_case, *along, *([] if margins is None else [margins])]
+
+
+def ranking(result: Result) -> Table:
+    """Table of policies over all passes, by rank, and why the last ones have none.
+
+    Δσ with its 95 % interval for these lines, and for others like them; CL and the change of CF, means over
+    cells; the worst pass; the share of passes in which the policy is better than the next one, with its
+    interval. A method's trainings follow it.
+    """
+    after = next_in_ranking(result.standings)
+    rows = []
+    for one in result.by_rank:
+        name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
+        windows = signed(one.early, 1), signed(nan if one.late is None else one.late, 1)
+        figures = number(one.contact_loss, 2), number(one.cost_change, 0), signed(one.harm.worst, 0)
+        if one.disqualified:
+            out = f"({number(one.change, 1)})", "", ""
+            rows.append((name, *out, *windows, *figures, "", why(one.disqualified)))
+            continue
+        intervals = ("" if each is None else "{:.1f} to {:.1f}".format(*each) for each in _intervals(one))
+        better = str(one.better_than.get(after.get(one.policy) or "", ""))
+        rows.append((name, f"{one.change:.1f}", *intervals, *windows, *figures, better, ""))
+    headings = ("policy", "Δσ (%)", "95 %", "other lines", "spans 10-19", "100 spans on", "CL (%)", "ΔCF (%)",
+                "worst pass (%)", "better than next", "not ranked, since")  # fmt: skip
+    of_lines = any(one.interval_for_lines for one in result.standings)
+    late = any(one.late is not None for one in result.standings)
+    known = [True] * 3 + [of_lines] + [late] * 2 + [True] * 5
+    title = f"{result.title}: Δσ (%), {result.cells[0].seeds} seeds"
+    return Table(
+        with_feedback(title, result.standings),
+        tuple(compress(headings, known)),
+        [tuple(compress(row, known)) for row in rows],
+    )
+
+
+def _intervals(one: Standing) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    return one.interval, one.interval_for_lines
+
+
+def why(disqualified: str) -> str:
+    """Why a policy is not ranked, without the rule: where, and what it does there."""
+    where, _, what = disqualified.partition(": it ")
+    return f"{what.partition(', more than')[0]}: {where}" if what else disqualified
 
 
 def summary(result: Result) -> Table:
@@ -270,8 +314,7 @@ def summary(result: Result) -> Table:
         changes = (oracles.get(place, "–") for place in result.places)
         rows.append(("*oracle*", *changes, *["–"] * len(OVERALL)))
     seeds = result.cells[0].seeds
-    title = with_feedback(f"{result.title}: Δσ (%), {seeds} seeds", result.standings)
-    return Table(title, headings, tuple(rows))
+    return Table(f"{result.title}: Δσ (%) by case, {seeds} seeds", headings, tuple(rows))
 
 
 def _headings(places: Sequence[LineAtSpeed]) -> list[str]:

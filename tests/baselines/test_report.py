@@ -19,12 +19,13 @@ from panto_baselines.line import as_toml
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
 from panto_baselines.report.page import page, report, what_is
-from panto_baselines.report.tables import summary
+from panto_baselines.report.tables import ranking, summary, why
 from panto_baselines.report.tables import tables_of as of_track
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import read_checked, with_checksum, write_checked
 
+from ..benchmark_tables import CHECKS
 from ..pages import DOCS, tables_of
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
@@ -184,7 +185,7 @@ def test_a_track_on_which_a_tape_is_nearly_as_good_says_so_in_its_heading():
     table = json.loads(json.dumps(result()).replace('"p"', '"tape of pd"'))
     words = "needs no feedback: tape of pd -10.0 %, pd -9.0 %"
     assert f"; {words}</h2>" in html(table)
-    assert summary(parse_result(table, "it")).title.endswith(f"Δσ (%), 2 seeds; {words}")
+    assert ranking(parse_result(table, "it")).title.endswith(f"Δσ (%), 2 seeds; {words}")
     assert "needs no feedback" not in html()
 
 
@@ -377,13 +378,35 @@ def test_a_document_s_table_holds_every_policy_place_and_oracle():
     assert passive[1] == "0.0 *"  # the first in the cells of this result by hand
 
 
+def test_a_document_s_ranking_says_who_is_out_and_why():
+    table = result()
+    made = ranking(parse_result(table, "it"))
+    assert made.headings[:3] == ("policy", "Δσ (%)", "95 %")
+    assert "other lines" not in made.headings
+    assert "100 spans on" not in made.headings
+    rows = {row[0]: row for row in made.cells}
+    assert rows["p"][1:3] == ("-10.0", "-11.0 to -9.0")
+    assert rows["p"][-2:] == ("75 % (50 to 90)", "")
+    assert rows[HOSTILE][1].startswith("(")
+    assert rows[HOSTILE][-1] == "it cheats"
+    table["standings"][2]["interval_for_lines"] = [-20.0, 2.0]
+    made = ranking(parse_result(table, "it"))
+    assert made.cells[0][made.headings.index("other lines")] == "-20.0 to 2.0"
+
+
+def test_a_reason_is_shown_without_the_rule():
+    told = "ln2 at 260 km/h: it changes σ by +12.8 % in one pass (seed 5), more than 10 %"
+    assert why(told) == "changes σ by +12.8 % in one pass (seed 5): ln2 at 260 km/h"
+    assert why("it cheats") == "it cheats"
+
+
 # --- the documents ---------------------------------------------------------------------------------
 
 TRACKS = [name for name in names("benchmark") if name.startswith("benchmark/") and name != "benchmark/ideal"]
 """All but that for the curious, which `make benchmark` leaves out."""
 
 
-@pytest.mark.parametrize("track", TRACKS)
+@pytest.mark.parametrize("track", [name for name in TRACKS if name.partition("/")[2] not in CHECKS])
 def test_its_tables_are_those_of_the_results(track):
     shown = tables_of("benchmark.md")
     for table in of_track(read_result(DOCS / f"{track}.json.gz")):
@@ -397,7 +420,10 @@ def test_stored_results_are_of_the_tracks_as_they_are(track):
     stored = read_checked(DOCS / f"{track}.json.gz")
     # Values that came later have in older results the default with which these were made.
     settings = BenchmarkSettings.model_validate(stored["settings"])
-    assert settings.model_dump(mode="json") == load_benchmark(track).model_dump(mode="json")
+    # Installed policies play the same pass apart and beside the plant: see test_apart.py.
+    assert settings.model_dump(mode="json", exclude={"trusted"}) == load_benchmark(track).model_dump(
+        mode="json", exclude={"trusted"}
+    )
 
 
 def test_the_makefile_runs_the_same_tracks():
