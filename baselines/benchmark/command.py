@@ -82,6 +82,9 @@ def benchmark(
         str | None,
         typer.Option(help="Page to write, as `panto report` does.", callback=writable(PAGES)),
     ] = None,
+    wide: Annotated[
+        bool, typer.Option("--wide", help="Print every figure at every speed, in up to 200 columns.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Compare policies on the same lines, at the same speeds, under the same seeds.
@@ -94,6 +97,7 @@ def benchmark(
     from panto_env.analysis.plots import save
 
     from ..report.page import save as save_page
+    from .brief import brief
     from .report import plot as draw_plot
     from .report import tables
 
@@ -122,7 +126,7 @@ def benchmark(
         if json:
             print_json(outcome.as_dict())
             return
-        console.print(tables(outcome))
+        console.print(tables(outcome) if wide else brief(outcome))
         if settings.salt is not None:
             words = f"Seeds are made from the salt '{settings.salt}', SHA-256 {salt_hash(settings.salt)}."
             console.print(words, soft_wrap=True)

@@ -232,3 +232,10 @@ def _disqualification(cells: Sequence[Cell]) -> str:
             f"a third of them or more ({ADVICE})"
         )
     return ""
+
+
+def why(disqualified: str) -> str:
+    """Why a policy is not ranked, without the rule: what it does, and where."""
+    where, known, what = disqualified.partition(": it ")
+    told = (what if known else disqualified.removeprefix("it ")).partition(", more than")[0]
+    return f"{told}: {where}" if known else told

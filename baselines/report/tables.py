@@ -13,7 +13,7 @@ from typing import Generic, NamedTuple, TypeVar
 from panto_env.base.table import Table
 from panto_env.terminal import number
 
-from ..benchmark.overall import Standing, next_in_ranking, with_feedback
+from ..benchmark.overall import Standing, next_in_ranking, why, with_feedback
 from ..benchmark.report import FIGURES, kilometre_tables, margins_table
 from ..benchmark.run import Result
 from ..benchmark.settings import LineAtSpeed
@@ -284,12 +284,6 @@ def ranking(result: Result) -> Table:
 
 def _intervals(one: Standing) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
     return one.interval, one.interval_for_lines
-
-
-def why(disqualified: str) -> str:
-    """Why a policy is not ranked, without the rule: where, and what it does there."""
-    where, _, what = disqualified.partition(": it ")
-    return f"{what.partition(', more than')[0]}: {where}" if what else disqualified
 
 
 def summary(result: Result) -> Table:

@@ -13,13 +13,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from panto_baselines.benchmark.overall import why
 from panto_baselines.benchmark.run import parse_result, read_result
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.line import as_toml
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
 from panto_baselines.report.page import page, report, what_is
-from panto_baselines.report.tables import ranking, summary, why
+from panto_baselines.report.tables import ranking, summary
 from panto_baselines.report.tables import tables_of as of_track
 from panto_configs import names
 from panto_env import InputError
@@ -282,7 +283,7 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == html(result(), result())
     (tmp_path / "a.html").unlink()
     told = called(first, "--markdown")
-    assert "| policy | 250 km/h | 300 km/h | all | 95 % |" in told.output
+    assert "| policy | Δσ (%) | 95 % | CL (%) | ΔCF (%) |" in told.output
     assert set(tmp_path.iterdir()) == {first, second}
 
 
@@ -388,7 +389,7 @@ def test_a_document_s_ranking_says_who_is_out_and_why():
     assert rows["p"][1:3] == ("-10.0", "-11.0 to -9.0")
     assert rows["p"][-2:] == ("75 % (50 to 90)", "")
     assert rows[HOSTILE][1].startswith("(")
-    assert rows[HOSTILE][-1] == "it cheats"
+    assert rows[HOSTILE][-1] == "cheats"
     table["standings"][2]["interval_for_lines"] = [-20.0, 2.0]
     made = ranking(parse_result(table, "it"))
     assert made.cells[0][made.headings.index("other lines")] == "-20.0 to 2.0"
@@ -397,7 +398,7 @@ def test_a_document_s_ranking_says_who_is_out_and_why():
 def test_a_reason_is_shown_without_the_rule():
     told = "ln2 at 260 km/h: it changes σ by +12.8 % in one pass (seed 5), more than 10 %"
     assert why(told) == "changes σ by +12.8 % in one pass (seed 5): ln2 at 260 km/h"
-    assert why("it cheats") == "it cheats"
+    assert why("it cheats, more than twice") == "cheats"
 
 
 # --- the documents ---------------------------------------------------------------------------------

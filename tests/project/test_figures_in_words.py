@@ -153,7 +153,7 @@ SENTENCES = {
         ),
         ("no ranked one is above {:.1f} %", lambda: [max(abs(each["most_moved"]) for each in ranked())]),
         (
-            "of {} places in the rankings below, {} have none",
+            "of {} places in the rankings, {} have none",
             lambda: (len(ranked()), sum(each["moved"] == 0 for each in ranked())),
         ),
     ],
