@@ -2,7 +2,7 @@
 
 The minimum of the force lies within the first metres after a support, where the line is put back by a span.
 It depends on what the paper does not print: how many modes are kept, and what becomes of the wire's velocity.
-`python -m tests.plant.test_three_span_projection` prints the table of docs/paper2.md.
+`python -m tests.plant.test_three_span_projection` prints a table; docs/paper2.md has rows of it.
 """
 
 from dataclasses import dataclass
