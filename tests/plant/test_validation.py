@@ -66,7 +66,7 @@ def test_finite_elements_are_compared_with_the_default_s_grid_and_step(monkeypat
 
 
 def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_on_any_grid():
-    """What docs/validation.md says of waves of 0.8 m, of the preset's depth and of 2 mm, and of 0.4 m."""
+    """What docs/conditions.md says of waves of 0.8 m, of the preset's depth and of 2 mm, and of 0.4 m."""
     fine, full, fast = wear.DISCRETISATIONS
     for condition in wear.CONDITIONS:
         true, ours, coarse = (wear.check_wear(condition, each) for each in (fine, full, fast))
