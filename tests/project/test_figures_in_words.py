@@ -107,6 +107,13 @@ def of_trainings(function, track, other):
     return np.concatenate([function(track, name, other) for name in names])
 
 
+def windows(track, policy, line=None):
+    """Change of sigma (%) in the early and the late window, over a track or on one of its lines."""
+    rows = stored(track)["standings" if line is None else "cells"]
+    (one,) = (each for each in rows if each["policy"] == policy and line in (None, each.get("catenary")))
+    return one["early"], one["late"]
+
+
 SENTENCES = {
     "docs/benchmark.md": [
         (
@@ -150,6 +157,19 @@ SENTENCES = {
         (
             "`agent-trailing` reduces σ by {:.1f} %, the best reference by {:.1f} %",
             lambda: (less("train-trailing", "agent-trailing")[0], less("train-trailing", TRAILING)[0]),
+        ),
+        (
+            "a hundred spans on, `agent-any-pantograph` takes {:.1f} % off σ, after {:.1f} % at first",
+            lambda: [-one for one in windows("long", "agent-any-pantograph")[::-1]],
+        ),
+        (
+            "its σ is {:.0f} % below passive at first and {:.0f} % above it later; on `ln2` its gain of "
+            "{:.0f} % is gone",
+            lambda: (
+                -windows("long", "agent-any-line", "sweden-st15")[0],
+                windows("long", "agent-any-line", "sweden-st15")[1],
+                -windows("long", "agent-any-line", "ln2")[0],
+            ),
         ),
         ("no ranked one is above {:.1f} %", lambda: [max(abs(each["most_moved"]) for each in ranked())]),
         (
