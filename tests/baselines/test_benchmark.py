@@ -274,8 +274,11 @@ def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_js
     assert found
     assert hashlib.sha256(found[1].encode()).hexdigest() == found[2]
     assert files[1].read_text(encoding="utf-8") == page([read_result(files[0])])
-    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
+    for words in ("p:gain=0.5", "passive", "CL", "Δσ", "rank", "--wide"):
         assert words in result.stdout
+    wide = called("p:gain=0.5", "--wide").stdout
+    for words in ("p:gain=0.5", "passive", "CF", "CL", "F_m", "σ", "uplift", "effort", "spans 10–19"):
+        assert words in wide
 
 
 def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
