@@ -254,7 +254,8 @@ def search(
         for trial, (values, found) in zip(
             trials, tried(design, [t.params for t in trials], workers), strict=True
         ):
-            trial.set_constraint("excess", found.excess)
+            if len(design.objectives) > 1:  # CMA-ES takes no constraints, but a penalty, below
+                trial.set_constraint("excess", found.excess)
             trial.set_user_attr("excess", found.excess)
             trial.set_user_attr("std_ratio", found.std_ratio if not math.isnan(found.std_ratio) else None)
             trial.set_user_attr("refused", found.refused)
