@@ -65,9 +65,10 @@ def _out_elsewhere(cells: Sequence[Cell], judged: Sequence[str]) -> list[Cell]:
 
 def headline(standings: Sequence[Standing]) -> str:
     """Who is first, by how much, and who follows."""
-    first, *others = [each for each in standings if each.rank is not None] or [None]
-    if first is None or not first.change < 0:
+    ranked = [each for each in standings if each.rank is not None]
+    if not ranked or not ranked[0].change < 0:
         return "No policy that is ranked lowers σ."
+    first, *others = ranked
     words = f"{first.policy} is first: σ {number(first.change, 1)}{_within(first)} %"
     if not others:
         return f"{words}."

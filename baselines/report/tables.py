@@ -257,7 +257,7 @@ def ranking(result: Result) -> Table:
     interval. A method's trainings follow it.
     """
     after = next_in_ranking(result.standings)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for one in result.by_rank:
         name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
         windows = signed(one.early, 1), signed(nan if one.late is None else one.late, 1)

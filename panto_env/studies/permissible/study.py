@@ -12,6 +12,7 @@ from ...base.arrays import to_kmh
 from ...base.plotting import LIMIT, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary
+from ...plant.catenary.flexible import FlexibleCatenaryData
 from ..study import Outcome, Report
 from .scan import PASSIVE, VERIFIED_FROM, Scan, bands_of, scan, verified
 from .shown import in_words
@@ -155,7 +156,7 @@ def limits_table(found: Sequence[Found], distance: float | None) -> Table:
     for one in found:
         if one.distance != distance:
             continue
-        waves = 0.7 * to_kmh(load_catenary(one.case.line).contact_wire.wave_speed)
+        waves = _wave_limit(one.case.line)
         best = max(POLICIES, key=lambda policy: (_or_zero(one.limit(policy)), policy))
         fallback = [scanned.answer(best).fallback for scanned in (one.first, one.again)]
         rows.append(
@@ -169,6 +170,13 @@ def limits_table(found: Sequence[Found], distance: float | None) -> Table:
         )
     headings = ("line", "pantograph", "0.7 c", PASSIVE, *POLICIES, "if the best fails")
     return Table(f"Permissible speeds (km/h): {where(distance)}", headings, rows, text_columns=2)
+
+
+def _wave_limit(name: str) -> float:
+    """0.7 of the wave speed (km/h)."""
+    line = load_catenary(name)
+    assert isinstance(line, FlexibleCatenaryData)
+    return 0.7 * to_kmh(line.contact_wire.wave_speed)
 
 
 def _or_zero(value: float) -> float:
@@ -236,7 +244,7 @@ def plot_bands(found: Sequence[Found]) -> Figure:
                 color="0.45" if policy == PASSIVE else series_colour(j - 1),
                 label=policy if k == 0 else None,
             )
-        waves = 0.7 * to_kmh(load_catenary(one.case.line).contact_wire.wave_speed)
+        waves = _wave_limit(one.case.line)
         axis.plot([waves] * 2, [k - 0.42, k + 0.42], color=LIMIT, linewidth=0.9)
     axis.set(xlabel="speed (km/h); black: 0.7 of the wave speed", ylim=(len(found) - 0.5, -0.5))
     axis.set_yticks(range(len(found)), [one.case.line for one in found])
