@@ -267,13 +267,14 @@ class _Form:
         start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
         return (
             f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
+            '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
             f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
             "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
             f"typedef struct {{\n{self._translation.state_fields()}\n}} {name}_state;\n\n"
             f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
             f"{_comment(call)}\n"
             f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
-            "\n#endif\n"
+            "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
         )
 
 
