@@ -13,7 +13,7 @@ from rich import table as rich_table
 
 from panto_env.analysis.options import print_criteria, with_settings
 from panto_env.base.errors import InputError, listed
-from panto_env.base.files import make_folder
+from panto_env.base.files import check_output, make_folder
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
 from panto_env.metrics.compliance import worst
@@ -21,6 +21,7 @@ from panto_env.metrics.figures import FIRST_SETTLED, LABELS
 from panto_env.terminal import (
     Json,
     Plot,
+    announce_overwriting,
     console,
     counting,
     number,
@@ -107,19 +108,88 @@ def train(
         console.print(line, soft_wrap=True)
 
 
+EXPORTS = {"safetensors": ".safetensors", "c": ".c"}
+"""Suffix of the file that each format of `panto export` has."""
+
+
+@with_settings(only=("catenary", "pantograph", "actuator", "sensors"), defaults=False)
 def export(
-    model: Annotated[Path, typer.Argument(help="Model file that `panto train` wrote.")],
+    settings: dict[str, Any],
+    policy: Annotated[str, typer.Argument(help="Model file, or a policy's name (with parameters).")],
     output: Annotated[
-        str, typer.Argument(help="Model file to write (.safetensors).", callback=writable((".safetensors",)))
-    ],
+        str | None,
+        typer.Argument(
+            help=f"File to write ({', '.join(EXPORTS.values())}); by default one named as the policy, here.",
+            callback=writable(tuple(EXPORTS.values())),
+        ),
+    ] = None,
+    format: Annotated[
+        str | None, typer.Option(help=f"One of {', '.join(EXPORTS)}; by default that of the file's suffix.")
+    ] = None,
 ) -> None:
-    """Write a model file to publish: only what the policy needs, as arrays and JSON, with nothing pickled.
+    """Write a policy for use elsewhere: a model file to publish, or a program for a train's controller.
 
-    The policy is the same, but it cannot be trained further.
+    safetensors: only what the policy needs, as arrays and JSON, with nothing pickled; it is the same policy,
+    but cannot be trained further. c: one C99 file and its header, which need nothing but libm; the options
+    say which line, pantograph and actuator its constants are for, by default those of its training.
     """
-    from .model_file import read_model, write_policy
+    from .onboard import exported
+    from .onboard.export import name_in_c
+    from .policy import TrainedPolicy
 
-    write_policy(Path(output), *read_model(model))
+    kind = _format(output, format)
+    path = Path(output or f"{name_in_c(policy)}{EXPORTS[kind]}")
+    if kind == "safetensors":
+        from panto_env.policies import find_policy
+
+        from .model_file import write_policy
+
+        driver = find_policy(policy)
+        if not isinstance(driver, TrainedPolicy):
+            raise InputError(
+                f"The policy '{policy}' has no model of its own to write; take a trained one, or c."
+            )
+        if settings:
+            raise InputError(
+                "A model file holds nothing of line, pantograph, actuator or sensors; leave them out."
+            )
+        write_policy(_announced(path, output), driver.facts, driver.actor)
+        return
+    header = path.with_name(f"{name_in_c(path.name)}.h")
+    for each, given in ((path, output), (header, None)):
+        _announced(each, given)
+    made = exported(policy, name_in_c(path.name), **settings)
+    made.write(path)
+    console.print(
+        f"{path}, {header}: {made.name}_init, {made.name}_step every {made.interval:g} s", soft_wrap=True
+    )
+    rows = [("reading", *asdict(each).values()) for each in made.inputs]
+    rows += [("force", *asdict(each).values()) for each in made.outputs]
+    print_table(Table("inputs and outputs", ("", "name", "unit", "meaning"), tuple(rows)))
+
+
+def _format(output: str | None, given: str | None) -> str:
+    """Format of an export. Raises InputError where none is given, or file and format differ."""
+    if given is not None and given not in EXPORTS:
+        raise InputError(f"--format must be one of {', '.join(EXPORTS)}, not '{given}'.")
+    if output is None:
+        if given is None:
+            raise InputError(f"Name a file to write, or a --format: {', '.join(EXPORTS)}.")
+        return given
+    of_file = next(name for name, suffix in EXPORTS.items() if Path(output).suffix.lower() == suffix)
+    if given not in (None, of_file):
+        raise InputError(
+            f"A file for --format {given} must end in {EXPORTS[given or of_file]}, not {output}."
+        )
+    return of_file
+
+
+def _announced(path: Path, given: str | None) -> Path:
+    """The path, checked and announced before any work, unless it was as an argument."""
+    if given is None:
+        check_output(path, (path.suffix,))
+        announce_overwriting(path)
+    return path
 
 
 @with_settings(

@@ -111,18 +111,18 @@ class Guarded:
 
         Raises InputError where the policy does not exist.
         """
-        self._policy, self._delays = find_policy(policy), (delay, lag)
-        vars(self).update({"observation": "measured"} | wishes(self._policy))
+        self.policy, self.delays = find_policy(policy), (delay, lag)
+        vars(self).update({"observation": "measured"} | wishes(self.policy))
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode. Raises InputError for a line without wires."""
-        self._policy.reset(context)
-        self._guard = Guard(context, *self._delays)
+        self.policy.reset(context)
+        self._guard = Guard(context, *self.delays)
 
     def act(self, observation: Observation) -> Array:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
         seen = self._guard.checked(observation)
-        return self._guard.limited(self._policy.act(seen))
+        return self._guard.limited(self.policy.act(seen))
 
 
 class GuardedEnv(gymnasium.Wrapper[Observation, Any, Observation, Any], RecordConstructorArgs):
@@ -156,26 +156,26 @@ class Guard:
     """The guard of one pantograph in an episode: in each control step what is seen, then what may be done."""
 
     def __init__(self, context: Context, delay: float, lag: float) -> None:
-        self._readings = Readings(context)
-        self._monitor = Monitor(context, delay, lag)
+        self.readings = Readings(context)
+        self.monitor = Monitor(context, delay, lag)
 
     def checked(self, observation: Observation) -> Observation:
         """The observation with held values for those that cannot be."""
-        self._seen = self._readings.checked(observation)
+        self._seen = self.readings.checked(observation)
         return self._seen
 
     def limited(self, action: Any) -> Array:
         """Action, (actions,), each in -1..1, as far as it may be done after what was seen last."""
         given = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
-        gate = self._monitor(self._seen, self._readings)
-        if self._monitor.low:
+        gate = self.monitor(self._seen, self.readings)
+        if self.monitor.low:
             given = np.maximum(given, 0.0)
         return np.asarray(gate * given)
 
     @property
     def gate(self) -> float:
         """Factor of the last action, 0 to 1."""
-        return self._monitor.gate
+        return self.monitor.gate
 
 
 class Readings:
@@ -190,23 +190,23 @@ class Readings:
             own[-1] = "force deviation"
         self.present = np.array([names.index(name) for name in own])
         self.force = int(self.present[-1])
-        self._past = [
+        self.past = [
             np.array([names.index(earlier(name, k)) for name in own]) for k in range(1, layout.history + 1)
         ]
         entries = [layout.entries[place] for place in self.present]
         zeros = [
             (-1.0 / FORCE_DEVIATION if e.name == "force deviation" else -e.centre / e.scale) for e in entries
         ]
-        self._zero = np.full(len(own), np.inf) if ending else np.array(zeros)
-        self._share = 1 - math.exp(-interval / AVERAGED) if ending else 0.0  # of an average, in a step
-        self._memory = [
+        self.zero = np.full(len(own), np.inf) if ending else np.array(zeros)
+        self.share = 1 - math.exp(-interval / AVERAGED) if ending else 0.0  # of an average, in a step
+        self.memory = [
             (place, int(span.split()[0]), float(ahead.split()[0]) / interval)
             for place, name in enumerate(names)
             if name.startswith("remembered force")
             for _, span, ahead in [name.split(", ")]
         ]
         self._per_step = interval * context.speed / context.alignment.mean_length  # spans
-        self._unknown = 0.0 if layout.kind in (CENTRED, DEVIATIONS) else context.nominal_force / 100.0
+        self.unknown = 0.0 if layout.kind in (CENTRED, DEVIATIONS) else context.nominal_force / 100.0
         self._last: Array | None = None  # as read
         self._shown: list[Array] = []  # the newest last
         self._stood = np.zeros(len(own), dtype=int)
@@ -224,37 +224,37 @@ class Readings:
             self._last, self._shown = read, [read]
             self._faulty.append(False)
             return seen
-        still = np.abs(read - (1 - self._share) * self._last) < SAME
+        still = np.abs(read - (1 - self.share) * self._last) < SAME
         self._stood = np.where(still, self._stood + 1, 0)
-        bad = (self._stood >= STANDS) | (np.abs(read - self._zero) < 1e-6)
+        bad = (self._stood >= STANDS) | (np.abs(read - self.zero) < 1e-6)
         # One that begins to be held has shown what is wrong since it stands still: its last value is before.
         begins = bad & (self._stood == STANDS) & (len(self._shown) > STANDS)
         for back in range(1, STANDS + 1) if begins.any() else ():
             wrong, right = self._shown[-back], self._shown[-1 - STANDS]
-            self._shift += np.where(begins, self._share * wrong, 0.0)
+            self._shift += np.where(begins, self.share * wrong, 0.0)
             self._shown[-back] = np.where(begins, right, wrong)
         shown = np.where(bad, self._shown[-1], read + self._shift)
         # The environment's averages go on with what was read, these stay where they are while it is held.
-        self._shift += self._share * (read - np.where(bad, 0.0, shown))
+        self._shift += self.share * (read - np.where(bad, 0.0, shown))
         self._last = read
         self._faulty.append(bool(bad.any()))
         self.held = self.held + self._interval if bad.any() else 0.0
         self._sound_for = 0 if bad.any() else self._sound_for + 1
-        for k, past in enumerate(self._past, start=1):
+        for k, past in enumerate(self.past, start=1):
             seen[past] = self._shown[-min(k, len(self._shown))]
         seen[self.present] = shown
         self._shown = [*self._shown[-8:], shown]
-        if self._memory and self._sound_for < len(self._faulty):
+        if self.memory and self._sound_for < len(self._faulty):
             self._forget(seen)
         return seen
 
     def _forget(self, seen: Observation) -> None:
         """Take for unknown what memory has of times in which a reading was faulty."""
-        for place, spans, ahead in self._memory:
+        for place, spans, ahead in self.memory:
             ago = round(spans / self._per_step - ahead)
             recent = [self._faulty[-k] for k in range(max(ago - 3, 1), ago + 4) if k <= len(self._faulty)]
             if any(recent):
-                seen[place] = self._unknown
+                seen[place] = self.unknown
 
 
 class Monitor:
@@ -263,11 +263,11 @@ class Monitor:
     def __init__(self, context: Context, delay: float, lag: float) -> None:
         self._interval, self._limit = context.control_interval, context.force_limit
         line, layout = mean_line(context), context.layout
-        self._models = [
+        self.models = [
             Sampled(line_model(replace(context, channels=(channel,)), line, delay, lag), self._interval)
             for channel in context.channels
         ]
-        self._states = [np.zeros(model.size) for model in self._models]
+        self._states = [np.zeros(model.size) for model in self.models]
         names = [entry.name for entry in layout.entries]
         self._commands = [k for k, name in enumerate(names) if re.fullmatch("last .* action", name)]
         force = next(entry for entry in layout.entries if entry.name in FORCES)
@@ -275,13 +275,13 @@ class Monitor:
         of_nominal = force.name == "force deviation"
         newtons = self._nominal if of_nominal else 1.0
         self._to_force = force.scale * newtons, (force.centre + of_nominal) * newtons
-        self._absolute = layout.kind != DEVIATIONS
-        self._shares = 1 - np.exp(-self._interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW]))
+        self.absolute = layout.kind != DEVIATIONS
+        self.shares = 1 - np.exp(-self._interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW]))
         self._means = np.zeros((2, 3))  # over both windows: of the force, without control, and what that adds
         self._squares, self._added = np.zeros((2, 3)), 0.0
         self._begun = False
-        self._low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
-        self._at_rest = lfilter_zi(*self._low_pass)
+        self.low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
+        self.at_rest = lfilter_zi(*self.low_pass)
         self.gate, self.low = 0.0, False
         self._waits, self._pause, self._acted, self._passive_for = LISTENING, PAUSE, 0.0, 0.0
         self._heard, self._heard_at = math.inf, context.speed  # spread while passive (N), at a speed (m/s)
@@ -296,7 +296,7 @@ class Monitor:
         scale, centre = self._to_force
         force = centre + scale * float(seen[readings.force])
         added = 0.0
-        for k, (model, place) in enumerate(zip(self._models, self._commands, strict=True)):
+        for k, (model, place) in enumerate(zip(self.models, self._commands, strict=True)):
             command = float(seen[place]) * self._limit
             self._states[k] = model.a @ self._states[k] + model.b * command
             added += float(model.c[0] @ self._states[k])
@@ -333,24 +333,24 @@ class Monitor:
         self._waits = max(self._waits - self._interval, 0.0)
         step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / self._fade_in
         self.gate = min(max(self.gate + step, 0.0), 1.0)
-        self.low = self._absolute and force < LOW * self._nominal and added < 0.0
+        self.low = self.absolute and force < LOW * self._nominal and added < 0.0
         return self.gate
 
     def _add(self, force: float, added: float) -> None:
         now = np.array([force, force - added, added])
         if not self._begun:
             self._means[:], self._begun = now, True
-            self._past = np.multiply.outer(self._at_rest, now)
-        (b0, b1, b2), (_, a1, a2) = self._low_pass
+            self._past = np.multiply.outer(self.at_rest, now)
+        (b0, b1, b2), (_, a1, a2) = self.low_pass
         first, second = self._past
         passed = b0 * now + first
         self._past = np.array([b1 * now - a1 * passed + second, b2 * now - a2 * passed])
         now = passed
-        shares = self._shares[:2, None]
+        shares = self.shares[:2, None]
         self._deviation = float(now[0] - self._means[0, 0])
         self._means += shares * (now - self._means)
         self._squares += shares * ((now - self._means) ** 2 - self._squares)
-        self._added += self._shares[2] * (added - self._added)
+        self._added += self.shares[2] * (added - self._added)
 
     def _speed_of(self, seen: Observation) -> float:
         if self._to_speed is None:

@@ -13,7 +13,6 @@ from safetensors.numpy import load_file
 from typer.testing import CliRunner
 
 from panto_agents import train
-from panto_agents.command import export
 from panto_agents.model_file import read_model
 from panto_agents.policy import TrainedPolicy, load
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
@@ -126,8 +125,9 @@ def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, 
 def test_a_damaged_model_is_not_exported(washed, tmp_path):
     damaged = tmp_path / "damaged.safetensors"
     damaged.write_bytes(washed.best.read_bytes()[:-200])
-    with pytest.raises(InputError, match="not a whole model file"):
-        export(damaged, str(tmp_path / "out.safetensors"))
+    result = CliRunner().invoke(make_app(), ["export", str(damaged), str(tmp_path / "out.safetensors")])
+    assert isinstance(result.exception, InputError)
+    assert "not a whole model file" in str(result.exception)
     assert not (tmp_path / "out.safetensors").exists()
 
 

@@ -1,0 +1,286 @@
+"""A policy as a C99 file and its header, for a controller on a train."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from panto_baselines.policies.guarded import Guarded
+from panto_env.base.checksums import __version__
+from panto_env.base.errors import InputError
+from panto_env.base.files import write_text
+from panto_env.control import Task
+from panto_env.control.lines import on_example
+from panto_env.control.settings import run_settings
+from panto_env.policies import find_policy, wishes
+
+from ..evaluation import NOT_OF_A_PASS
+from ..policy import TrainedPolicy
+from ..settings import arguments
+from . import acting, seeing
+from .parts import Table, new_state, parts_of
+from .translate import Translation
+
+READINGS = (
+    (
+        "head_displacement",
+        "m",
+        "of the head, up, from the wire's height at rest",
+    ),
+    ("frame_displacement", "m", "of the frame, up, from the height that goes with it"),
+    ("head_velocity", "m/s", "positive upwards"),
+    ("frame_velocity", "m/s", "positive upwards"),
+    ("contact_force", "N", "between contact strip and wire"),
+    ("place", "spans", "whole part: number of the span, rising; fraction: share of it that is passed"),
+    ("speed", "m/s", "of the train"),
+)
+"""Name, unit and meaning of the readings of every policy, in the order of ``seeing``."""
+PLACES = ("frame", "head")
+WIDTH = 96
+"""Letters of a line of comment."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An input or an output of a controller."""
+
+    name: str
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A policy as C99, and what a caller must know of it; ``controller`` runs the same in Python."""
+
+    name: str  # with which all public names in C begin
+    source: str  # the C file
+    header: str  # NAME.h, which the C file includes
+    inputs: tuple[Variable, ...]  # fields of NAME_readings, in order, all double
+    outputs: tuple[Variable, ...]  # elements of ``force``, in order
+    interval: float  # time between two calls of NAME_step (s)
+    card: str  # what the policy is, and was made for
+    constants: Table
+    state: Table
+
+    def controller(self) -> Controller:
+        """The controller in Python, by the functions from which the C is made."""
+        return Controller(self)
+
+    def write(self, path: str | Path) -> tuple[Path, Path]:
+        """Write the C file, and the header beside it; their paths. Raises InputError where that fails."""
+        source = Path(path)
+        header = source.with_name(f"{self.name}.h")
+        write_text(header, self.header)
+        write_text(source, self.source)
+        return source, header
+
+
+class Controller:
+    """A controller that runs in plain Python: slow, for comparison."""
+
+    def __init__(self, exported: Exported) -> None:
+        self._constants = SimpleNamespace(**exported.constants)
+        self._initial, self._outputs = exported.state, len(exported.outputs)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew, as NAME_init does."""
+        self._state = new_state(self._initial)
+        acting.begin(self._constants, self._state)
+
+    def step(self, readings: Sequence[float]) -> list[float]:
+        """Forces (N) for the readings of a step, in the order of ``Exported.inputs``."""
+        force = [0.0] * self._outputs
+        acting.step(self._constants, self._state, readings, force)
+        return [float(each) for each in force]
+
+
+def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
+    """A policy as C99.
+
+    policy: a model file, a name, or an object, as ``simulate`` takes it. name: for C; by default made of the
+    policy's. settings: those of a run, such as catenary and pantograph; others are as in the policy's
+    training, and for one that was not trained those of Pantograph-v0. Scales of readings, the length of
+    spans, the guard's model and the force limit come from them.
+
+    Raises InputError, one sentence, for a policy that has no form in C or does not fit the settings, and for
+    a name that C does not take.
+    """
+    driver = find_policy(policy)
+    words = str(policy) if isinstance(policy, str | Path) else type(policy).__name__
+    called = name or name_in_c(words)
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", called):
+        raise InputError(
+            f"'{called}' is not a name in C; give one of letters, digits and _, such as controller."
+        )
+    task = _task(driver, settings)
+    context = task.context(0)
+    driver.reset(context)  # refuses a task that it was not trained for
+    constants, state = parts_of(driver, words, task)
+    inputs = [Variable(*each) for each in READINGS]
+    inputs += [
+        Variable(
+            f"front_force_{k}", "N", f"contact force that the pantograph in front felt {place:g} m ahead"
+        )
+        for k, place in enumerate(context.layout.front)
+    ]
+    reported = constants["inputs"] - len(inputs)
+    places = [PLACES[channel] for channel in context.channels]
+    inputs += [
+        Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}") for k in range(reported)
+    ]
+    limit = f"within {context.force_limit:g} N either way, positive upwards"
+    outputs = tuple(
+        Variable(f"{each}_force", "N", f"of the actuator on the {each}, {limit}") for each in places
+    )
+    form = _Form(called, tuple(inputs), outputs, context.control_interval, constants, state)
+    card = _card(words, driver, task)
+    return Exported(
+        name=called,
+        source=form.source(card),
+        header=form.header(card),
+        inputs=form.inputs,
+        outputs=outputs,
+        interval=context.control_interval,
+        card=card,
+        constants=constants,
+        state=state,
+    )
+
+
+def name_in_c(words: str) -> str:
+    """A policy's or a file's name, of the letters that C takes."""
+    plain = re.sub(r"\.(safetensors|c)$", "", Path(words).name)
+    return re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+
+
+def _task(driver: Any, settings: dict[str, Any]) -> Task:
+    """A task that has been reset, with the settings of the policy's training where others are not given."""
+    inner = driver.policy if isinstance(driver, Guarded) else driver
+    trained = inner.facts.environment if isinstance(inner, TrainedPolicy) else {}
+    variants = inner.facts.variants if isinstance(inner, TrainedPolicy) else ()
+    environment = arguments({"id": "Pantograph-v0"} | trained)
+    given = {key: value for key, value in environment.items() if key not in NOT_OF_A_PASS[1:]}
+    low, high = (np.ravel(given["speed_kmh"])[end] for end in (0, -1))
+    slowest = min([low, *(np.min(each["speed_kmh"]) for each in variants if "speed_kmh" in each)])
+    # The memory of earlier spans must hold them at the lowest speed of the training.
+    given |= {"speed_kmh": (float(slowest), float(high)), "pantograph_scatter": 0.0, "faults": ()}
+    given |= wishes(driver) | settings
+    task = Task(on_example(run_settings(given)), keep_samples=False)
+    task.reset(0, np.random.default_rng(0))
+    return task
+
+
+def _card(name: str, driver: Any, task: Task) -> str:
+    """Facts of a policy, in lines of plain text."""
+    guard = isinstance(driver, Guarded)
+    inner = driver.policy if guard else driver
+    context = task.context(0)
+    low, high = (3.6 * speed for speed in task.settings.speeds)
+    lines = [f"Policy {name}, exported by panto-env {__version__}."]
+    if isinstance(inner, TrainedPolicy):
+        facts = inner.facts
+        lines += [
+            f"Trained by {facts.algorithm}, {facts.steps} steps, seed {facts.seed}, panto-env "
+            f"{facts.version}, commit {facts.commit or 'unknown'}, by: {facts.command or 'unknown'}.",
+            "Trained in: " + ", ".join(f"{key} = {value}" for key, value in facts.environment.items()) + ".",
+        ]
+        if facts.variants:
+            kinds = sorted(
+                {f"{key} {each[key]}" for each in facts.variants for key in each if key != "faults"}
+            )
+            lines.append("and in variants with " + ", ".join(kinds) + ".")
+    if guard:
+        lines.append("Guarded: doubtful readings are held, and a command that does harm fades to none.")
+    lines += [
+        f"Its constants are for the line {context.catenary.name}, mean length of a span "
+        f"{context.alignment.mean_length:.4g} m, pantograph {context.pantograph.name}, "
+        f"{low:.4g} to {high:.4g} km/h.",
+        f"A call every {context.control_interval:g} s; force limit {context.force_limit:g} N.",
+        "It was trained and judged in simulation alone; nobody has run it on a train.",
+    ]
+    return "\n".join(lines)
+
+
+class _Form:
+    """The two files of a controller."""
+
+    def __init__(
+        self,
+        name: str,
+        inputs: tuple[Variable, ...],
+        outputs: tuple[Variable, ...],
+        interval: float,
+        constants: Table,
+        state: Table,
+    ) -> None:
+        self.name, self.inputs, self.outputs, self.interval = name, inputs, outputs, interval
+        self._tables = constants, state
+
+    @cached_property
+    def _translation(self) -> Translation:
+        translation = Translation(*self._tables, f"{self.name}_state")
+        translation.add(acting.begin)
+        translation.add(acting.step)
+        return translation
+
+    def source(self, card: str) -> str:
+        """The C file."""
+        name, translation = self.name, self._translation
+        values = ",\n".join(f"        readings->{each.name}" for each in self.inputs)
+        parts = [
+            _comment(card),
+            f'#include <math.h>\n#include "{name}.h"',
+            translation.constant_tables(),
+            "\n".join(translation.declarations),
+            *translation.functions.values(),
+            f"void {name}_init({name}_state *state)\n{{\n    "
+            f"*state = ({name}_state){{0}};\n    begin(state);\n}}",
+            f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force)\n{{\n"
+            f"    const double given[{len(self.inputs)}] = {{\n{values}}};\n    "
+            f"step(state, given, force);\n}}",
+        ]
+        return "\n\n".join(parts) + "\n"
+
+    def header(self, card: str) -> str:
+        """The header."""
+        name = self.name
+        readings = "\n".join(
+            f"    double {each.name}; /* {each.unit}: {each.description} */" for each in self.inputs
+        )
+        forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(self.outputs))
+        guard = f"{name.upper()}_H"
+        call = (
+            f"One control step, every {self.interval:g} s. force: {forces}. A reading that is no finite "
+            f"number, or above {seeing.LARGEST:g}, counts as its last good one; until each was good once, "
+            "force is 0. It stays finite and within its limit whatever is read."
+        )
+        start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
+        return (
+            f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
+            '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
+            f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
+            "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
+            f"typedef struct {{\n{self._translation.state_fields()}\n}} {name}_state;\n\n"
+            f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
+            f"{_comment(call)}\n"
+            f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
+            "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
+        )
+
+
+def _comment(text: str) -> str:
+    """A comment in C; no text of a model file can end it early, or hold letters that a compiler refuses."""
+    plain = text.replace("??", "? ?").replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
+    plain = plain.encode("ascii", "replace").decode()
+    lines = [line for each in plain.splitlines() for line in textwrap.wrap(each, WIDTH) or [""]]
+    return "/*\n" + "\n".join(f" * {line}" for line in lines) + "\n */"

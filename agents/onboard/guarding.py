@@ -1,0 +1,258 @@
+"""The guard around a policy: readings that cannot be are held, and a command that does harm fades to passive.
+
+A part of the on-board controller's description; see ``seeing`` for its form. Rules and constants are those of
+``panto_baselines.policies.guarded``, whose observations, step by step, these functions see. What depends on
+the speed of a run there depends on the speed read here.
+"""
+
+from __future__ import annotations
+
+import math
+
+from panto_baselines.policies.guarded import (
+    CALMER,
+    EARLY_HARM,
+    FADE_IN,
+    FADE_OUT,
+    FASTER,
+    GOOD,
+    GROWTH,
+    HARM,
+    LISTENING,
+    LONGEST_PAUSE,
+    LOW,
+    PATIENCE,
+    PAUSE,
+    PEAK,
+    PROBE,
+    RETURN,
+    SAME,
+    SETTLED,
+    SHIFT,
+    SHORT_HARM,
+    SHORT_SPREAD,
+    SPREAD,
+    STANDS,
+    STRONG,
+)
+
+from .seeing import SENSORS, SPEED, Constants, Number, State, Whole, nominal_force, shown_force
+
+SHOWN = 9
+"""Control steps whose readings, as shown, are kept."""
+STANDSTILL = 1.0
+"""Speed (m/s) below which places ahead in memory are not told apart by time."""
+LONG_AGO = 1_000_000_000
+"""Control steps, in place of a time without end."""
+
+
+def begin_guard(c: Constants, s: State) -> None:
+    """Begin passive, listening, with all sensors sound."""
+    s.sound_for = LONG_AGO
+    s.waits = LISTENING
+    s.pause = PAUSE
+    s.fade_in = PROBE
+    s.heard = math.inf
+    s.most = math.inf
+    s.before = math.inf
+
+
+def check_readings(c: Constants, s: State) -> None:
+    """Hold readings that stand still or are exactly zero; take for unknown what memory has of such times."""
+    any_bad = 0
+    for k in range(SENSORS):
+        read = float(s.seen[c.present[k]])
+        s.shows[k] = read
+        if s.begun == 1:
+            if abs(read - (1.0 - c.guard_share) * s.last[k]) < SAME:
+                s.stood[k] = min(s.stood[k] + 1, LONG_AGO)
+            else:
+                s.stood[k] = 0
+            bad = 0
+            if s.stood[k] >= STANDS or abs(read - c.zero[k]) < 1e-6:
+                bad = 1
+                any_bad = 1
+            if bad == 1 and s.stood[k] == STANDS and s.shown_steps > STANDS:
+                replace_last_shown(c, s, k)
+            if bad == 1:
+                s.shows[k] = s.shown[0, k]
+                s.shift[k] += c.guard_share * read
+            else:
+                s.shows[k] = read + s.shift[k]
+                s.shift[k] += c.guard_share * (read - s.shows[k])
+        s.last[k] = read
+    s.fault_at = (s.fault_at + 1) % c.fault_steps
+    s.faulty[s.fault_at] = any_bad
+    if s.begun == 1:
+        if any_bad == 1:
+            s.held = min(s.held + c.interval, float(LONG_AGO))
+            s.sound_for = 0
+        else:
+            s.held = 0.0
+            s.sound_for = min(s.sound_for + 1, LONG_AGO)
+        show(c, s)
+    for back in range(SHOWN - 1, 0, -1):
+        for k in range(SENSORS):
+            s.shown[back, k] = s.shown[back - 1, k]
+    for k in range(SENSORS):
+        s.shown[0, k] = s.shows[k]
+    s.shown_steps = min(s.shown_steps + 1, SHOWN)
+    if c.memory_spans > 0 and s.sound_for < c.fault_steps:
+        forget_faulty_times(c, s)
+
+
+def replace_last_shown(c: Constants, s: State, k: int) -> None:
+    """A reading that begins to be held was wrong since it stands still: show what came before instead."""
+    for back in range(STANDS):
+        s.shift[k] += c.guard_share * s.shown[back, k]
+        s.shown[back, k] = s.shown[STANDS, k]
+
+
+def show(c: Constants, s: State) -> None:
+    """Write what is shown into the observation, present and earlier."""
+    if c.history > 0:
+        for back in range(c.history):
+            for k in range(SENSORS):
+                s.seen[c.earlier[back, k]] = s.shown[min(back + 1, s.shown_steps) - 1, k]
+    for k in range(SENSORS):
+        s.seen[c.present[k]] = s.shows[k]
+
+
+def forget_faulty_times(c: Constants, s: State) -> None:
+    """Take for unknown what memory has of times in which a reading was faulty."""
+    if s.input[SPEED] > STANDSTILL:
+        per_step = c.interval * s.input[SPEED] / c.mean_length
+        for n in range(c.remembered):
+            steps = c.remembered_spans[n] / per_step - c.remembered_ahead[n]
+            ago = int(math.floor(steps + 0.5))  # noqa: RUF046 - C's floor gives a double
+            for k in range(max(ago - 3, 1), min(ago + 4, c.fault_steps + 1)):
+                if s.faulty[(s.fault_at - k + 1 + c.fault_steps) % c.fault_steps] == 1:
+                    s.seen[c.remembered_entry[n]] = c.unknown * nominal_force(c, s)
+
+
+def act_within_guard(c: Constants, s: State) -> None:
+    """Multiply the action by the gate; where the force is low, take no more of it away."""
+    force = shown_force(c, s)
+    added = added_by_control(c, s)
+    if s.held == 0.0:
+        add(c, s, force, added)
+    speed = max(s.input[SPEED], STANDSTILL)
+    if s.begun == 0:
+        s.heard_at = speed
+    listen_while_passive(c, s, speed)
+    pause_or_not(c, s, speed)
+    if s.waits > 0.0 and s.waits <= c.interval and s.heard > CALMER * s.before:
+        s.pause = PAUSE  # it was no better without
+    s.waits = max(s.waits - c.interval, 0.0)
+    change = c.interval / s.fade_in
+    if s.waits > 0.0:
+        change = -c.interval / FADE_OUT
+    s.gate = min(max(s.gate + change, 0.0), 1.0)
+    for a in range(c.actions):
+        if c.knows_force and force < LOW * nominal_force(c, s) and added < 0.0:
+            s.action[a] = max(s.action[a], 0.0)
+        s.action[a] = s.gate * s.action[a]
+
+
+def added_by_control(c: Constants, s: State) -> Number:
+    """Contact force (N) that the commands so far have added, by a model of pantograph and mean line."""
+    added = 0.0
+    for a in range(c.actions):
+        command = s.past[a] * c.force_limit
+        for i in range(c.states):
+            s.following_model[i] = c.model_b[a, i] * command
+            for j in range(c.states):
+                s.following_model[i] += c.model_a[a, i, j] * s.model[a, j]
+        for i in range(c.states):
+            s.model[a, i] = s.following_model[i]
+            added += c.model_c[a, i] * s.model[a, i]
+    return added
+
+
+def add(c: Constants, s: State, force: float, added: float) -> None:
+    """Add a step to means and variances: of the force, of it without control, and of what control adds."""
+    s.now[0] = force
+    s.now[1] = force - added
+    s.now[2] = added
+    for n in range(3):
+        if s.heard_any == 0:
+            s.means[0, n] = s.now[n]
+            s.means[1, n] = s.now[n]
+            s.filter[0, n] = c.at_rest[0] * s.now[n]
+            s.filter[1, n] = c.at_rest[1] * s.now[n]
+        passed = c.low_pass_b[0] * s.now[n] + s.filter[0, n]
+        s.filter[0, n] = c.low_pass_b[1] * s.now[n] - c.low_pass_a[1] * passed + s.filter[1, n]
+        s.filter[1, n] = c.low_pass_b[2] * s.now[n] - c.low_pass_a[2] * passed
+        if n == 0:
+            s.deviation = passed - s.means[0, 0]
+        for w in range(2):
+            s.means[w, n] += c.shares[w] * (passed - s.means[w, n])
+            off = passed - s.means[w, n]
+            s.squares[w, n] += c.shares[w] * (off * off - s.squares[w, n])
+    s.heard_any = 1
+    s.mean_added += c.shares[2] * (added - s.mean_added)
+
+
+def spread(c: Constants, s: State, window: int, what: int) -> Number:
+    """Standard deviation (N) over a window: 0 as it is, 1 without control, 2 what control adds."""
+    return math.sqrt(max(s.squares[window, what], 1e-9))
+
+
+def listen_while_passive(c: Constants, s: State, speed: float) -> None:
+    """Hear, while passive, how much the force varies; count how long control has acted."""
+    if s.gate == 0.0:
+        s.passive_for = min(s.passive_for + c.interval, float(LONG_AGO))
+        s.listened = max(s.listened, abs(s.deviation))
+    else:
+        s.passive_for = 0.0
+        s.listened = 0.0
+    if s.passive_for > SETTLED:
+        s.heard = spread(c, s, 0, 0)
+        s.heard_at = speed
+        s.most = s.listened
+    if s.gate == 1.0:
+        s.acted_for = min(s.acted_for + c.interval, float(LONG_AGO))
+    else:
+        s.acted_for = 0.0
+    if s.acted_for > GOOD:
+        s.pause = PAUSE
+
+
+def pause_or_not(c: Constants, s: State, speed: float) -> None:
+    """Whether control pauses: readings are held, the mean moves, it does harm, or the speed is another."""
+    if s.held > PATIENCE:
+        if s.waits == 0.0:
+            s.fade_in = FADE_IN
+        s.waits = max(s.waits, RETURN)
+    elif s.gate > 0.0 and s.waits == 0.0:
+        if abs(s.mean_added) > SHIFT * nominal_force(c, s):
+            s.before = 0.0
+            s.waits = PAUSE
+        elif does_harm(c, s, speed) == 1:
+            s.before = spread(c, s, 1, 0)
+            s.waits = s.pause
+            s.fade_in = PROBE
+            s.pause = min(GROWTH * s.pause, LONGEST_PAUSE)
+        elif speed >= FASTER * s.heard_at or s.heard_at >= FASTER * speed:
+            s.before = 0.0
+            s.waits = PAUSE
+            s.fade_in = FADE_IN
+
+
+def does_harm(c: Constants, s: State, speed: float) -> Whole:
+    """1 where the force varies more than it would without control, or did, or is farther off; else 0."""
+    added = spread(c, s, 1, 2)
+    lately = spread(c, s, 1, 0)
+    ratio = max(1.0, speed / s.heard_at)
+    heard = s.heard * ratio * ratio
+    harm = EARLY_HARM
+    if s.acted_for > SETTLED:  # what was heard at first is of waves that still build up
+        harm = HARM
+        if spread(c, s, 0, 0) > SPREAD * heard:
+            return 1
+    if spread(c, s, 0, 0) > harm * spread(c, s, 0, 1) or lately > SHORT_HARM * spread(c, s, 1, 1):
+        return 1
+    far = abs(s.deviation) > PEAK * s.most * ratio * ratio
+    if added > STRONG * s.heard and (lately > SHORT_SPREAD * heard or far):  # else it is not of control
+        return 1
+    return 0

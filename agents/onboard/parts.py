@@ -1,0 +1,288 @@
+"""The constants and the state of an on-board controller, from a policy and the task that it is for."""
+
+from __future__ import annotations
+
+import math
+import re
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from panto_baselines.policies.fb_ff import FORCE_RANGE, FeedbackFeedforward
+from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
+from panto_baselines.policies.guarded import FORCES, Guard, Guarded
+from panto_env.base.arrays import METRES_PER_SECOND
+from panto_env.base.errors import InputError
+from panto_env.control import Context, Task
+from panto_env.control.entries import (
+    CENTRED,
+    DEVIATIONS,
+    MEASURED,
+    READING_ENTRIES,
+    Entry,
+    present,
+)
+
+from ..model_file import Actor, Facts, RecurrentActor
+from ..policy import TrainedPolicy
+from . import acting, seeing
+from .guarding import SHOWN
+
+Table = dict[str, Any]
+WITHOUT_GUARD = TrainedPolicy | Proportional | ProportionalDerivative | FeedbackFeedforward
+"""Policies that can be described."""
+
+
+def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
+    """Constants and state, by name, of a policy in a task that has been reset.
+
+    Raises InputError, one sentence with the policy's name, where the description does not cover it.
+    """
+    context, inner = task.context(0), policy.policy if isinstance(policy, Guarded) else policy
+    if not isinstance(inner, WITHOUT_GUARD):
+        raise InputError(
+            f"The policy '{name}' cannot be exported: only a trained agent, p, pd and fb+ff can, each also "
+            "with guarded: before its name; of an ensemble export one member, such as agent-any-line:seed=1."
+        )
+    constants, state = _seen(name, task, context)
+    if isinstance(inner, TrainedPolicy):
+        _add_network(constants, state, inner.facts, inner.actor, name)
+    else:
+        _add_feedback(constants, state, inner, context, name)
+    constants["guarded"] = isinstance(policy, Guarded)
+    if isinstance(policy, Guarded):
+        _add_guard(constants, state, Guard(context, *policy.delays), context)
+    return constants, state
+
+
+def new_state(state: Table) -> SimpleNamespace:
+    """A state of its own, all 0."""
+    return SimpleNamespace(
+        **{name: value.copy() if isinstance(value, np.ndarray) else value for name, value in state.items()}
+    )
+
+
+def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
+    layout, episode = context.layout, task.episode
+    if layout.kind not in (MEASURED, CENTRED, DEVIATIONS) or layout.line_values:
+        what = "the values of each span" if layout.line_values else f"the observation '{layout.kind}'"
+        raise InputError(f"The policy '{name}' cannot be exported: it sees {what}, which no train reads.")
+    front, actions = len(layout.front), context.actions
+    places, spans = len(layout.memory), layout.memory_spans if layout.memory else 0
+    steps = episode.memory.kept.shape[1] if places else 1
+    aerodynamic = context.pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
+    force = next(each for each in layout.entries if each.name in FORCES)
+    sources = [_source(each, front, actions) for each in layout.entries]
+    constants: Table = {
+        "inputs": seeing.FURTHER + front + (actions if context.washout else 0),
+        "averaged": layout.kind == DEVIATIONS,
+        "average_share": float(episode.average_share),
+        "front": front,
+        "history": layout.history,
+        "actions": actions,
+        "entries": len(layout.entries),
+        "source": np.array([source for source, _ in sources]),
+        "number": np.array([number for _, number in sources]),
+        "centre": layout.centre,
+        "slope": layout.slope,
+        "per_unit": 1 / layout.scale,
+        "sight": float(episode.odometer.sight),
+        "interval": context.control_interval,
+        "mean_length": context.alignment.mean_length,
+        "memory_spans": spans,
+        "memory_places": places,
+        "memory_steps": steps,
+        "steps_ahead": np.array(layout.memory) / context.control_interval,
+        "static_force": context.nominal_force - aerodynamic * context.speed**2,
+        "aerodynamic": aerodynamic,
+        "force_limit": context.force_limit,
+        "washout_share": float(episode.washout_share),
+        "force_entry": layout.entries.index(force),
+        "of_nominal": force.name == "force deviation",
+        "force_scale": force.scale,
+        "force_centre": force.centre,
+    }
+    state: Table = {
+        "begun": 0,
+        "known": np.zeros(constants["inputs"], dtype=np.int64),
+        "input": np.zeros(constants["inputs"]),
+        "reading": np.zeros(seeing.SENSORS),
+        "average": np.zeros(seeing.SENSORS),
+        "ahead": np.zeros(max(front + places * spans * (1 + actions), 1)),
+        "past": np.zeros(actions + layout.history * (seeing.SENSORS + actions)),
+        "kept": np.zeros((steps, 2 + actions)),
+        "time": 0,
+        "seen": np.zeros(len(layout.entries), dtype=np.float32),
+        "action": np.zeros(actions),
+        "washed": np.zeros(actions),
+    }
+    return constants, state
+
+
+def _source(entry: Entry, front: int, actions: int) -> tuple[int, int]:
+    """What an entry shows, and its number among these."""
+    name, earlier = present(entry), entry.name.endswith(" ago")
+    readings = [each for each, _, _ in READING_ENTRIES]
+    base = name.removesuffix(" deviation")
+    if base == "force":
+        return (seeing.PAST_DEVIATION, entry.number) if earlier else (seeing.DEVIATION, 0)
+    if name.startswith(("front force", "remembered")):
+        return seeing.AHEAD, entry.number
+    if re.fullmatch("last .* action", name) or (earlier and base in readings):
+        return seeing.PAST, entry.number
+    if base in readings:
+        return seeing.READING, entry.number
+    if " of span position" in name:
+        return seeing.TURN, entry.number or (2 if name.startswith("sine") else 3)
+    simple = {"speed": seeing.TRAIN_SPEED, "nominal force": seeing.NOMINAL}
+    if name not in simple:
+        raise InputError(f"No controller on a train can show the entry '{entry.name}' of the observation.")
+    return simple[name], 0
+
+
+def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor, name: str) -> None:
+    if facts.residual_of is not None:
+        raise InputError(
+            f"The policy '{name}' cannot be exported: it adds to '{facts.residual_of}', which has no form in "
+            "C; take an agent that acts alone."
+        )
+    cell = actor.cell if isinstance(actor, RecurrentActor) else None
+    units = 0 if cell is None else cell.weight_state.shape[1]
+    rows = np.array([len(bias) for bias in actor.biases])
+    columns = np.array([weight.shape[1] for weight in actor.weights])
+    constants |= {
+        "kind": acting.NETWORK,
+        "layers": len(rows),
+        "rows": rows,
+        "columns": columns,
+        "weight": np.concatenate([weight.ravel() for weight in actor.weights]),
+        "bias": np.concatenate(actor.biases),
+        "weight_at": np.cumsum([0, *(rows * columns)])[:-1],
+        "bias_at": np.cumsum([0, *rows])[:-1],
+        "bent_by_tanh": actor.activation == "tanh",
+        "squashed": actor.squashed,
+        "units": units,
+        "washes_out": facts.washout is not None,
+    }
+    if cell is not None:
+        constants |= cell._asdict()
+    if facts.washout is not None:
+        share = 1.0 - math.exp(-constants["interval"] / facts.washout.time_constant)
+        constants |= {"lag": facts.washout.lag, "rate": facts.washout.rate, "average_of_force": share}
+    wide = add_steps_before(constants, state, facts)
+    widest = max(wide, *rows.tolist(), *columns.tolist())
+    for each, size in (("values", widest), ("following", widest), ("hidden", max(units, 1))):
+        state[each] = np.zeros(size, dtype=np.float32)
+    for each in ("average_force", "actuator_force"):
+        state[each] = np.zeros(constants["actions"])
+
+
+def add_steps_before(constants: Table, state: Table, facts: Facts) -> int:
+    """Add the steps before the network; the largest number of values between them."""
+    width, most, places = constants["entries"], constants["entries"], 0
+    each: dict[str, list[Any]] = {
+        name: [] for name in ("width", "stacked", "step_at", "step_bound", "padded")
+    }
+    centre: list[float] = []
+    scale: list[float] = []
+    padding: list[float] = []
+    for step in facts.steps_before:
+        size = width if step.centre else width * step.frames
+        each["width"].append(width)
+        each["stacked"].append(0 if step.centre else step.frames)
+        each["step_at"].append(places)
+        each["step_bound"].append(step.bound or math.inf)
+        each["padded"].append(int(step.padding is not None))
+        centre += step.centre or [0.0] * size
+        scale += step.scale or [1.0] * size
+        padding += (step.padding or (0.0,) * width) * (size // width)
+        width, places, most = size, places + size, max(most, size)
+    constants |= {name: np.array(values) for name, values in each.items()}
+    constants["steps_before"] = len(facts.steps_before)
+    constants |= {"step_centre": np.array(centre), "step_scale": np.array(scale)}
+    constants["padding"] = np.array(padding, dtype=np.float32)
+    state["frames"] = np.zeros(places, dtype=np.float32)
+    return int(most)
+
+
+def _add_feedback(
+    constants: Table,
+    state: Table,
+    policy: Proportional | ProportionalDerivative | FeedbackFeedforward,
+    context: Context,
+    name: str,
+) -> None:
+    velocity = next(each for each in context.layout.entries if each.name == "frame velocity")
+    constants |= {
+        "kind": acting.FEEDBACK,
+        "feeds_forward": isinstance(policy, FeedbackFeedforward),
+        "dead_zone": 0.0,
+        "derivative": getattr(policy, "derivative", 0.0),
+        "damping": getattr(policy, "damping", 0.0),
+        "velocity_entry": context.layout.entries.index(velocity),
+        "velocity_scale": velocity.scale,
+    }
+    state["last_error"] = 0.0
+    if not isinstance(policy, FeedbackFeedforward):
+        constants["gain"] = policy.gain
+        return
+    if len(policy.gains) > 1 or policy.reading != "span":
+        raise InputError(
+            f"The policy '{name}' cannot be exported: in C it is only with one gain, and the reading 'span'."
+        )
+    constants |= {
+        "gain": next(iter(policy.gains.values())),
+        "dead_zone": policy.dead_zone,
+        "amplitude": policy.amplitude,
+        "phase": policy.theta / (2 * math.pi),
+        "lowest": FORCE_RANGE[0],
+        "highest": FORCE_RANGE[1],
+    }
+
+
+def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -> None:
+    readings, monitor = guard.readings, guard.monitor
+    steps = constants["memory_steps"] + 8
+    entry, spans, ahead = zip(*readings.memory, strict=True) if readings.memory else ((0,), (0,), (0.0,))
+    low_pass_b, low_pass_a = monitor.low_pass
+    states = monitor.models[0].size
+    constants |= {
+        "present": readings.present,
+        "earlier": np.array(readings.past or [[0]]),
+        "zero": readings.zero,
+        "guard_share": readings.share,
+        "fault_steps": steps,
+        "remembered": len(readings.memory),
+        "remembered_entry": np.array(entry),
+        "remembered_spans": np.array(spans, dtype=float),
+        "remembered_ahead": np.array(ahead),
+        "unknown": readings.unknown / context.nominal_force,
+        "knows_force": monitor.absolute,
+        "states": states,
+        "model_a": np.array([model.a for model in monitor.models]),
+        "model_b": np.array([model.b for model in monitor.models]),
+        "model_c": np.array([model.c[0] for model in monitor.models]),
+        "low_pass_a": low_pass_a,
+        "low_pass_b": low_pass_b,
+        "at_rest": monitor.at_rest,
+        "shares": monitor.shares,
+    }
+    sensors = seeing.SENSORS
+    state |= {
+        "shows": np.zeros(sensors),
+        "last": np.zeros(sensors),
+        "shown": np.zeros((SHOWN, sensors)),
+        "shift": np.zeros(sensors),
+        "stood": np.zeros(sensors, dtype=np.int64),
+        "faulty": np.zeros(steps, dtype=np.int64),
+        "model": np.zeros((len(monitor.models), states)),
+        "following_model": np.zeros(states),
+        "now": np.zeros(3),
+        "means": np.zeros((2, 3)),
+        "squares": np.zeros((2, 3)),
+        "filter": np.zeros((2, 3)),
+    }
+    state |= dict.fromkeys(("shown_steps", "fault_at", "sound_for", "heard_any"), 0)
+    numbers = "held waits pause fade_in heard heard_at most before gate mean_added deviation passive_for"
+    state |= dict.fromkeys((*numbers.split(), "listened", "acted_for"), 0.0)
