@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError, suggest
 
-from .exported import Exported
+from .export import Exported
 
 PROCESSORS = {
     "cortex-m4": ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"),  # float in hardware, double by functions
