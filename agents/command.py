@@ -35,6 +35,7 @@ from panto_env.terminal import (
 
 if TYPE_CHECKING:
     from .evaluation import Pair
+    from .onboard import Exported
 
 
 Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.")]
@@ -108,7 +109,7 @@ def train(
         console.print(line, soft_wrap=True)
 
 
-EXPORTS = {"safetensors": ".safetensors", "c": ".c"}
+EXPORTS = {"safetensors": ".safetensors", "c": ".c", "fmu": ".fmu", "onnx": ".onnx"}
 """Suffix of the file that each format of `panto export` has."""
 
 
@@ -130,39 +131,55 @@ def export(
     """Write a policy for use elsewhere: a model file to publish, or a program for a train's controller.
 
     safetensors: only what the policy needs, as arrays and JSON, with nothing pickled; it is the same policy,
-    but cannot be trained further. c: one C99 file and its header, which need nothing but libm; the options
-    say which line, pantograph and actuator its constants are for, by default those of its training.
+    but cannot be trained further. onnx: its network. c: one C99 file and its header, which need nothing but
+    libm. fmu: a co-simulation unit of FMI 3.0 with this C. The options say which line, pantograph and
+    actuator the constants of the last two are for, by default those of its training.
     """
-    from .onboard import exported
+    from .onboard import exported, write_fmu, write_onnx
     from .onboard.export import name_in_c
     from .policy import TrainedPolicy
 
     kind = _format(output, format)
     path = Path(output or f"{name_in_c(policy)}{EXPORTS[kind]}")
-    if kind == "safetensors":
+    if kind in ("safetensors", "onnx"):
         from panto_env.policies import find_policy
 
         from .model_file import write_policy
 
         driver = find_policy(policy)
-        if not isinstance(driver, TrainedPolicy):
-            raise InputError(
-                f"The policy '{policy}' has no model of its own to write; take a trained one, or c."
-            )
         if settings:
             raise InputError(
                 "A model file holds nothing of line, pantograph, actuator or sensors; leave them out."
             )
+        if kind == "onnx":
+            write_onnx(driver, _announced(path, output))
+            return
+        if not isinstance(driver, TrainedPolicy):
+            raise InputError(
+                f"The policy '{policy}' has no model of its own to write; take a trained one, or c."
+            )
         write_policy(_announced(path, output), driver.facts, driver.actor)
         return
-    header = path.with_name(f"{name_in_c(path.name)}.h")
+    name = name_in_c(path.stem)
+    if kind == "fmu":
+        _announced(path, output)
+        made = exported(policy, name, **settings)
+        write_fmu(made, path)
+        console.print(f"{path}: a step every {made.interval:g} s", soft_wrap=True)
+        _print_variables(made)
+        return
+    header = path.with_name(f"{name}.h")
     for each, given in ((path, output), (header, None)):
         _announced(each, given)
-    made = exported(policy, name_in_c(path.name), **settings)
+    made = exported(policy, name, **settings)
     made.write(path)
     console.print(
         f"{path}, {header}: {made.name}_init, {made.name}_step every {made.interval:g} s", soft_wrap=True
     )
+    _print_variables(made)
+
+
+def _print_variables(made: Exported) -> None:
     rows = [("reading", *asdict(each).values()) for each in made.inputs]
     rows += [("force", *asdict(each).values()) for each in made.outputs]
     print_table(Table("inputs and outputs", ("", "name", "unit", "meaning"), tuple(rows)))

@@ -108,6 +108,17 @@ def test_identify_from_csv_finds_the_truth(run, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_unit_controls_as_its_policy_does(run):
+    """Not to the digit: its slow averages are of what sensors read, the environment's without their noise."""
+    pytest.importorskip("fmpy")
+    example, told, said = run("onboard_fmu")
+    assert told in said
+    in_unit = float(re.search(r"in a unit: sigma ([\d.]+) N", told)[1])
+    direct = simulate(**example.PASS, policy="agent-any-line").summary().std
+    assert in_unit == pytest.approx(direct, rel=0.02)
+
+
+@pytest.mark.slow
 def test_sac_example_trains_and_acts(monkeypatch, tmp_path):
     """A second of it: the critics have learnt, and what it would do is a policy of the benchmark."""
     torch = pytest.importorskip("torch")
