@@ -31,11 +31,11 @@ PASSES = "passes"
 def write_onnx(policy: Policy, path: str | Path) -> None:
     """Write a trained policy's network, whole or not at all.
 
-    Inputs are the observation, (passes, entries) in float32, and the policy's states, each as the output
-    "next_..." of the step before, or at first as the metadata's "start" has it; the output "action",
-    (passes, actions) in float32, is in -1..1 of the actuator's force limit. Steps before the network and
-    a washout of the policy itself are included. Raises InputError for a policy that is more than its
-    network, where the package onnx is missing, or if the file can't be written.
+    Inputs are the observation, (passes, entries) in float32, and the policy's states. A state's input is
+    at first what the metadata's "start" has, then the step's output of its name after ``next_``. The output
+    "action", (passes, actions) in float32, is in -1..1 of the actuator's force limit. Steps before the
+    network and a washout of the policy itself are included. Raises InputError for a policy that is more than
+    its network, where the package onnx is missing, or if the file can't be written.
     """
     if find_spec("onnx") is None:
         raise InputError("ONNX needs the package onnx: pip install 'panto-env[onboard]'.")
