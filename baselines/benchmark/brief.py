@@ -11,7 +11,7 @@ from rich.text import Text
 from panto_env.base.table import Table
 from panto_env.terminal import number
 
-from .overall import Standing, next_in_ranking, why, with_feedback
+from .overall import Standing, by_rank, next_in_ranking, why, with_feedback
 from .report import as_rich, spans_in_words
 from .run import Benchmark
 from .statistics import Cell
@@ -29,7 +29,7 @@ MOST_LINES = 2
 
 def brief(outcome: Benchmark) -> RenderableType:
     """The headline, the ranking, Δσ at each speed of one or two lines, and why policies have no rank."""
-    standings = outcome.standings
+    standings = by_rank(outcome.standings)
     parts: list[RenderableType] = [
         Text(headline(standings), style="bold"),
         as_rich(ranking(outcome.settings.title, standings)),

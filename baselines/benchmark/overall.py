@@ -239,3 +239,15 @@ def why(disqualified: str) -> str:
     where, known, what = disqualified.partition(": it ")
     told = (what if known else disqualified.removeprefix("it ")).partition(", more than")[0]
     return f"{told}: {where}" if known else told
+
+
+def by_rank(standings: Sequence[Standing]) -> list[Standing]:
+    """Standings, the best first, each method before its trainings, and last those without a rank."""
+    trainings = {name for one in standings for name in one.trainings}
+    own = {one.policy: one for one in standings}
+    return [
+        each
+        for one in sorted(standings, key=lambda one: (one.rank is None, one.rank or 0))
+        if one.policy not in trainings
+        for each in (one, *(own[name] for name in one.trainings))
+    ]

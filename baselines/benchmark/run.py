@@ -27,7 +27,7 @@ from panto_env.plant.catenary.schema import CLEAR
 from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played, Trace
-from .overall import Standing, standings, with_feedback
+from .overall import Standing, by_rank, standings, with_feedback
 from .settings import (
     ORACLE_TAPE,
     BenchmarkSettings,
@@ -273,16 +273,8 @@ class Result(BaseModel):
 
     @property
     def by_rank(self) -> list[Standing]:
-        """Standings, the best first, each method before its trainings, and last those without a rank."""
-        method_of = self.method_of
-        ranked = sorted(self.standings, key=lambda one: (one.rank is None, one.rank or 0))
-        own = {one.policy: one for one in self.standings}
-        return [
-            each
-            for one in ranked
-            if one.policy not in method_of
-            for each in (one, *(own[name] for name in one.trainings))
-        ]
+        """Standings, the best first: see ``overall.by_rank``."""
+        return by_rank(self.standings)
 
     @property
     def places(self) -> list[LineAtSpeed]:
