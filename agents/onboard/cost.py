@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from panto_env.base.errors import InputError, suggest
 
 from .export import Exported
+from .fmu import run_tool
 
 PROCESSORS = {
     "cortex-m4": ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"),  # float in hardware, double by functions
@@ -145,12 +145,7 @@ def _program(exported: Exported, processor: tuple[str, ...]) -> tuple[bytes, dic
 
 def _tool(folder: Path, name: str, *arguments: str) -> str:
     """What a tool prints. Raises InputError where it fails."""
-    command = [f"{PREFIX}{name}", *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    if done.returncode:
-        first = next((line for line in done.stderr.splitlines() if "error" in line), "it gives no reason")
-        raise InputError(f"{PREFIX}{name} failed on the controller: {first}.")
-    return done.stdout
+    return run_tool(folder, [f"{PREFIX}{name}", *arguments], f"{PREFIX}{name} failed on the controller")
 
 
 class _Emulator:

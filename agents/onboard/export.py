@@ -13,20 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from panto_baselines.policies.guarded import Guarded
+from panto_env.base.arrays import to_kmh
 from panto_env.base.checksums import __version__
 from panto_env.base.errors import InputError
 from panto_env.base.files import write_text
 from panto_env.control import Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
+from panto_env.plant.state import Place
 from panto_env.policies import find_policy, wishes
 
 from ..evaluation import NOT_OF_A_PASS
 from ..policy import TrainedPolicy
 from ..settings import arguments
 from . import acting, seeing
-from .parts import Table, new_state, parts_of
+from .parts import Table, new_state, parts_of, without_guard
 from .translate import Translation
 
 READINGS = (
@@ -43,7 +44,6 @@ READINGS = (
     ("speed", "m/s", "of the train"),
 )
 """Name, unit and meaning of the readings of every policy, in the order of ``seeing``."""
-PLACES = ("frame", "head")
 WIDTH = 96
 """Letters of a line of comment."""
 
@@ -134,7 +134,7 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
         for k, place in enumerate(context.layout.front)
     ]
     reported = constants["inputs"] - len(inputs)
-    places = [PLACES[channel] for channel in context.channels]
+    places = [Place(channel).name.lower() for channel in context.channels]
     inputs += [
         Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}") for k in range(reported)
     ]
@@ -165,7 +165,7 @@ def name_in_c(words: str) -> str:
 
 def _task(driver: Any, settings: dict[str, Any]) -> Task:
     """A task that has been reset, with the settings of the policy's training where others are not given."""
-    inner = driver.policy if isinstance(driver, Guarded) else driver
+    inner = without_guard(driver)
     trained = inner.facts.environment if isinstance(inner, TrainedPolicy) else {}
     variants = inner.facts.variants if isinstance(inner, TrainedPolicy) else ()
     environment = arguments({"id": "Pantograph-v0"} | trained)
@@ -182,10 +182,9 @@ def _task(driver: Any, settings: dict[str, Any]) -> Task:
 
 def _card(name: str, driver: Any, task: Task) -> str:
     """Facts of a policy, in lines of plain text."""
-    guard = isinstance(driver, Guarded)
-    inner = driver.policy if guard else driver
+    inner = without_guard(driver)
     context = task.context(0)
-    low, high = (3.6 * speed for speed in task.settings.speeds)
+    low, high = map(to_kmh, task.settings.speeds)
     lines = [f"Policy {name}, exported by panto-env {__version__}."]
     if isinstance(inner, TrainedPolicy):
         facts = inner.facts
@@ -199,7 +198,7 @@ def _card(name: str, driver: Any, task: Task) -> str:
                 {f"{key} {each[key]}" for each in facts.variants for key in each if key != "faults"}
             )
             lines.append("and in variants with " + ", ".join(kinds) + ".")
-    if guard:
+    if inner is not driver:
         lines.append("Guarded: doubtful readings are held, and a command that does harm fades to none.")
     lines += [
         f"Its constants are for the line {context.catenary.name}, mean length of a span "

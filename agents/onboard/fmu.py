@@ -14,6 +14,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Literal
@@ -28,7 +29,6 @@ from .export import Exported, Variable
 UNITS = {
     "m": {"m": 1},
     "m/s": {"m": 1, "s": -1},
-    "m/s2": {"m": 1, "s": -2},
     "N": {"kg": 1, "m": 1, "s": -2},
     "s": {"s": 1},
 }
@@ -222,8 +222,14 @@ def _compiled(sources: dict[str, str]) -> bytes:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text)
         command = [compiler, *FLAGS, "-o", "library", *_to_compile(sources), "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        if done.returncode:
-            first = next((line for line in done.stderr.splitlines() if "error" in line), "it gives no reason")
-            raise InputError(f"The C compiler {compiler} could not make the unit's library: {first}.")
+        run_tool(folder, command, f"The C compiler {compiler} could not make the unit's library")
         return (Path(folder) / "library").read_bytes()
+
+
+def run_tool(folder: str | Path, command: Sequence[str], failed: str) -> str:
+    """What a compiler's tool prints in a folder. Raises InputError, with these words, where it fails."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        first = next((line for line in done.stderr.splitlines() if "error" in line), "it gives no reason")
+        raise InputError(f"{failed}: {first}.")
+    return done.stdout

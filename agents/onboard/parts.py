@@ -39,7 +39,7 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
 
     Raises InputError, one sentence with the policy's name, where the description does not cover it.
     """
-    context, inner = task.context(0), policy.policy if isinstance(policy, Guarded) else policy
+    context, inner = task.context(0), without_guard(policy)
     if not isinstance(inner, WITHOUT_GUARD):
         raise InputError(
             f"The policy '{name}' cannot be exported: only a trained agent, p, pd and fb+ff can, each also "
@@ -54,6 +54,11 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
     if isinstance(policy, Guarded):
         _add_guard(constants, state, Guard(context, *policy.delays), context)
     return constants, state
+
+
+def without_guard(policy: Any) -> Any:
+    """The policy within a guard, or the policy itself."""
+    return policy.policy if isinstance(policy, Guarded) else policy
 
 
 def new_state(state: Table) -> SimpleNamespace:

@@ -11,7 +11,7 @@ from rich.text import Text
 from panto_env.base.table import Table
 from panto_env.terminal import number
 
-from .overall import Standing, by_rank, next_in_ranking, why, with_feedback
+from .overall import Standing, by_rank, method_of, next_in_ranking, why, with_feedback
 from .report import as_rich, spans_in_words
 from .run import Benchmark
 from .statistics import Cell
@@ -85,14 +85,14 @@ def _within(one: Standing) -> str:
 def ranking(title: str, standings: Sequence[Standing]) -> Table:
     """A row for each policy that ran on every line."""
     after = next_in_ranking(standings)
-    method_of = {name: each.policy for each in standings for name in each.trainings}
+    methods = method_of(standings)
     rows = []
     for each in standings:
         change = f"{number(each.change, 1)}{_within(each)}"
         better = each.better_than.get(after.get(each.policy, ""))
         rows.append(
             (
-                f"{method_of[each.policy]}: {each.policy}" if each.policy in method_of else each.policy,
+                f"{methods[each.policy]}: {each.policy}" if each.policy in methods else each.policy,
                 "–" if each.rank is None else str(each.rank),
                 change if each.rank is not None else f"({number(each.change, 1)})",
                 number(each.contact_loss, 2),

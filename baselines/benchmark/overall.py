@@ -241,9 +241,14 @@ def why(disqualified: str) -> str:
     return f"{told}: {where}" if known else told
 
 
+def method_of(standings: Sequence[Standing]) -> dict[str, str]:
+    """Methods by the names of their trainings."""
+    return {name: one.policy for one in standings for name in one.trainings}
+
+
 def by_rank(standings: Sequence[Standing]) -> list[Standing]:
     """Standings, the best first, each method before its trainings, and last those without a rank."""
-    trainings = {name for one in standings for name in one.trainings}
+    trainings = method_of(standings)
     own = {one.policy: one for one in standings}
     return [
         each

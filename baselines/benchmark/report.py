@@ -22,7 +22,7 @@ from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.terminal import number
 
 from .harm import MOST_GROWN, MOST_WORSE, WORSE
-from .overall import Standing, next_in_ranking, with_feedback
+from .overall import Standing, method_of, next_in_ranking, with_feedback
 from .run import Benchmark
 from .settings import REFERENCE, Windows
 from .single_pass import ROW_LABELS, drive
@@ -200,7 +200,7 @@ def _overall(outcome: Benchmark) -> Table:
     for heading in [*headings, *(["beaten by\nthe first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
     after = next_in_ranking(found)
-    method_of = {name: each.policy for each in found for name in each.trainings}
+    methods = method_of(found)
     for each in found:
         low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
         if each.interval_for_lines is not None:
@@ -220,7 +220,7 @@ def _overall(outcome: Benchmark) -> Table:
         if best is not None:
             values.append(str(best.better_than.get(each.policy, "–")))
         style = "red" if each.disqualified else "bold" if each is best else ""
-        method = method_of.get(each.policy)
+        method = methods.get(each.policy)
         table.add_row(f"{method}: {each.policy}" if method else each.policy, *values, style=style)
     return table
 

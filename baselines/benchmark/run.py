@@ -27,7 +27,7 @@ from panto_env.plant.catenary.schema import CLEAR
 from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played, Trace
-from .overall import Standing, by_rank, standings, with_feedback
+from .overall import Standing, by_rank, method_of, standings, with_feedback
 from .settings import (
     ORACLE_TAPE,
     BenchmarkSettings,
@@ -269,7 +269,7 @@ class Result(BaseModel):
     @property
     def method_of(self) -> dict[str, str]:
         """Methods by the names of their trainings."""
-        return {name: one.policy for one in self.standings for name in one.trainings}
+        return method_of(self.standings)
 
     @property
     def by_rank(self) -> list[Standing]:

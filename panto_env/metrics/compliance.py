@@ -186,6 +186,8 @@ TOLERANCE = 0.5
 trimmed to 0.05 N, and a policy with a washout moves the mean by a few tenths. Own choice."""
 STD_OF_MEAN = 0.3
 """Maximum σ over F_m."""
+WAVE_SHARE = 0.7
+"""Maximum speed over the contact wire's wave speed."""
 SOURCE = "EN 50367, recalled"
 
 
@@ -351,7 +353,7 @@ def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
     ratio = speed / line.wave_speed
     seen = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
     values = [
-        Criterion("speed", "v/c, train over wave", "", ratio, None, 0.7, "EN 50119, seen", seen),
+        Criterion("speed", "v/c, train over wave", "", ratio, None, WAVE_SHARE, "EN 50119, seen", seen),
         Criterion("doppler", "Doppler factor (c − v)/(c + v)", "", (1 - ratio) / (1 + ratio)),
     ]
     if not math.isnan(line.dropper_reflection):

@@ -61,8 +61,8 @@ def test_nothing_is_permissible_where_the_lowest_speed_is_forbidden():
     assert found.answer("pd").limit == found.answer("pd").fallback == 230.0
     assert [row[1] for row in answers_table(found).cells] == ["none", "230"]
     again = made({PASSIVE: {}, "pd": {220.0: (FORCE,)}})
-    assert verified(found, again)["pd"] == 210.0
-    assert math.isnan(verified(found, again)[PASSIVE])
+    assert verified(found, again, "pd") == 210.0
+    assert math.isnan(verified(found, again, PASSIVE))
 
 
 TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [200], "controlled": [1, 2]}

@@ -288,7 +288,6 @@ def bands_of(speeds_kmh: Sequence[float], kept: Sequence[bool]) -> list[tuple[fl
     return [(speeds_kmh[begin], speeds_kmh[end - 1]) for begin, end in edges.tolist()]
 
 
-def verified(first: Scan, again: Scan) -> dict[str, float]:
-    """For each policy the lower one of its limits (km/h) in two scans; nan if it has none in one of them."""
-    both = {policy: (first.limit(policy), again.limit(policy)) for policy in first.policies}
-    return {policy: float(np.min(limits)) for policy, limits in both.items()}
+def verified(first: Scan, again: Scan, policy: str, failing: bool = False) -> float:
+    """The lower one of a policy's limits (km/h) in two scans; nan if it has none in one of them."""
+    return float(np.min([each.limit(policy, failing=failing) for each in (first, again)]))

@@ -38,7 +38,7 @@ def answers_table(scan: Scan, again: Scan | None = None) -> Table:
     for policy in scan.policies:
         found, acts = scan.answer(policy), policy != PASSIVE
         limits = [found.limit] if again is None else [found.limit, again.limit(policy)]
-        lowest = found.limit if again is None else verified(scan, again)[policy]
+        lowest = found.limit if again is None else verified(scan, again, policy)
         rows.append(
             (
                 policy,

@@ -12,6 +12,7 @@ from ...base.arrays import to_kmh
 from ...base.plotting import LIMIT, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary
+from ...metrics.compliance import WAVE_SHARE
 from ...plant.catenary.flexible import FlexibleCatenaryData
 from ..study import Outcome, Report
 from .scan import PASSIVE, VERIFIED_FROM, Scan, bands_of, scan, verified
@@ -60,7 +61,7 @@ class Found(NamedTuple):
 
     def limit(self, policy: str) -> float:
         """Permissible speed in both scans (km/h)."""
-        return verified(self.first, self.again)[policy]
+        return verified(self.first, self.again, policy)
 
     def kept(self, policy: str) -> list[bool]:
         """Whether a policy keeps all requirements at each speed in both scans."""
@@ -158,14 +159,14 @@ def limits_table(found: Sequence[Found], distance: float | None) -> Table:
             continue
         waves = _wave_limit(one.case.line)
         best = max(POLICIES, key=lambda policy: (_or_zero(one.limit(policy)), policy))
-        fallback = [scanned.answer(best).fallback for scanned in (one.first, one.again)]
+        fallback = verified(one.first, one.again, best, failing=True)
         rows.append(
             (
                 one.case.line,
                 one.case.pantograph,
                 f"{waves:.0f}",
                 *(_speed(one, policy) for policy in (PASSIVE, *POLICIES)),
-                "none" if any(map(math.isnan, fallback)) else f"{min(fallback):g}",
+                "none" if math.isnan(fallback) else f"{fallback:g}",
             )
         )
     headings = ("line", "pantograph", "0.7 c", PASSIVE, *POLICIES, "if the best fails")
@@ -173,10 +174,10 @@ def limits_table(found: Sequence[Found], distance: float | None) -> Table:
 
 
 def _wave_limit(name: str) -> float:
-    """0.7 of the wave speed (km/h)."""
+    """Speed at ``WAVE_SHARE`` of the wave speed (km/h)."""
     line = load_catenary(name)
     assert isinstance(line, FlexibleCatenaryData)
-    return 0.7 * to_kmh(line.contact_wire.wave_speed)
+    return WAVE_SHARE * to_kmh(line.contact_wire.wave_speed)
 
 
 def _or_zero(value: float) -> float:
