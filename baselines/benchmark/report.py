@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from panto_env.analysis.plots import fit_force_axis, mark_supports_of_run
-from panto_env.base.plotting import LIMIT, POSITION, series_colour
+from panto_env.base.plotting import LIMIT, POSITION, series_line
 from panto_env.base.table import Table as TextTable
 from panto_env.metrics import compliance as en50367
 from panto_env.metrics.figures import LABELS, in_words
@@ -287,25 +287,27 @@ def plot(outcome: Benchmark) -> Figure:
     figure = Figure(figsize=(11, 8 * len(lines)), layout="constrained")
     parts = figure.subfigures(len(lines), 1, squeeze=False)[:, 0]
     for k, (part, line) in enumerate(zip(parts, lines, strict=True)):
-        colours = {policy: series_colour(n) for n, policy in enumerate(outcome.settings.policies_on(line))}
+        lines_of = {policy: series_line(n) for n, policy in enumerate(outcome.settings.policies_on(line))}
         above, below = part.subfigures(2, 1)
         forces, (sigmas, changes) = above.subplots(), below.subplots(1, 2)
-        _forces(forces, outcome, k, colours)
+        _forces(forces, outcome, k, lines_of)
         cells = [
             each for each in outcome.cells if each.place.line == (line.catenary, line.pantograph, line.case)
         ]
-        _sigmas(sigmas, cells, colours)
-        _changes(changes, cells, colours)
+        _sigmas(sigmas, cells, lines_of)
+        _changes(changes, cells, lines_of)
         where = f"pantograph {line.pantograph}, line {line.catenary}{line.case and f', {line.case}'}"
         part.suptitle(
             f"{where}; evaluated spans {in_words(outcome.windows[k].early)}, seeds: {cells[0].seeds}"
         )
         handles, labels = _legend((forces, sigmas), cells)
-        part.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
+        wide = 0.8 + 0.08 * max(map(len, labels))  # inches, of the longest label with its line
+        columns = max(1, min(5, int(figure.get_figwidth() / wide)))
+        part.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize="small")
     return figure
 
 
-def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> None:
+def _forces(axes: Axes, outcome: Benchmark, k: int, lines_of: Mapping[str, Mapping[str, Any]]) -> None:
     settings, line = outcome.settings, outcome.settings.lines[k]
     speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
     first, last = outcome.windows[k].early
@@ -317,11 +319,11 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> 
         for row, played in rows
         if (row.catenary, row.pantograph, row.case, row.speed_kmh, row.seed) == place
     }
-    for policy, colour in colours.items():
+    for policy, style in lines_of.items():
         run, _ = drive(settings, line, policy, speed, seed, actions[policy])
         inside = run.alignment.within(run.position, shown)
         force = zero_phase_low_pass(run.contact_force, run.time_step)[inside]
-        axes.plot(run.position[inside], force, color=colour, linewidth=1.3, label=policy)
+        axes.plot(run.position[inside], force, **style, linewidth=1.3, label=policy)
     axes.axhline(run.nominal_force, color="0.5", linestyle=":", linewidth=1, label="nominal force")
     fit_force_axis([axes], run)
     mark_supports_of_run(axes, run)
@@ -333,30 +335,31 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, colours: dict[str, str]) -> 
     )
 
 
-def _sigmas(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
+def _sigmas(axes: Axes, cells: list[Cell], lines_of: Mapping[str, Mapping[str, Any]]) -> None:
     """σ over speed, and the maximum that EN 50367 allows at the passive pantograph's mean force."""
-    for policy, colour in colours.items():
+    for policy, style in lines_of.items():
         by_speed = _by_speed(cells, policy)
         speeds = [cell.speed_kmh for cell in by_speed]
-        axes.plot(speeds, [cell.figures["std"] for cell in by_speed], ".-", color=colour, linewidth=1.3)
-    first = _by_speed(cells, next(iter(colours)))
+        axes.plot(speeds, [cell.figures["std"] for cell in by_speed], marker=".", **style, linewidth=1.3)
+    first = _by_speed(cells, next(iter(lines_of)))
     limit = [en50367.STD_OF_MEAN * cell.figures["mean"] for cell in first]
     words = f"{en50367.SOURCE}: σ of at most {en50367.STD_OF_MEAN:g} F_m ({first[0].policy})"
-    style: dict[str, Any] = {"color": LIMIT, "linestyle": "-.", "linewidth": 0.9}  # not as the force's
+    style: dict[str, Any] = {"color": LIMIT, "linestyle": "-.", "marker": "_", "linewidth": 0.9}  # not as the force's
     axes.plot([cell.speed_kmh for cell in first], limit, label=words, **style)
     axes.set(xlabel="speed (km/h)", ylabel=LABELS["std"].heading, xticks=sorted({c.speed_kmh for c in cells}))
     axes.set_ylim(bottom=0)
 
 
-def _changes(axes: Axes, cells: list[Cell], colours: dict[str, str]) -> None:
+def _changes(axes: Axes, cells: list[Cell], lines_of: Mapping[str, Mapping[str, Any]]) -> None:
     """Change of σ with its 95 % interval, policies side by side at each speed."""
     speeds = sorted({cell.speed_kmh for cell in cells})
-    apart = 0.6 * min(np.diff(speeds), default=25.0) / len(colours)
-    for k, (policy, colour) in enumerate(colours.items()):
+    apart = 0.6 * min(np.diff(speeds), default=25.0) / len(lines_of)
+    for k, (policy, style) in enumerate(lines_of.items()):
         for cell in _by_speed(cells, policy):
-            x = cell.speed_kmh + apart * (k - (len(colours) - 1) / 2)
+            x = cell.speed_kmh + apart * (k - (len(lines_of) - 1) / 2)
             low, high = cell.interval or (cell.change, cell.change)
-            axes.plot([x, x], [low, high], color=colour, linewidth=1.6)
+            colour = style["color"]
+            axes.plot([x, x], [low, high], **style, linewidth=1.6)
             fill = "white" if cell.disqualified else colour
             axes.plot(x, cell.change, "o", color=colour, markerfacecolor=fill, markersize=5)
     axes.axhline(0.0, color="0.4", linewidth=0.9)

@@ -27,6 +27,11 @@ def series_colour(number: int) -> str:
     return SERIES[number % len(SERIES)]
 
 
+def series_line(number: int) -> dict[str, str]:
+    """Colour and style of a series by its number; where colours repeat it is dashed, then dotted."""
+    return {"color": series_colour(number), "linestyle": ("-", "--", ":")[number // len(SERIES) % 3]}
+
+
 def panels(size: tuple[float, float], rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
     """A figure of this size (inches) and its axes. Matplotlib is imported late: it is slow to import."""
     from matplotlib.figure import Figure
