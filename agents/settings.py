@@ -113,7 +113,7 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     own = {key: value for key, value in environment.items() if key != "id"}
     for key in own:
         if key not in fields():
-            raise InputError(f"unknown key '{key}' in [environment]: {suggest(key, tuple(fields()))}")
+            raise InputError(f"unknown key '{key}': {suggest(key, tuple(fields()))}")
     return {**IDS[name], **own}
 
 
