@@ -232,6 +232,9 @@ def _judged(
         saturation = float(np.mean(np.abs(commands) >= FULL * recorder.force_limit))
         watts = run.mechanical_power(spans)
         arguments = _arguments(settings, line, speed_kmh, seed)
+        if "spans" in arguments:  # the line is given, so the passive run may end where its figures do
+            behind = sum(line.distances) + SHORT_SPAN
+            arguments["distance"] = run.alignment.limits(spans)[1] + behind
         passive = run if policy == REFERENCE else passive_at_mean_of(first, spans, arguments)
     pressed = Figures.none() if passive is None else passive.summary(spans)
     return Row(
