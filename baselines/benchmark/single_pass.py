@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory, simulate
-from panto_env.analysis.simulation import ready_pass
+from panto_env.analysis.simulation import passive_at_mean, ready_pass
 from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control import Task
@@ -62,7 +62,7 @@ def passive_at_mean_of(
         return None
     try:
         mean = means if len(means) > 1 else means[0]
-        passive = simulate(**arguments, mean_force=mean, trimmed_over=spans)
+        passive = passive_at_mean(mean_force=mean, trimmed_over=spans, **arguments)
     except InputError:
         return None
     return None if passive.terminated else passive.worst_controlled(spans)
@@ -304,7 +304,7 @@ def _record(
 
     with _torch_on_one_thread():
         arguments = _arguments(settings, line, speed_kmh, seed)
-        run = simulate(policy=recorders, watch=watch, **arguments)
+        run = simulate(policy=recorders, watch=watch, record_droppers=False, **arguments)
     return run, recorders
 
 
@@ -330,8 +330,7 @@ def line_ends(catenary: str) -> bool:
 
 def _arguments(settings: BenchmarkSettings, line: Line, speed_kmh: float, seed: int) -> dict[str, Any]:
     """Arguments of ``simulate`` for a pass, except its policy."""
-    own = {"seed": seed, "record_droppers": False}
-    return at_speed(along(settings, line), speed_kmh) | own
+    return at_speed(along(settings, line), speed_kmh) | {"seed": seed}
 
 
 def at_speed(given: dict[str, Any], speed_kmh: Any) -> dict[str, Any]:

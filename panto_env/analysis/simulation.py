@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
+from functools import partial
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -85,6 +87,23 @@ def simulate(
         if watch is not None:
             watch(task)
     return task.trajectory(0, policy=name, seed=seed, last=True)
+
+
+def passive_at_mean(
+    *, mean_force: float | Sequence[float], trimmed_over: tuple[int, int], seed: int, **settings: Any
+) -> Trajectory:
+    """Pass without a policy whose mean force (N) over the spans is the given one; of a train, one for each.
+
+    The same as ``simulate`` gives without droppers, but the pass that has met the mean is not run again.
+    Raises InputError as ``simulate`` does.
+    """
+    given = {"catenary": _LINE, "pantograph": _PANTOGRAPH} | settings | {"mean_force": mean_force}
+    checked = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
+    met: deque[Trajectory] = deque(maxlen=1)
+    if all(each == each.in_still_air for each in checked.line_condition):  # it is trimmed in still air
+        trim_of_pass(checked, seed, trimmed_over, partial(passive_mean, keep=met.append))
+    again = partial(simulate, **given, seed=seed, trimmed_over=trimmed_over, record_droppers=False)
+    return met[0] if met else again()
 
 
 def _ready(given: dict[str, Any], seed: int, trimmed_over: SpanChoice, record_droppers: bool) -> Task:

@@ -367,11 +367,14 @@ def passive_pass(settings: RunSettings) -> Trajectory:
     return task.trajectory(0, last=True).controlled
 
 
-def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> PassiveMean:
+def passive_mean(
+    settings: RunSettings, seed: int, spans: SpanChoice, keep: Callable[[Trajectory], None] | None = None
+) -> PassiveMean:
     """Mean forces of a pass without a policy, over the spans, as a function of the static forces.
 
-    spans: as ``trim_of_pass`` takes them. Where the speed drifts, what the required mean is higher over these
-    spans than at the mean speed is taken off: it follows the speed, and the static force has no part in that.
+    spans: as ``trim_of_pass`` takes them. keep: called with the record of every pass. Where the speed
+    drifts, what the required mean is higher over these spans than at the mean speed is taken off: it follows
+    the speed, and the static force has no part in that.
     """
     task = Task(settings)
 
@@ -379,7 +382,9 @@ def passive_mean(settings: RunSettings, seed: int, spans: SpanChoice) -> Passive
         task.trim = Trim((0.0,), (forces,))
         task.reset(0, np.random.default_rng(seed))
         task.run_passively()
-        run = task.trajectory(0)
+        run = task.trajectory(0, seed=seed)
+        if keep is not None:
+            keep(run)
         if run.terminated:
             targets = " and ".join(f"{each.target_mean:.1f}" for each in run.train)
             raise InputError(

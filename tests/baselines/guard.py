@@ -67,7 +67,7 @@ def judge(policies, without, track, number, speed, seed):
         setattr(guarded, rule, 0.0 if rule == "LOW" else math.inf)
     settings = load_benchmark(f"benchmark/{track}")
     arguments = _arguments(settings, settings.lines[number], speed, seed)
-    passive, *runs = (simulate(policy=each, **arguments) for each in (None, *policies))
+    passive, *runs = (simulate(policy=each, record_droppers=False, **arguments) for each in (None, *policies))
     found = []
     for run in runs:
         worst, lost_alone = (-math.inf, 0), 0
