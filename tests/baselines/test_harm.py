@@ -115,6 +115,20 @@ def test_both_windows_are_those_of_one_pass():
     assert found.as_dict()["late_std"] == found.late.figures.std
 
 
+def test_the_passive_run_of_the_early_window_may_end_with_it():
+    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
+    found = next(row for row in benchmark.run(given, workers=1).rows if row.policy != "passive")
+    whole = simulate(
+        speed_kmh=280,
+        seed=0,
+        spans=44,
+        line_condition="as-built",
+        mean_force=found.figures.mean,
+        trimmed_over=(10, 19),
+    )
+    assert found.pressed_std == whole.summary((10, 19)).std
+
+
 def test_a_line_that_ends_before_has_one_window():
     given = asked(lines=[{"catenary": "sweden-st15-bridge", "pantograph": "dsa250", "speeds_kmh": [160]}])
     assert evaluated_windows(given, given.lines[0]).late is None

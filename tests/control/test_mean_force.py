@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, Trajectory, simulate
+from panto_env.analysis.simulation import passive_at_mean
 from panto_env.analysis.sweep import sweep
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task, passive_mean, trim_of_pass
@@ -255,3 +256,30 @@ def test_it_is_nothing_at_one_speed_or_where_a_number_or_nothing_is_required():
         assert _required_more(settings, made_up(drifts=False), None) == 0.0
         if given.get("mean_force") != "en50367":
             assert _required_more(settings, made_up(), None) == 0.0
+
+
+@pytest.mark.parametrize(("condition", "more"), [("fair", -1), ("fair:wind=15", 0)])
+def test_the_pass_that_met_the_mean_is_the_one_that_simulate_gives(empty_store, condition, more):
+    given = LIGHT | {
+        "pantograph": "dsa380",
+        "speed_kmh": 250.0,
+        "line_condition": condition,
+        "seed": 4,
+        "spans": 30,
+        "distance": 700.0,
+    }
+    given |= {"mean_force": 110.0, "trimmed_over": (5, 8)}
+    expected = simulate(**given, record_droppers=False)
+    with_trim = len(empty_store[1])
+    from_store = passive_at_mean(**given)
+    assert len(empty_store[1]) == with_trim + 1
+    for kept in empty_store[0].iterdir():
+        kept.unlink()
+    found = passive_at_mean(**given)
+    assert len(empty_store[1]) == 2 * with_trim + 1 + more  # in wind the trim's run is another
+    for each in (found, from_store):
+        np.testing.assert_array_equal(each.contact_force, expected.contact_force)
+        assert each.seed == expected.seed
+        assert each.summary((5, 8)) == expected.summary((5, 8))
+    mean = found.summary((5, 8)).mean
+    assert mean > 120.0 if "wind" in condition else mean == pytest.approx(110.0, abs=TOLERANCE)
