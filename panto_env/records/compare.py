@@ -20,6 +20,7 @@ from ..metrics.figures import LABELS, STATISTICS, statistics
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
+from .likeness import PER_HOUR, SUM, UNLIKE, check_period, check_reading, doubts
 from .record import Record, Samples, Shift, find_shift
 
 SAME_SPEED = 0.03
@@ -27,8 +28,6 @@ SAME_SPEED = 0.03
 STD, UPLIFT, HEIGHT = 20.0, 20.0, 20.0
 """Accepted deviations of σ (%), of the maximum uplift (mm) and of the contact point's range (mm)."""
 SOURCE = "EN 50318, recalled"
-UNLIKE = 0.3
-"""Correlation below which a record hardly resembles the run, and figures agree by chance. Own choice."""
 COVERED = 0.98
 """Share of a span that both must cover for it to be compared."""
 
@@ -79,13 +78,16 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
 
     shift: about what is to be added to the record's positions (m), if known; else it is searched within 1.5
     spans. Raises InputError where the run ended early or is too short, the two have less than a span in
-    common, or the speeds differ by more than 3 %, of the whole or of a second in the spans that both cover.
+    common, the speeds differ by more than 3 %, of the whole or of a second in the spans that both cover, or
+    the record is clearly more like the run if it is read in another way.
     """
     covered = run.spans()
     assert covered is not None  # it is for a choice of "all" only
     begin, end = run.alignment.limits(covered)
+    check_period(Samples(record), run.alignment.mean_length)
     same, notes = _at_speed(record, run)
     found = find_shift(Samples(same), run, begin, end, shift)
+    check_reading(Samples(same), run, begin, end, shift, found)
     moved = [replace(piece, position=piece.position + found.value) for piece in same.pieces]
     samples = Samples(replace(same, pieces=tuple(moved)))
     spans, own, other = _spans(samples, run, begin, end)
@@ -93,23 +95,21 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     uplift, where = _uplift(samples, run, begin, end)
     heights = np.array([each.height_range for each in spans if not math.isnan(each.height_range[0])])
     height = 1e3 * float((heights[:, 1] - heights[:, 0]).mean()) if len(heights) else math.nan
-    if found.correlation < UNLIKE:
-        notes.append(
-            f"Record and run hardly resemble each other (correlation {found.correlation:.2f}): it may be "
-            "of another line, the shift beyond the search, or columns may be swapped."
-        )
+    notes += doubts(found, figures["mean"])
     range_of_height = "range of the contact point's height"
     values = {"uplift at a support": uplift, range_of_height: height}
     missing = tuple(name for name, value in values.items() if math.isnan(value))
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
     )
+    ratio = figures["mean"][0] / figures["mean"][1]
     heights_note = "mean over the spans of the range within each, low-passed at 20 Hz"
     criteria = (
         Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
         Criterion("height", range_of_height, "mm", height, -HEIGHT, HEIGHT, SOURCE, heights_note),
         alike,
+        Criterion("ratio", "mean force, record over run", "", ratio, 1 / SUM, SUM, "own choice"),
         *(
             Criterion(key, LABELS[key].name, "N", simulated - measured)
             for key, (measured, simulated) in figures.items()
@@ -127,6 +127,13 @@ def _pairs(one: Array, other: Array) -> dict[str, tuple[float, float]]:
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
     same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
     if not same:
+        ratio = run.speed / record.longest.speed
+        if abs(ratio / PER_HOUR - 1) <= SAME_SPEED:
+            raise InputError(
+                f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's "
+                f"{run.speed_kmh:.1f} km/h, 3.6 times as much: if the speed was recorded in m/s, tell: "
+                "--unit speed=m/s."
+            )
         raise InputError(
             f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's {run.speed_kmh:.1f} "
             f"km/h; simulate the run at the record's speed: --speed {record.longest.speed_kmh:.1f}."

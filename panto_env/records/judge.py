@@ -22,6 +22,7 @@ from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
 from ..terminal import number
+from .likeness import check_period
 from .record import ABOVE, Record, Samples
 
 CLASS_KMH, FIRST_KMH = 20.0, 15.0
@@ -87,6 +88,8 @@ def judge(
     """
     samples = Samples(record)
     alignment = _alignment(samples, line, span)
+    if alignment is not None:
+        check_period(samples, alignment.mean_length)
     reach = (0.0, alignment.length if alignment is not None and line is not None and line.ends else math.inf)
     parts = [_part(samples, "whole", "whole record", np.ones(len(samples.raw), dtype=bool))]
     runs = list(dict.fromkeys(piece.run for piece in record.pieces))
