@@ -71,7 +71,10 @@ def estimate(
     velocity_noise: Annotated[
         float | None, Option(help="White noise of a sample, rms (m/s).", show_default="0.005")
     ] = None,
-    lag: Annotated[float, Option(help="Time that the estimate may wait for later samples (s).")] = 0.0,
+    lag: Annotated[
+        float,
+        Option(help="Time of later samples that count (s); 0 is what a train knows at once, and less exact."),
+    ] = 0.05,
     free_zero: Annotated[
         bool, Option("--free-zero", help="The zero of heights is unknown: the mean force is the lift.")
     ] = False,
