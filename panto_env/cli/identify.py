@@ -115,6 +115,7 @@ def identify(
         if json:
             fits = {name: fit.as_dict() for name, fit in _by_short_name(identified.fits).items()}
             facts = {"band": identified.band, "fits": fits, "failures": _by_short_name(identified.failures)}
+            facts["doubts"] = list(identified.doubts)
             print_json(facts | {"method": method.value, "matches": [match.as_dict() for match in matches]})
             return
         _print(identified, matches, full_name)
@@ -172,5 +173,7 @@ def _print(identified: Identification, matches: list[Match], method: str) -> Non
             alert("Warning:", f"{fit.method}: {shown}: no pantograph has that.")
     for name, reason in identified.failures.items():
         alert("Warning:", f"{name}: {reason}")
+    for doubt in identified.doubts:
+        alert("Warning:", f"{doubt}.")
     if matches:
         print_table(matches_table(matches, method))

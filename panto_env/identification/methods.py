@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError
 from .model import IDENTIFIED, Fit, Parameters, check_known, free_names, matrices
-from .record import Record, check_record
+from .record import Record, check_record, doubts
 from .response import band_limited, excited_band, polynomials, respond
 
 DEPENDENT = 1e8
@@ -167,6 +167,11 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
             raise InputError(f"The output-error fit diverges ({error}); check the record's units.") from error
     jacobian = misfit.jacobian(solution)
     length = np.linalg.norm(jacobian, axis=0)
+    if not (np.isfinite(length) & (length > 0)).all():
+        raise InputError(
+            "The output-error fit ends where a value has no influence on the motion; check the record's "
+            "units and zeros."
+        )
     _, singular, rows = np.linalg.svd(jacobian / length, full_matrices=False)
     dependence = float(singular[0] / singular[-1])
     if not fitted.success:
@@ -266,6 +271,7 @@ class Identification:
     band: float  # Hz
     fits: dict[str, Fit]  # by method
     failures: dict[str, str]  # why a method found nothing, by method
+    doubts: tuple[str, ...] = ()  # where the record does not agree with what is known of the rig
 
 
 def identify(
@@ -295,4 +301,8 @@ def identify(
             fits[method] = run()
         except InputError as error:
             failures[method] = str(error)
-    return Identification(band, fits, failures)
+    try:
+        clean = band_limited(record, band)[0]
+    except InputError:  # too short for that: noise does no harm to means and much to changes
+        clean = record
+    return Identification(band, fits, failures, doubts(clean, known["k1T"], free_offset=free_offset))

@@ -87,6 +87,11 @@ ALIKE = 30.0
 """How many times as far one may move as another, or as large a force be as the spring makes it."""
 HEAVIEST = 50.0  # kg, of a frame: it follows the head up to its own frequency on k2
 TOGETHER = 0.5  # correlation from which two series count as moving together, or against each other
+NOISE = 0.1
+"""Share of the plate's power above half of the highest frequency, below which that is noise."""
+OFF, ALIGNED = 0.1, 0.95
+"""Relative difference of the measured force from that of the contact spring that is worth a word, and the
+correlation from which on their changes are compared. Own choice."""
 PUSH = (
     "displacements count in the direction in which the plate pushes the head, which is down under a wire, "
     "and the force is positive where it pushes"
@@ -146,6 +151,11 @@ def _check_force(record: Record, force: Array, stiffness: float) -> None:
         )
     if swing < FORCE[0]:
         raise InputError(f"Column force changes by {swing:.2g} N only: kilonewtons in a column of N?")
+    if force.mean() < -force.std():
+        raise InputError(
+            f"The mean force is {force.mean():.3g} N, and a plate can't pull the head: turn the sign of "
+            f"column force, or correct its zero; {PUSH}."
+        )
     spring = stiffness * (record.plate - record.head)
     together = _correlation(force, spring)
     if together < -TOGETHER:
@@ -161,14 +171,43 @@ def _check_force(record: Record, force: Array, stiffness: float) -> None:
         )
 
 
+def doubts(record: Record, stiffness: float, *, free_offset: bool) -> tuple[str, ...]:
+    """Sentences where the measured force and that of the contact spring, k1T (N/m), do not agree.
+
+    record: best without noise beyond the excitation. free_offset: whether zeros do not matter.
+    """
+    if record.force is None:
+        return ()
+    spring = stiffness * (record.plate - record.head)
+    slope = float(record.force.std() / spring.std()) if spring.std() > 0 else math.inf
+    if _correlation(record.force, spring) > ALIGNED and abs(slope - 1) > OFF:
+        return (
+            f"the force changes by {slope:.3g} times what k1T = {stiffness:g} N/m makes of the compression "
+            "of the contact spring: k1T or a unit is wrong by that, and with it all that was identified",
+        )
+    offset = float(record.force.mean() - spring.mean())
+    if not free_offset and abs(offset) > OFF * max(float(record.force.mean()), float(np.ptp(record.force))):
+        return (
+            f"the mean force differs from that of the contact spring by {offset:.3g} N, as if a zero were "
+            f"off by {1e3 * abs(offset) / stiffness:.2g} mm: correct it, or let zeros be free "
+            "(--free-offset)",
+        )
+    return ()
+
+
 def frequency_below(record: Record, share: float, first: int = 0) -> float:
     """Frequency (Hz) below which lies a share of the power of the plate's motion about its mean.
 
-    first: number of the lowest frequency that counts.
+    White noise is left out, where little of the power is above half of the highest frequency: otherwise a
+    thousandth of noise would be the highest motion. first: number of the lowest frequency that counts.
     """
     plate = (record.plate - record.plate.mean()) * np.hanning(len(record.plate))
-    power = np.cumsum(np.abs(np.fft.rfft(plate)) ** 2)
-    place = int(np.searchsorted(power, share * power[-1]))
+    density = np.abs(np.fft.rfft(plate)) ** 2
+    above = density[len(density) // 2 :]
+    if above.sum() < NOISE * density.sum():
+        density = density - above.mean()
+    power = np.cumsum(density)
+    place = int(np.argmax(power >= share * power[-1]))
     return float(np.fft.rfftfreq(len(plate), record.time_step)[max(place, first)])
 
 

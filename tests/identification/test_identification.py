@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -187,3 +189,33 @@ def test_true_parameters_lie_inside_their_intervals_in_90_per_cent_of_200_record
         assert methods[PRINTED].coverage.min() == 0
         assert methods[OUTPUT_ERROR].values.shape == (200, 5)
     assert min(methods[FILTERED].coverage.min() for methods in found) == pytest.approx(81.5, abs=3)
+
+
+def noisy(noise=20e-6, **other):
+    """A record with white noise (m) in the displacements, of less than a millimetre at the head."""
+    random, clean = np.random.default_rng(0), clean_record(ALL[0], TRUTH)
+    seen = {name: getattr(clean, name) for name in ("plate", "head", "support")} | other
+    return dataclasses.replace(
+        clean, **{name: each + noise * random.standard_normal(len(each)) for name, each in seen.items()}
+    )
+
+
+def test_the_band_of_the_excitation_is_not_that_of_the_noise():
+    clean = clean_record(ALL[0], TRUTH)
+    scale = 0.4e-3 / np.ptp(clean.plate)
+    little = noisy(plate=scale * clean.plate)
+    assert excited_band(little) == pytest.approx(excited_band(clean), rel=0.1)
+
+
+def test_what_the_record_does_not_agree_with_is_said():
+    record = noisy()
+    assert identify(record, KNOWN).doubts == ()
+    (doubt,) = identify(record, KNOWN | {"k1T": 1.3 * KNOWN["k1T"]}).doubts
+    assert "changes by 0.77 times what k1T" in doubt
+    moved = noisy(head=clean_record(ALL[0], TRUTH).head + 7e-3)
+    found = identify(moved, KNOWN)
+    assert "a zero were off by 7 mm" in found.doubts[0]
+    assert "no influence on the motion" in found.failures[OUTPUT_ERROR]
+    assert identify(moved, KNOWN, free_offset=True).doubts == ()
+    with pytest.raises(InputError, match="a plate can't pull the head"):
+        identify(dataclasses.replace(record, force=record.force - 72.0), KNOWN)
