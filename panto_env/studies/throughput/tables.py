@@ -108,7 +108,7 @@ def details(result: Row) -> list[Table | str]:
 
 
 def markdown(results: Sequence[Row]) -> tuple[str, str]:
-    """The two blocks of docs/speed.md, of all machines and of the first one, each between its markers."""
+    """Blocks between markers: of all machines, as in docs/speed.md; of the first one, some tables there."""
     first = _marked(["  \n".join(machines(results)), summary(results).markdown])
     parts = [
         part if isinstance(part, str) else f"**{part.title}**\n\n{part.markdown}"
