@@ -24,6 +24,9 @@ IDENTIFIABLE = 0.6
 """Share of its tolerance below which the standard deviation of an identifiable value has fallen."""
 CORRELATED = 0.9
 """Correlation from which on two values are named: the records know their sum or difference better."""
+FASTER = 2e-4
+"""Relative difference of a train's speed from the simulated one above which it is simulated anew: twice as
+much as of a tension."""
 WHITE = 0.01
 """Probability below which a residual is called unlike noise."""
 
@@ -118,8 +121,13 @@ class Fit:
         """By how much the gain of each part's sensors differs from 1, (parts,)."""
         return np.asarray(self.problem.sensors(self.solution.state.x)[1])
 
+    @property
+    def scales(self) -> Array:
+        """By which share distances of each part were short, as of a worn wheel, (parts,)."""
+        return np.asarray(self.problem.sensors(self.solution.state.x)[3])
+
     def measured(self, k: int) -> Array:
-        """Coefficients of a part's measured force (N), with its place and gain corrected."""
+        """Coefficients of a part's measured force (N), with its place, scale and gain corrected."""
         return self.parts[k].measured.coefficients(self.problem.measured(k, self.solution.state.x))
 
     @cached_property
@@ -154,4 +162,12 @@ def fit(
     """
     with one_thread():
         ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
-        return Fit(ready, ready.run(ready.start() if begin is None else begin, report, working))
+        begin = ready.start() if begin is None else begin
+        if np.abs(ready.sensors(begin.x)[3]).max() > FASTER:
+            ready = ready.at_speeds(begin.x)
+        solution = ready.run(begin, report, working)
+        speeds = [part.fine.speed / part.measured.piece.speed - 1 for part in ready.parts]
+        if np.abs(ready.sensors(solution.state.x)[3] - speeds).max() > FASTER:
+            ready = ready.at_speeds(solution.state.x)
+            solution = ready.run(solution.state, report, working)
+        return Fit(ready, solution)

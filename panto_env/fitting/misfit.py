@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from .passes import BANDS, Measured, Passes, Variant, between
 from .values import Values
 
-OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0}
+OWN = {"shift": 0.5, "gain": 0.03, "zero": 5.0, "scale": 1e-3}
 """Values of each record's own, and their standard deviations before its force is looked at (own choice): by
-how much positions are short (m), the sensors' gain differs from 1, and their zero from 0 (N). Taken for sure,
-a gain that is 3 % off and a zero that drifts by 8 N move tensions by 0.9 %, and nothing shows it.
+how much positions are short (m), the sensors' gain differs from 1, and their zero from 0 (N), and by which
+share distances are short. Taken for sure, a gain that is 3 % off and a zero that drifts by 8 N move tensions
+by 0.9 %, a wheel that reads 0.1 % too little moves them by 0.6 %, and nothing shows it.
 """
 Grid = Literal["coarse", "fair", "fine"]
 FURTHER = 1.0
@@ -66,6 +67,7 @@ class Problem:
     values: Values
     stretch: tuple[float, float] = (0.0, 0.0)  # of the simulated line that is compared (m)
     shifts: tuple[float, ...] = ()  # by how much positions of each record were short, roughly (m)
+    scales: tuple[float, ...] = ()  # by which share distances of each record are short, roughly
     of_records: tuple[str, ...] = ()  # notes on the records: what was left out, corrected or assumed
     notes: tuple[str, ...] = ()  # on what is fitted to them
 
@@ -86,10 +88,12 @@ class Problem:
         return np.concatenate([BANDS * k + part.measured.band for k, part in enumerate(self.parts)])
 
     def start(self) -> State:
-        """The line as designed."""
+        """The line as designed, and the records' rough scales."""
         count = len(self.parts)
         static = np.full(count, self.values.design.pantograph.static_force)
-        return State(np.zeros(len(self.prior)), static, np.full((count, BANDS), np.nan))
+        x = np.zeros(len(self.prior))
+        self.sensors(x)[3] = self.scales or 0.0
+        return State(x, static, np.full((count, BANDS), np.nan))
 
     def as_designed(self) -> list[Array]:
         """Force of the line as designed at the places of each part (N)."""
@@ -128,6 +132,7 @@ class Problem:
             by_own[0, k] = (near[0] - near[1]) / (2 * sample)
             by_own[1, k] = (target - target.mean() * by_static) / gain
             by_own[2, k] = -by_static / gain
+            by_own[3, k] = by_own[0, k] * part.measured.from_middle
             jacobian.append(part.measured.coefficients(np.vstack([by_value, *by_own])).T)
             residual.append(part.measured.coefficients(target - force))
         return replace(state, static_forces=static), np.concatenate(jacobian), np.concatenate(residual)
@@ -161,13 +166,27 @@ class Problem:
         return np.split(values, np.cumsum([len(part.measured.band) for part in self.parts])[:-1])
 
     def sensors(self, x: Array) -> Array:
-        """Of all values x, those of ``OWN``, (3, parts): how much positions are short (m), gain, zero (N)."""
+        """Of all values x, those of ``OWN``, (4, parts): shift (m), gain, zero (N) and scale."""
         return np.asarray(x[len(self.values) :].reshape(len(OWN), len(self.parts)))
+
+    def at_speeds(self, x: Array) -> Self:
+        """The same with trains as fast as these values' scales say; records tell time exactly."""
+        parts = [
+            replace(
+                part,
+                **{
+                    grid: getattr(part, grid).at(part.measured.piece.speed * (1 + float(scale)))
+                    for grid in ("fine", "fair", "coarse")
+                },
+            )
+            for part, scale in zip(self.parts, self.sensors(x)[3], strict=True)
+        ]
+        return replace(self, parts=parts)
 
     def measured(self, k: int, x: Array, further: float = 0.0) -> Array:
         """Force of a part, (places,) (N), with place, gain and zero corrected; further: its shift (m)."""
-        shift, gain, zero = self.sensors(x)[:, k]
-        force = self.parts[k].measured.force(float(shift) + further)
+        shift, gain, zero, scale = self.sensors(x)[:, k].tolist()
+        force = self.parts[k].measured.force(shift + further, scale)
         return np.asarray((force - zero) / (1 + gain))
 
     def static_forces(self, state: State, x: Array) -> Array:

@@ -56,9 +56,18 @@ class Measured:
         """Force of the record, low-passed (N), (samples,)."""
         return zero_phase_low_pass(self.piece.force, self.piece.time_step)
 
-    def force(self, shift: float = 0.0) -> Array:
-        """Measured force (N), (places,); shift: by which the record's positions are too small (m)."""
-        position = self.piece.position - self.offset + shift
+    @cached_property
+    def from_middle(self) -> Array:
+        """Way from the middle of what is compared, (places,) (m)."""
+        return self.place - 0.5 * (self.place[0] + self.place[-1])
+
+    def force(self, shift: float = 0.0, scale: float = 0.0) -> Array:
+        """Measured force (N), (places,), where the record's positions are short.
+
+        shift: by how much in the middle of what is compared (m). scale: by which share from there on.
+        """
+        position = self.piece.position - self.offset
+        position = position + shift + scale * (position - 0.5 * (self.place[0] + self.place[-1]))
         return between(self.smooth, np.interp(self.place, position, np.arange(len(position))))
 
     @cached_property
@@ -162,6 +171,7 @@ class Passes:
         numerics: Numerics,
     ) -> None:
         """speed: m/s; distance: of a pass (m); spans: of the line."""
+        self._facts = (catenary, pantograph, condition), (distance, spans, numerics)
         self._runs = Runs(speeds=(speed, speed), conditions=(condition,))
         self._spans, self._numerics, self._pantograph = spans, numerics, pantograph
         self._idle: defaultdict[FlexibleCatenaryData, list[Plant]] = defaultdict(list)
@@ -175,6 +185,11 @@ class Passes:
         self.layout, self.alignment = catenary.layout(spans), first.alignment
         self.position = speed * self.time_step * (np.arange(self.steps) + 0.5)
         """Of the samples, (steps,) (m)."""
+
+    def at(self, speed: float) -> Passes:
+        """The same passes at another speed (m/s)."""
+        before, behind = self._facts
+        return Passes(*before, speed, *behind)
 
     @contextmanager
     def _lent(self, catenary: FlexibleCatenaryData) -> Iterator[Plant]:

@@ -123,6 +123,29 @@ def rough_shift(own: Measured, force: Array, reach: float) -> tuple[float, float
     return float(trials[best]), scores[best] / float(np.linalg.norm(expected))
 
 
+LARGEST_SCALE = 3e-3
+"""Largest share by which distances of a record are taken to be short or long. Own choice."""
+FINE_GRID = 0.05
+"""Distance of the shifts (m) that are tried for each half of a record."""
+
+
+def rough_scale(own: Measured, force: Array, shift: float) -> float:
+    """By which share distances are short, roughly: by how unlike the shifts of the halves of a record are.
+
+    force: simulated (N), at the places of ``own``; shift: of the whole (m).
+    """
+    half = len(own.place) // 2
+    apart = float(own.place[half + half // 2] - own.place[half // 2])
+    reach = 0.5 * LARGEST_SCALE * apart
+    trials = shift + np.arange(-reach, reach + FINE_GRID, FINE_GRID)
+    seen = [own.force(float(trial)) for trial in trials]
+    shifts = []
+    for part in (slice(0, half), slice(half, None)):
+        alike = [float(np.corrcoef(each[part], force[part])[0, 1]) for each in seen]
+        shifts.append(float(trials[int(np.argmax(alike))]))
+    return (shifts[1] - shifts[0]) / apart
+
+
 END = 20.0
 """Way (m) at both ends of a record that is not compared: a low-pass without delay does not know how it goes
 on, and the record's place is not known yet."""
@@ -210,12 +233,14 @@ def problem(
             f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; "
             "where theirs differ, cut the records at the overlaps and fit each part."
         )
-    shifted = []
+    shifted, scales = [], []
     for part, force in zip(parts, Fitting(parts, values).as_designed(), strict=True):
         shift, _ = rough_shift(part.measured, force, SEARCH * span)
         shifts.append(shift)
+        scales.append(rough_scale(part.measured, force, shift))
         shifted.append(replace(part, measured=_moved(part.measured, shift, stretch, span)))
-    return Fitting(shifted, values, (begin, end), tuple(shifts), tuple(of_records), tuple(notes))
+    rough = tuple(shifts), tuple(scales)
+    return Fitting(shifted, values, (begin, end), *rough, tuple(of_records), tuple(notes))
 
 
 def _inner(piece: Piece, offset: float, stretch: tuple[float, float]) -> tuple[float, float]:

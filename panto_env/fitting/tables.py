@@ -84,6 +84,7 @@ def parts_table(fit: Fit) -> Table:
         "record": lambda k: fit.parts[k].name,
         "speed (km/h)": lambda k: f"{fit.parts[k].measured.piece.speed_kmh:.1f}",
         "shift (m)": lambda k: f"{shifts[k] + 0.0:+.2f}",
+        "wheel (%)": lambda k: f"{100 * fit.scales[k] + 0.0:+.3f}",
         "gain (%)": lambda k: f"{100 * gains[k] + 0.0:+.2f}",
         "σ compared (N)": lambda k: number(std[k][0], 2),
         "σ left (N)": lambda k: number(std[k][1], 2),

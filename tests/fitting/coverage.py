@@ -59,7 +59,9 @@ HEADINGS = (
     "unlike noise",
 )
 SCALES = {"tensions": 100.0, "droppers": 1e3, "supports": 1e3, "damping": 100.0, "unevenness": 1e3}
-WRONG = ("nothing", "grid", "damping", "pantograph", "drift")
+WRONG = ("nothing", "grid", "damping", "pantograph", "drift", "wheel")
+WHEEL = 1e-3
+"""Share by which the positions of a worn wheel are too large."""
 
 
 def design_of(seed: int, line: str) -> FlexibleCatenaryData:
@@ -129,6 +131,10 @@ def records_of(
             inside = piece.position > before * line.span_length
             piece = replace(piece, position=piece.position[inside], force=piece.force[inside], height=None)
             record = replace(record, pieces=(piece,))
+        if wrong == "wheel":
+            (piece,) = record.pieces
+            record = replace(record, pieces=(replace(piece, position=(1 + WHEEL) * piece.position),))
+            (piece,) = record.pieces
         gain, zero = (GAIN, ZERO) * random.standard_normal(2)
         piece.force[:] = (1 + gain) * piece.force + zero
         if wrong == "drift":
