@@ -162,8 +162,9 @@ def fit(
     """
     with one_thread():
         ready = problem(records, line, pantograph, free=free, tolerances=tolerances)
-        begin = ready.start() if begin is None else begin
-        if np.abs(ready.sensors(begin.x)[3]).max() > FASTER:
+        if begin is None:
+            begin = ready.start()
+        elif np.abs(ready.sensors(begin.x)[3]).max() > FASTER:
             ready = ready.at_speeds(begin.x)
         solution = ready.run(begin, report, working)
         speeds = [part.fine.speed / part.measured.piece.speed - 1 for part in ready.parts]

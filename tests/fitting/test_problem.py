@@ -93,6 +93,31 @@ def test_records_of_several_tension_lengths_are_noted(pantograph):
         assert any("2 tension lengths" in note for note in notes) is found
 
 
+def test_a_wheel_that_reads_too_much_is_found_roughly(ready, record, design, pantograph):
+    assert abs(ready.scales[0]) < 8e-4
+    (piece,) = record.pieces
+    worn = replace(record, pieces=(replace(piece, position=1.002 * piece.position),))
+    fitting = problem([worn], design, pantograph)
+    assert fitting.scales[0] == pytest.approx(-0.002, abs=8e-4)  # 300 m are compared, on the design
+    x = fitting.start().x
+    assert fitting.sensors(x)[3] == fitting.scales
+    measured_there, away = fitting.measured(0, x), fitting.measured(0, 0 * x)
+    expected = fitting.as_designed()[0]
+    assert np.corrcoef(measured_there, expected)[0, 1] > np.corrcoef(away, expected)[0, 1]
+    faster = fitting.at_speeds(x).parts[0]
+    assert faster.fine.speed == faster.coarse.speed == faster.measured.piece.speed * (1 + fitting.scales[0])
+
+
+@pytest.mark.slow
+def test_the_derivative_by_the_scale(ready, derivatives):
+    small, state, number = 1e-5, ready.start(), len(ready.values) + 3
+    x = np.repeat(state.x[None], 2, axis=0)
+    x[1, number] += small
+    first, other = (ready.parts[0].measured.coefficients(ready.measured(0, each)) for each in x)
+    column = derivatives[0][:, number]
+    assert np.linalg.norm(column + (other - first) / small) < 0.02 * np.linalg.norm(column)
+
+
 @pytest.mark.slow
 def test_derivatives_of_all_droppers_add_up(exact, derivatives):
     """A smooth shift of all droppers, which a force hardly shows, is the sum of columns that nearly cancel.
@@ -127,7 +152,7 @@ def test_derivatives_of_one_value(exact, derivatives, kind, which, size):
     assert np.linalg.norm(derivatives[0][:, number] - actual) < 0.02 * np.linalg.norm(actual)
 
 
-@pytest.mark.parametrize("which", [-2, -1])
+@pytest.mark.parametrize("which", [-3, -2])
 @pytest.mark.slow
 def test_derivatives_of_gain_and_zero(ready, derivatives, which):
     """What is left falls by the derivative times either, with the static force that follows the mean."""

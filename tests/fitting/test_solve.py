@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from panto_env.fitting.misfit import OWN
 from panto_env.fitting.passes import BANDS
 from panto_env.fitting.solve import SURE, Solution, normal
 
@@ -22,7 +23,7 @@ def ended(fitting, x):
 @pytest.fixture(scope="module")
 def true(ready, truth):
     """The true values."""
-    return np.array([*(truth.of(value) for value in ready.values.all), 0.0, 0.0, 0.0])
+    return np.array([*(truth.of(value) for value in ready.values.all), *(0.0 for _ in OWN)])
 
 
 @pytest.mark.parametrize("by", [0.009, -0.011])
