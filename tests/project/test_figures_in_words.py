@@ -207,16 +207,6 @@ SENTENCES = {
             ),
         ),
         (
-            "It is ahead of `periodic` in {:.0f} % of passes, and of every other policy in {:.0f} % and more",
-            lambda: (
-                ahead("known-line", "agent-known-line", "periodic")[0],
-                min(
-                    ahead("known-line", "agent-known-line", other)[0]
-                    for other in ("adaptive", "repetitive", "mpc", "lqg")
-                ),
-            ),
-        ),
-        (
             "and {:.0f} to {:.0f} % at 250, 300 and 325 km/h",
             lambda: ends(
                 [
