@@ -22,6 +22,7 @@ LEFT_TO_THE_COMMAND = (
     "Over speed",
     "What the contact force",
     "CL (%) of FB+FF",
+    "CL (%) over speed",
     "Actuators",
     "Time step and grid",
 )

@@ -9,6 +9,7 @@ from . import made
 
 PAGE, OTHER_PAGE, STATEMENTS = "paper2.md", "paper2-diagnosis.md", "The paper's words beside ours"
 LEFT_TO_THE_COMMAND = (
+    "Amplitude of the contact force's harmonics",
     "Proportional control",
     "What the loop of rig bears",
     "Estimated force,",
