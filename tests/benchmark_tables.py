@@ -1,14 +1,17 @@
 """The tables of README.md and docs/benchmark.md from the stored results: python -m tests.benchmark_tables.
 
-`make benchmark` calls it. Each table stays where it is; one of a new track comes last.
+`make benchmark` calls it. Each table stays where it is. The page has a short ranking of each headline track;
+`panto report --markdown` prints all tables in full.
 """
 
 from __future__ import annotations
 
 import re
+from itertools import compress
 
-from panto_baselines.benchmark.run import read_result
-from panto_baselines.report.tables import tables_of
+from panto_baselines.benchmark.run import Result, read_result
+from panto_baselines.benchmark.settings import control_of
+from panto_baselines.report.tables import ranking
 from panto_env.base.files import write_whole
 from panto_env.base.table import Table
 
@@ -19,8 +22,19 @@ README = ROOT / "README.md"
 RESULTS = ROOT / "docs" / "benchmark"
 BEGIN, END = "<!-- python -m tests.benchmark_tables -->", "<!-- end -->"
 TRACK = "unknown-line"
-CHECKS = ("as-built", "head", "high-speed", "known-line", "without-position")
-"""Tracks that check single abilities, whose tables the page leaves to `panto report --markdown`."""
+HEADLINE = (
+    "any-line",
+    "high-speed-as-built",
+    "train-trailing",
+    "train-both",
+    "unknown-line",
+    "unknown-section",
+)
+"""Tracks that the page ranks: a policy can't win them without feedback."""
+COLUMNS = ("policy", "Δσ (%)", "95 %", "other lines", "not ranked, since")
+"""Those of a full ranking that the page shows."""
+BEST = 4
+"""How many of the best policies the page shows of each track."""
 SHOWN = {
     "agent-any-pantograph": "learned, for four pantographs",
     "agent-any-line": "learned",
@@ -29,21 +43,43 @@ SHOWN = {
     "pd:washout=1": "feedback",
     "passive": "no control",
 }
-"""Policies of the README's table, and what each is."""
+"""Policies of the README's table, and what each is. The page shows them on each track, too."""
+
+
+def short_ranking(result: Result) -> Table:
+    """The rows of a track's ranking that matter, with ranks among all policies.
+
+    They are those of the best policies, of ``SHOWN`` and of the best tape that has a rank, and none of a
+    method's trainings.
+    """
+    full = ranking(result)
+    listed = [
+        (one, row)
+        for one, row in zip(result.by_rank, full.cells, strict=True)
+        if one.policy not in result.method_of
+    ]
+    ranked = [one.policy for one, _ in listed if one.rank is not None and not control_of(one.policy)]
+    tapes = [one.policy for one, _ in listed if one.rank is not None and one.policy.startswith("tape of")]
+    names = {*SHOWN, *ranked[:BEST], *tapes[:1]}
+    kept = [heading in COLUMNS for heading in full.headings]
+    rows = [
+        ("–" if one.rank is None else str(one.rank), *compress(row, kept))
+        for one, row in listed
+        if one.policy in names
+    ]
+    return Table(full.title, ("rank", *compress(full.headings, kept)), rows, text_columns=2)
 
 
 def with_tables(text: str) -> str:
-    """The page's text with the tables of the stored results."""
-    for path in sorted(RESULTS.glob("*.json.gz")):
-        if path.name.partition(".")[0] in CHECKS:
-            continue
-        result = read_result(path)
-        blocks = [f"*{table.title}*\n\n{table.markdown.rstrip()}\n" for table in tables_of(result)]
-        block = "\n".join(blocks)
-        title = re.escape(result.title)
-        old = rf"^\*{title}: Δσ.*\*\n\n(?:\|.*\n)+(?:\n\*{title}: .*\*\n\n(?:\|.*\n)+)*"
+    """The page's text with rankings of the stored results; raises ValueError where one is missing."""
+    for track in HEADLINE:
+        result = read_result(RESULTS / f"{track}.json.gz")
+        table = short_ranking(result)
+        block = f"*{table.title}*\n\n{table.markdown.rstrip()}\n"
+        old = rf"^\*{re.escape(result.title)}: Δσ.*\*\n\n(?:\|.*\n)+"
         text, found = re.subn(old, lambda _, block=block: block, text, flags=re.MULTILINE)
-        text += "" if found else f"\n{block}"
+        if found != 1:
+            raise ValueError(f"{PAGE} has {found} rankings with the title {result.title}.")
     return text
 
 

@@ -47,6 +47,15 @@ def check_page(page: str, printed: dict[str, Table]) -> None:
             assert any(same_row(title, headings, row, other) for other in found), (title, row)
 
 
+def check_statements(page: str, title: str, outcome: Outcome) -> None:
+    """The page tells how many statements agree, and shows each that doesn't."""
+    agree = sum(item.agrees for item in outcome.comparisons)
+    assert f"{agree} of {len(outcome.comparisons)} agree" in (DOCS / page).read_text(encoding="utf-8")
+    headings, rows = tables_of(page)[title]
+    refused = {tuple(row) for row in rows if row[headings.index("agrees")] == "no"}
+    assert len(refused) == len(outcome.comparisons) - agree
+
+
 def same_row(title: str, headings: list[str], shown: list[str], printed: list[str]) -> bool:
     """Whether a row of the page is this one, but for the last digit, which rounding may turn."""
     losses = [k for k, heading in enumerate(headings) if k and ("CL" in title or "CL" in heading)]

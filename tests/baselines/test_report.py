@@ -15,18 +15,17 @@ from typer.testing import CliRunner
 
 from panto_baselines.benchmark.overall import why
 from panto_baselines.benchmark.run import parse_result, read_result
-from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, control_of, load_benchmark
 from panto_baselines.line import as_toml
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
 from panto_baselines.report.page import page, report, what_is
 from panto_baselines.report.tables import ranking, summary
-from panto_baselines.report.tables import tables_of as of_track
 from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import read_checked, with_checksum, write_checked
 
-from ..benchmark_tables import CHECKS
+from ..benchmark_tables import BEST, HEADLINE, short_ranking
 from ..pages import DOCS, tables_of
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
@@ -407,13 +406,24 @@ TRACKS = [name for name in names("benchmark") if name.startswith("benchmark/") a
 """All but that for the curious, which `make benchmark` leaves out."""
 
 
-@pytest.mark.parametrize("track", [name for name in TRACKS if name.partition("/")[2] not in CHECKS])
-def test_its_tables_are_those_of_the_results(track):
-    shown = tables_of("benchmark.md")
-    for table in of_track(read_result(DOCS / f"{track}.json.gz")):
-        headings, rows = shown[table.title]
-        assert tuple(headings) == table.headings
-        assert [tuple(row) for row in rows] == table.cells
+def test_the_page_has_a_ranking_of_each_headline_track_and_no_other_table_of_results():
+    printed = [short_ranking(read_result(DOCS / "benchmark" / f"{track}.json.gz")) for track in HEADLINE]
+    assert tables_of("benchmark.md") == {
+        table.title: (list(table.headings), [list(row) for row in table.cells]) for table in printed
+    }
+
+
+@pytest.mark.parametrize("track", HEADLINE)
+def test_a_short_ranking_has_the_best_policies_and_rows_of_the_full_one(track):
+    result = read_result(DOCS / "benchmark" / f"{track}.json.gz")
+    full, short = ranking(result), short_ranking(result)
+    columns = [full.headings.index(heading) for heading in short.headings[1:]]
+    rows = [tuple(row[column] for column in columns) for row in full.cells]
+    assert [rows.index(row[1:]) for row in short.cells] == sorted(rows.index(row[1:]) for row in short.cells)
+    ranks = {one.policy: one.rank for one in result.standings}
+    assert all(row[0] == str(ranks[row[1]] or "–") for row in short.cells)
+    best = sorted((rank, name) for name, rank in ranks.items() if rank and not control_of(name))[:BEST]
+    assert {name for _, name in best} <= {row[1] for row in short.cells}
 
 
 @pytest.mark.parametrize("track", TRACKS)
