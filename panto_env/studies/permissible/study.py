@@ -63,6 +63,13 @@ class Found(NamedTuple):
         """Permissible speed in both scans (km/h)."""
         return verified(self.first, self.again, policy)
 
+    def gain(self, policy: str) -> float:
+        """By how much a policy raises the limit (km/h); none counts as a step below the lowest speed."""
+        below = self.first.speeds_kmh[0] - STEP
+        limits = (self.limit(policy), self.limit(PASSIVE))
+        own, passive = (below if math.isnan(limit) else limit for limit in limits)
+        return own - passive
+
     def kept(self, policy: str) -> list[bool]:
         """Whether a policy keeps all requirements at each speed in both scans."""
         pairs = zip(self.first.kept(policy), self.again.kept(policy), strict=True)
@@ -203,20 +210,22 @@ def _speed(one: Found, policy: str) -> str:
 
 
 def gains_table(found: Sequence[Found]) -> Table:
-    """Over all lines: km/h gained by each policy, and by how much σ/F_m falls."""
+    """Over all lines: km/h gained by each policy, and by how much σ/F_m falls.
+
+    Gains are lower bounds where a policy keeps all up to the last speed of the scan.
+    """
     rows = []
     for distance in DISTANCES:
         own = [one for one in found if one.distance == distance]
         for policy in POLICIES:
-            gains = [one.limit(policy) - one.limit(PASSIVE) for one in own]
-            known = [each for each in gains if not math.isnan(each)]
+            gains = [one.gain(policy) for one in own]
             std = [one.reduction(policy) for one in own]
             rows.append(
                 (
                     where(distance),
                     policy,
-                    f"{np.median(known):+.0f}" if known else "",
-                    f"{min(known):+.0f} to {max(known):+.0f}" if known else "",
+                    f"{np.median(gains):+.0f}",
+                    f"{min(gains):+.0f} to {max(gains):+.0f}",
                     f"{-np.median(std):+.0f}",
                     f"{-max(std):+.0f} to {-min(std):+.0f}",
                 )
@@ -271,11 +280,10 @@ def verdict(found: Sequence[Found]) -> str:
     """What it comes to."""
     own = [one for one in found if one.distance == SHOWN]
     best = max(POLICIES, key=lambda policy: sum(_or_zero(one.limit(policy)) for one in own))
-    gains = {one.case.line: one.limit(best) - one.limit(PASSIVE) for one in own}
-    known = [each for each in gains.values() if not math.isnan(each)]
+    gains = [one.gain(best) for one in own]
     gaps = [f"{one.case.line} {in_words(one.bands(PASSIVE))}" for one in own if len(one.bands(PASSIVE)) > 1]
     words = (
-        f"Under two pantographs {SHOWN:g} m apart {best} raises the permissible speed by {min(known):.0f} to "
-        f"{max(known):.0f} km/h, median {np.median(known):.0f}, over {len(known)} lines."
+        f"Under two pantographs {SHOWN:g} m apart {best} raises the permissible speed by {min(gains):.0f} to "
+        f"{max(gains):.0f} km/h, median {np.median(gains):.0f}, over {len(gains)} lines."
     )
     return f"{words} Without control speeds are kept in bands: {'; '.join(gaps)}." if gaps else words
