@@ -48,9 +48,9 @@ class Charts:
         self.uplift = _chart("place (m)", "uplift at the supports (mm)", 240, x_range=self._place)
         self.spectrum = _chart("frequency (Hz)", "amplitude (N)", 240, x_range=Range1d(start=0, end=HIGHEST))
         self.force.line("x", "y", source=source["raw"], color=RAW)
-        self.force.vspan("x", source=source["supports"], color=SUPPORT, line_dash=[5, 4])
-        self.force.hspan("y", source=source["limits"], color=BLACK, line_dash=[6, 3])
-        self.spectrum.vspan("x", source=source["per span"], color=SUPPORT, line_dash=[5, 4])
+        self.force.vspan("x", source=source["supports"], color=SUPPORT, line_dash="dashed")
+        self.force.hspan("y", source=source["limits"], color=BLACK, line_dash="dashed")
+        self.spectrum.vspan("x", source=source["per span"], color=SUPPORT, line_dash="dashed")
         for name, colour in COLOURS.items():
             own = self.force.line("x", "y", source=source[f"{name} force"], color=colour, line_width=2)
             tip = HoverTool(renderers=[own], tooltips=[(name, "@y{0.0} N at @x{0.0} m")], mode="vline")
