@@ -12,7 +12,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
+	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,app,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.

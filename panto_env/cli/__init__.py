@@ -101,6 +101,7 @@ def make_app() -> typer.Typer:
         fit,
         identify,
         lines,
+        page,
         permissible,
         records,
         simulate,
@@ -122,7 +123,14 @@ def make_app() -> typer.Typer:
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
     for command in (
-        *(simulate.simulate, simulate.film, sweep.sweep, permissible.permissible_speed, design.design),
+        *(
+            simulate.simulate,
+            simulate.film,
+            sweep.sweep,
+            page.app,
+            permissible.permissible_speed,
+            design.design,
+        ),
         *(lines.family, lines.line, studies.validate),
         *(identify.identify, estimate.estimate, diagnose.diagnose, records.record, records.compare),
         *(fit.fit, fit.drift, studies.speed, studies.reproduce, studies.rig),

@@ -13,7 +13,7 @@ from ..base import plugins
 from ..base.errors import InputError
 
 PANELS = {
-    "Simulate": ("list", "line", "simulate", "sweep", "permissible-speed", "design", "family", "film"),
+    "Simulate": ("list", "line", "simulate", "sweep", "permissible-speed", "design", "family", "film", "app"),
     "Judge": ("report", "record", "compare", "validate", "reproduce", "speed"),
     "Identify": ("identify", "estimate", "fit", "drift", "diagnose", "rig"),
     "Control": ("benchmark", "tune", "oracle", "replay", "returns", "submission"),

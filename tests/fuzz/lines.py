@@ -136,6 +136,10 @@ trainings training.toml training.toml --workers 1
 dataset episodes lists.toml
 dataset designs lists.toml
 dataset designs designs.toml --count 1048577
+app --port 0
+app --port 65536
+app --port nan
+app --port ٣
 report bad.json
 report deep.json
 report run.parquet

@@ -1,0 +1,37 @@
+"""``panto app``: a page of one pass in the browser."""
+
+from __future__ import annotations
+
+import webbrowser
+from typing import Annotated
+
+from typer import Option
+
+from ..base.errors import InputError
+from ..terminal import console
+
+
+def app(
+    port: Annotated[
+        int, Option(min=1024, max=65535, help="Port of this machine at which it is served.")
+    ] = 5006,
+    browser: Annotated[bool, Option(help="Whether the page is opened in a browser.")] = True,
+) -> None:
+    """Serve a page on which line, pantograph, speed and policy are chosen and their run is seen at once.
+
+    Only browsers of this machine reach it, and it needs no network. Ctrl+C ends it.
+    """
+    try:
+        from ..app.page import serve
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"The page needs Bokeh, which is not installed ({error}); install panto-env with its extra: "
+            "pip install 'panto-env[app]'."
+        ) from error
+
+    def ready(address: str) -> None:
+        console.print(f"The page is {address}; Ctrl+C ends it.", soft_wrap=True)
+        if browser:
+            webbrowser.open(address)
+
+    serve(port, ready)
