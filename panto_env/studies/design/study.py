@@ -32,6 +32,13 @@ FRONT = "front"
 FRONT_SEEDS = (0, 1)
 AGENT = "agent-any-pantograph"
 """Policy that replaces tension and droppers."""
+PARTS = ("searched", "held_out", "as_built")
+"""Where a design is checked."""
+REPLACED = {
+    CONTACT: "contact wire's tension (kN)",
+    MESSENGER: "messenger's tension (kN)",
+    SPACING: "droppers in a span",
+}
 Numbers = Mapping[str, Any]
 
 
@@ -87,7 +94,12 @@ def of_front(seed: int, folder: str | Path) -> Numbers:
     """Plain data of a front of two objectives that a search with this seed finds and keeps in a folder."""
     design = read_design(file_of(FRONT)).model_copy(update={"seed": seed})
     front = best_of(design, search(design, folder))
-    return {"seed": seed, "designs": design.designs, "front": [list(trial.values) for trial in front]}
+    return {
+        "seed": seed,
+        "line": design.settings["catenary"],
+        "designs": design.designs,
+        "front": [list(trial.values) for trial in front],
+    }
 
 
 def start_of(design: Design, name: str) -> float:
@@ -184,21 +196,14 @@ def fell_table(cases: Sequence[Numbers]) -> Table:
     return Table("σ/F_m searched and elsewhere", headings, rows, text_columns=3)
 
 
-PARTS = ("searched", "held_out", "as_built")
-
-
 def values_table(cases: Sequence[Numbers]) -> Table:
     """What was searched, from what to what."""
-    names = dict.fromkeys(name for case in cases for name in case["variables"])
     rows = [
         (
             name,
-            *(
-                f"{own['start']:.4g} → {own['best']:.4g}" if (own := case["variables"].get(name)) else ""
-                for case in cases
-            ),
+            *("{start:.4g} → {best:.4g}".format(**case["variables"][name]) for case in cases),
         )
-        for name in names
+        for name in cases[0]["variables"]
     ]
     return Table("Values, as they are and found", ("variable", *(case["name"] for case in cases)), rows)
 
@@ -216,7 +221,7 @@ def replaced_table(cases: Sequence[Numbers]) -> Table:
                     REPLACED[one["parameter"]],
                     *(_amount(one, step) for step in (first, std, equal)),
                     ", ".join(beyond[0]["more_broken"]) if beyond else "",
-                    _wave_limit(case["line"], equal if one["parameter"] == CONTACT else first),
+                    _wave_limit(case["line"], std["value"]) if std and one["parameter"] == CONTACT else "",
                 )
             )
     headings = (
@@ -231,13 +236,6 @@ def replaced_table(cases: Sequence[Numbers]) -> Table:
     return Table("What control replaces on lines as built", headings, rows, text_columns=2)
 
 
-REPLACED = {
-    CONTACT: "contact wire's tension (kN)",
-    MESSENGER: "messenger's tension (kN)",
-    SPACING: "droppers in a span",
-}
-
-
 def _amount(one: Numbers, step: Numbers | None) -> str:
     if step is None:
         return "none"
@@ -245,11 +243,9 @@ def _amount(one: Numbers, step: Numbers | None) -> str:
     return f"≤ {amount}" if step == one["steps"][-1] and len(one["steps"]) > 1 else amount
 
 
-def _wave_limit(line: str, step: Numbers | None) -> str:
-    """0.7 of the wave speed with a step's tension of the contact wire, or the line's own."""
-    wire = _line(line).contact_wire
-    if step is not None and step["value"] > 1e3:
-        wire = wire.model_copy(update={"tension": step["value"]})
+def _wave_limit(line: str, tension: float) -> str:
+    """0.7 of the wave speed of a line's contact wire with this tension (N)."""
+    wire = _line(line).contact_wire.model_copy(update={"tension": tension})
     return f"{WAVE_SHARE * to_kmh(wire.wave_speed):.0f}"
 
 
@@ -275,9 +271,8 @@ def plot(numbers: Numbers) -> Figure:
         ratios, tensions = zip(*each["front"], strict=True)
         label = f"seed {each['seed']}, {each['designs']} designs"
         last.plot([t / 1e3 for t in tensions], ratios, "os"[k % 2], color=series_colour(k), label=label)
-    last.set(
-        title="benchmark-2015: fronts", xlabel="tension of both wires (kN)", ylabel="largest σ / F_m (-)"
-    )
+    title = f"{numbers['fronts'][0]['line']}, two objectives"
+    last.set(title=title, xlabel="tension of both wires (kN)", ylabel="largest σ / F_m (-)")
     last.legend(fontsize="small")
     of_lines[0].legend(fontsize="small")
     for axis in axes.flat:
