@@ -19,7 +19,7 @@ from ...plant.catenary.flexible import FlexibleCatenaryData
 from ..permissible.scan import PASSIVE
 from ..study import Outcome, Report
 from .check import Checked, candidates_of, check
-from .retrofit import CONTACT, MESSENGER, SPACING, replaced
+from .retrofit import CONTACT, MESSENGER, SPACING, Replaced, replaced
 from .search import Design, best_of, read_design, search
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ def of_case(name: str, folder: str | Path) -> Numbers:
             },
             "checked": [_plain(one) for one in check(design, candidates)],
             "replaced": [
-                one._asdict() | {"equal_std": _step(one.equal_std), "equal": _step(one.equal_requirements)}
-                for one in (replaced(design, AGENT) if name in RETROFITTED else ())
+                _plain_replaced(one) for one in (replaced(design, AGENT) if name in RETROFITTED else ())
             ],
         }
     )
@@ -123,8 +122,10 @@ def _line(name: str) -> FlexibleCatenaryData:
     return line
 
 
-def _step(step: Any) -> Any:
-    return step and step._asdict()
+def _plain_replaced(one: Replaced) -> dict[str, Any]:
+    ends = {"equal_std": one.equal_std, "equal": one.equal_requirements}
+    steps = {"steps": [step._asdict() for step in one.steps]}
+    return one._asdict() | steps | {key: step and step._asdict() for key, step in ends.items()}
 
 
 def _plain(one: Checked) -> dict[str, Any]:
@@ -201,11 +202,18 @@ def values_table(cases: Sequence[Numbers]) -> Table:
     rows = [
         (
             name,
-            *("{start:.4g} → {best:.4g}".format(**case["variables"][name]) for case in cases),
+            *(
+                " → ".join(_short(case["variables"][name][which]) for which in ("start", "best"))
+                for case in cases
+            ),
         )
         for name in cases[0]["variables"]
     ]
     return Table("Values, as they are and found", ("variable", *(case["name"] for case in cases)), rows)
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
 def replaced_table(cases: Sequence[Numbers]) -> Table:
