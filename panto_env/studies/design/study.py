@@ -35,10 +35,11 @@ AGENT = "agent-any-pantograph"
 PARTS = ("searched", "held_out", "as_built")
 """Where a design is checked."""
 REPLACED = {
-    CONTACT: "contact wire's tension (kN)",
-    MESSENGER: "messenger's tension (kN)",
-    SPACING: "droppers in a span",
+    CONTACT: "contact (kN)",
+    MESSENGER: "messenger (kN)",
+    SPACING: "droppers",
 }
+NAMES = {"start": "as it is", "best": "found"}
 Numbers = Mapping[str, Any]
 
 
@@ -241,7 +242,7 @@ def replaced_table(cases: Sequence[Numbers]) -> Table:
         "broken first",
         "0.7 c (km/h)",
     )
-    return Table("What control replaces on lines as built", headings, rows, text_columns=2)
+    return Table("Tension of the wires and droppers in a span", headings, rows, text_columns=2)
 
 
 def _amount(one: Numbers, step: Numbers | None) -> str:
@@ -266,7 +267,7 @@ def plot(numbers: Numbers) -> Figure:
         shown = [each for each in case["checked"] if each["policy"] in (PASSIVE, AGENT)]
         for k, each in enumerate(shown):
             speeds, ratios = zip(*((float(v), ratio) for v, ratio in each["by_speed"].items()), strict=True)
-            label = f"{each['design']}, {each['policy']}"
+            label = f"{NAMES[each['design']]}, {each['policy']}"
             axis.plot(
                 speeds, [math.nan if r is None else r for r in ratios], color=series_colour(k), label=label
             )
