@@ -127,10 +127,13 @@ same: $(READY)
 	$(BIN)/python -m tests.before.compare --before $(BEFORE)
 	$(BIN)/python -m tests.before.speed --before $(BEFORE)
 
-# Thousands of random lines, pantographs and speeds: each refused, or finite, balanced and nearly converged.
+# Thousands of random lines, pantographs and speeds: each refused, or finite, balanced and nearly converged; and of random
+# designs: each run, or refused in a sentence.
 NONSENSE := 3000
+DESIGNS := 2000
 nonsense: $(READY)
 	NONSENSE=$(NONSENSE) $(BIN)/pytest -s -m slow tests/plant/test_nonsense.py
+	DESIGNS=$(DESIGNS) $(BIN)/pytest -s -m slow -k random tests/studies/test_design.py
 
 # Every index of whole episodes and random lines checked against its array.
 bounds: $(READY)

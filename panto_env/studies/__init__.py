@@ -28,6 +28,7 @@ STUDIES: tuple[str, ...] = (
     "paper3-parameters",
     "spacing",
     "permissible",
+    "design",
 )
 """Names of all studies; that of "paper3-parameters" lies in ``paper3_parameters/study.py``."""
 

@@ -47,7 +47,7 @@ def check(design: Design, candidates: Mapping[str, Mapping[str, float]]) -> list
             own = arguments_of(design, values, policy)
             own.pop("accuracy", None)
             searched, seeds = sorted(design.speeds_kmh), range(design.seeds)
-            others = range(VERIFIED_FROM, VERIFIED_FROM + design.seeds)
+            others = range(VERIFIED_FROM, VERIFIED_FROM + design.check_seeds)
             groups = (
                 (searched, passes(own, searched, seeds)),
                 (design.held_out, passes(own, design.held_out, others)),
@@ -59,8 +59,10 @@ def check(design: Design, candidates: Mapping[str, Mapping[str, float]]) -> list
                 parts.append(done[first : first + len(jobs)])
                 first += len(jobs)
             by_speed = {
-                speed: max(each.std_ratio for each in part[k * design.seeds : (k + 1) * design.seeds])
-                for (speeds, _), part in zip(groups[:2], parts[:2], strict=True)
+                speed: max(each.std_ratio for each in part[k * count : (k + 1) * count])
+                for (speeds, _), part, count in zip(
+                    groups[:2], parts[:2], (design.seeds, design.check_seeds), strict=True
+                )
                 for k, speed in enumerate(speeds)
             }
             some, others_too, built = (worst(part) if part else Found(math.nan, 0.0, ()) for part in parts)

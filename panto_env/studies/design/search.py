@@ -61,6 +61,9 @@ class Design(Settings):
     seeds: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
         1, description="seeds of the search: 0, 1, ..."
     )
+    check_seeds: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
+        2, description="seeds of the check at held-out speeds and as built, others than those of the search"
+    )
     objectives: tuple[Objective, ...] = Field(
         ("std_ratio",),
         min_length=1,
@@ -237,7 +240,9 @@ def search(
         directions=["minimize"] * len(design.objectives),
         load_if_exists=True,
     )
-    same = design.model_dump(mode="json", exclude={"designs", "check_policies", "held_out_kmh"})
+    same = design.model_dump(
+        mode="json", exclude={"designs", "check_policies", "check_seeds", "held_out_kmh"}
+    )
     if (known := study.user_attrs.get("design", same)) != same:
         changed = sorted(key for key in same if known.get(key) != same[key])
         raise InputError(f"{folder} has a search with other {' and '.join(changed)}; choose another folder.")
