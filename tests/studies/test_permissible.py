@@ -146,3 +146,18 @@ def test_the_study_of_the_catalogue_tells_gains_bands_and_what_fell(monkeypatch,
     assert float(gains.cells[0][4]) == pytest.approx(-found["repetitive"]["std_reduction"], abs=0.6)
     assert len(outcome.rows["permissible-speeds"]) == 2 * 4 * 3  # seeds, speeds; passive, acting, failing
     assert {path.suffix for path in write(outcome, tmp_path)} == {".json", ".png", ".csv"}
+
+
+def test_the_page_shows_what_is_stored():
+    """The tables of the whole study, which takes hours, stand in docs/permissible."""
+    stored = json.loads((DOCS / "permissible" / "results.json").read_text(encoding="utf-8"))
+    shown = tables_of("permissible-speed.md")
+    assert len(shown) == 3
+    for title, (headings, rows) in shown.items():
+        assert headings == stored["tables"][title]["headings"]
+        assert rows == stored["tables"][title]["cells"]
+    text = " ".join((DOCS / "permissible-speed.md").read_text(encoding="utf-8").split())
+    gains = stored["tables"]["Gain over passive, over the lines"]["cells"]
+    (median,) = {row[2] for row in gains if row[:2] == ["two pantographs, 200 m", "agent-any-pantograph"]}
+    assert f"raises the permissible speed by 0 to 140 km/h, median {float(median):g}.**" in text
+    assert "by 0 to 140 km/h, median 100" in stored["verdict"]
