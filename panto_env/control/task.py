@@ -18,7 +18,7 @@ from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .arguments import not_finite
 from .entries import DEVIATIONS, ESTIMATED
-from .episode import Flags, Results, new_episode, new_results
+from .episode import Flags, Results, counts, new_episode, new_results
 from .length import Cost, EpisodeLength, arrays_of, new_plant
 from .observation import Context, Layout
 from .passive_run import (
@@ -304,6 +304,12 @@ class Task:
     def end(self, lane: int) -> int:
         """Number of plant steps of a lane's episode."""
         return int(self.episode.table[lane * self.agents, TaskRow.END])
+
+    def counts(self) -> Flags:
+        """Whether the reward of each row's last step counts, (rows,); see ``episode.counts``."""
+        steps = self.plant.run.table[np.array(self.episode.controlled), :, Row.STEP]
+        found: Flags = counts(steps.T.reshape(-1), self.episode.table)
+        return found
 
     def context(self, row: int) -> Context:
         """Information about an episode that a policy may use; row: of results, that of a collector."""
