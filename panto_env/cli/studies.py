@@ -71,7 +71,8 @@ def validate(
         bool, Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
     ] = False,
     brief: Annotated[
-        bool, Option("--brief", help="Print one line: whether all figures of the standard's table are inside.")
+        bool,
+        Option("--brief", help="Print one line: whether all figures of the standard's table are inside."),
     ] = False,
     plot: Plot = None,
     json: Json = False,
