@@ -19,7 +19,7 @@ $(READY): pyproject.toml constraints.txt
 DEMO := runs/demo
 demo: $(READY)
 	@rm -rf $(DEMO)
-	$(BIN)/panto validate --brief
+	@$(BIN)/panto validate --brief
 	$(BIN)/panto train configs/ppo-quick.toml --output $(DEMO)/ppo-en50318
 	$(BIN)/panto train configs/ppo-quick-shinkansen.toml --output $(DEMO)/ppo-shinkansen
 	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --html $(DEMO)/benchmark.html
