@@ -145,8 +145,8 @@ class VectorLanes:
 
     def answer(self) -> Answer:
         """Results of all lanes."""
-        counts = np.zeros(self.count, dtype=np.bool_)
-        for task, its in self._tasks():
+        counts = self.usual.counts()
+        for task, its in self._others:
             counts[its] = task.counts()[its]
         return Answer(self._results, self._speed_kmh.copy(), np.ones(self.count, dtype=np.bool_), counts)
 
