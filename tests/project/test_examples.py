@@ -230,7 +230,7 @@ def test_notebooks_start_alike_wherever_they_are_opened():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["own_line", "records"])
+@pytest.mark.parametrize("name", ["own_line", "own_record"])
 def test_notebooks_for_engineers_show_what_they_print_now(name, tmp_path):
     (path,) = (each for each in NOTEBOOKS if each.stem == name)
     stored = told(nbformat.read(path, as_version=4))
