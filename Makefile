@@ -9,10 +9,11 @@ READY := $(VENV)/.ready
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
 	  { echo "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
+	@echo "Installing into $(VENV), which takes minutes."
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/pip install --quiet --upgrade pip
+	@$(BIN)/pip install --quiet --constraint constraints.txt torch
+	@$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
