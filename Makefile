@@ -23,7 +23,8 @@ demo: $(READY)
 	@$(BIN)/panto validate --brief
 	$(BIN)/panto train configs/ppo-quick.toml --output $(DEMO)/ppo-en50318
 	$(BIN)/panto train configs/ppo-quick-shinkansen.toml --output $(DEMO)/ppo-shinkansen
-	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --html $(DEMO)/benchmark.html
+	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json \
+	  --html $(DEMO)/benchmark.html
 	@echo "The page is $(DEMO)/benchmark.html; every figure is in $(DEMO)/benchmark.json."
 
 # All tracks of the benchmark, with the agents that come with the project, the page of all, and the documents' tables.
