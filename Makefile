@@ -9,22 +9,23 @@ READY := $(VENV)/.ready
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
 	  { echo "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,app,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
+	@echo "Installing into $(VENV), which takes minutes."
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/pip install --quiet --upgrade pip
+	@$(BIN)/pip install --quiet --constraint constraints.txt torch
+	@$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,app,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
 DEMO := runs/demo
 demo: $(READY)
-	rm -rf $(DEMO)
-	$(BIN)/panto validate
+	@rm -rf $(DEMO)
+	@$(BIN)/panto validate --brief
 	$(BIN)/panto train configs/ppo-quick.toml --output $(DEMO)/ppo-en50318
 	$(BIN)/panto train configs/ppo-quick-shinkansen.toml --output $(DEMO)/ppo-shinkansen
-	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json --plot $(DEMO)/benchmark.png \
+	$(BIN)/panto benchmark --config configs/demo.toml --output $(DEMO)/benchmark.json \
 	  --html $(DEMO)/benchmark.html
-	@echo "The page is $(DEMO)/benchmark.html, the picture $(DEMO)/benchmark.png; every figure is in $(DEMO)/benchmark.json."
+	@echo "The page is $(DEMO)/benchmark.html; every figure is in $(DEMO)/benchmark.json."
 
 # All tracks of the benchmark, with the agents that come with the project, the page of all, and the documents' tables.
 TRACKS := any-line train-trailing train-both known-line as-built without-position head high-speed high-speed-as-built unknown-line unknown-section faults margins long journey

@@ -7,7 +7,10 @@ import nbformat
 from nbclient import NotebookClient
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-LEARNING, UNSEEN_LINE = EXAMPLES / "first_three.ipynb", EXAMPLES / "unseen_line.ipynb"
+LEARNING, UNSEEN_LINE, FIRST = (
+    EXAMPLES / f"{name}.ipynb" for name in ("first_three", "unseen_line", "learn")
+)
+NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
 SECONDS = 900.0
 """After which a cell is given up: some train."""
 
@@ -38,10 +41,10 @@ def changes(notebook):
 
 def main():
     """Run them and store them with their outputs."""
-    for path in (LEARNING, UNSEEN_LINE):
+    for path in NOTEBOOKS:
         notebook = executed(path)
-        for cell in notebook.cells:
-            cell.metadata = {}
+        for k, cell in enumerate(notebook.cells):
+            cell.id, cell.metadata = f"cell-{k}", {}
         notebook.metadata["language_info"] = {"name": "python"}  # and not which version ran it
         nbformat.write(notebook, path)
 

@@ -178,8 +178,9 @@ def _at_most(value: float, least: float, unit: str) -> str:
 
 
 def as_rich(table: TextTable) -> Table:
-    """A table for the terminal."""
-    shown = Table(title=table.title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    """A table for the terminal, without empty lines above and below."""
+    form: dict[str, Any] = {"title_justify": "left", "box": SIMPLE_HEAD, "padding": (0, 1, 0, 0)}
+    shown = Table(title=table.title, show_edge=False, **form)
     for k, heading in enumerate(table.headings):
         shown.add_column(heading, justify="right" if k else "left", overflow="fold")
     for row in table.cells:

@@ -70,6 +70,10 @@ def validate(
     start: Annotated[
         bool, Option("--start", help="Print the effect of a run's start on σ, by evaluated spans.")
     ] = False,
+    brief: Annotated[
+        bool,
+        Option("--brief", help="Print one line: whether all figures of the standard's table are inside."),
+    ] = False,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
@@ -83,6 +87,7 @@ def validate(
             with_conditions=conditions,
             with_lines=lines,
             with_start=start,
+            with_kinds=not brief,
         )
     with written_last() as later:
         if plot is not None:
@@ -91,17 +96,19 @@ def validate(
             print_json(validation.as_dict())
         else:
             checks, *others = validation.tables
-            print_table(checks)
-            console.print(
-                "The catalogue entry en50318-2002 explains the choice of open values: "
-                "`panto list en50318-2002`."
-            )
-            for run, criteria in zip(validation.runs, validation.compliance, strict=True):
-                print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
+            if not brief:
+                print_table(checks)
+                console.print(
+                    "The catalogue entry en50318-2002 explains the choice of open values: "
+                    "`panto list en50318-2002`."
+                )
+                for run, criteria in zip(validation.runs, validation.compliance, strict=True):
+                    print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
             for table in others:
                 print_table(table)
             if validation.passed:
-                console.print("All figures inside.")
+                verdict = f"EN 50318:2002, {len(validation.checks)} figures at two speeds: all inside."
+                console.print(verdict if brief else "All figures inside.")
             else:
                 alert("Not all figures are inside.")
     if not validation.passed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
-from ..plant.state import HEAD_RANGE, LOSS_TIME, PerCollector, per_collector
+from ..plant.state import HEAD_RANGE, LOSS_TIME, Ending, PerCollector, per_collector
 from .entries import AVERAGED, DEVIATIONS, line_values
 from .faults import FaultArrays, fault_arrays
 from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
@@ -145,6 +145,15 @@ class Results(NamedTuple):
     def copy(self) -> Results:
         """A copy of the arrays."""
         return Results(self.observation.copy(), self.values.copy(), self.flags.copy())
+
+
+def counts(steps: Any, table: Any) -> Any:
+    """Whether the reward of each row's last step counts, (rows,): not at a start, nor in the spans of settle.
+
+    An early end counts in them, too, since it is charged. steps: plant steps done, (rows,); table: as in
+    ``Episode``; both arrays, or tensors.
+    """
+    return (steps > table[:, TaskRow.COUNTED_FROM]) | (table[:, TaskRow.ENDING] > Ending.NONE)
 
 
 def new_results(rows: int, entries: int) -> Results:

@@ -15,7 +15,8 @@ import torch
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
 from ..backend.cuda import Columns, map_arrays
 from ..base.arrays import Array
-from .episode import Flags, Results
+from ..plant.state import Row
+from .episode import Flags, Results, counts
 from .observation import Context
 from .settings import RunSettings
 from .step import control_lane, control_steps
@@ -91,6 +92,13 @@ class TensorLanes:
     def results(self) -> Results:
         """Results of the last step or start, for all rows, in tensors of their own."""
         return Results(*(self._columns.of_lanes(each).contiguous() for each in self._results))
+
+    def counts(self) -> torch.Tensor:
+        """Whether the reward of each row's last step counts, (rows,); see ``episode.counts``."""
+        run, own = self._columns.tuples[RUN].table, self._columns.of_lanes(self._episode.table)
+        steps = run[:, list(self.task.episode.controlled), :, Row.STEP].movedim(1, 2)  # tiles, lanes, agents
+        found: torch.Tensor = counts(self._columns.of_lanes(steps).reshape(-1), own)
+        return found
 
     def speeds(self) -> torch.Tensor:
         """Mean speed of each lane's train (m/s), (lanes,)."""

@@ -18,7 +18,7 @@ from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .arguments import not_finite
 from .entries import DEVIATIONS, ESTIMATED
-from .episode import Flags, Results, new_episode, new_results
+from .episode import Flags, Results, counts, new_episode, new_results
 from .length import Cost, EpisodeLength, arrays_of, new_plant
 from .observation import Context, Layout
 from .passive_run import (
@@ -304,6 +304,15 @@ class Task:
     def end(self, lane: int) -> int:
         """Number of plant steps of a lane's episode."""
         return int(self.episode.table[lane * self.agents, TaskRow.END])
+
+    def counts(self) -> Flags:
+        """Whether the reward of each row's last step counts, (rows,); see ``episode.counts``."""
+        first, *others = self.episode.controlled
+        steps = self.plant.run.table[first, :, Row.STEP]  # a view, which is quicker
+        if others:
+            steps = self.plant.run.table[[first, *others], :, Row.STEP].T.reshape(-1)
+        found: Flags = counts(steps, self.episode.table)
+        return found
 
     def context(self, row: int) -> Context:
         """Information about an episode that a policy may use; row: of results, that of a collector."""

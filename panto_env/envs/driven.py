@@ -28,7 +28,7 @@ class DrivenByPolicies(
 
     ``DrivenByPolicies(gymnasium.make("Pantograph-v0", pantographs=["dsa380", "dsa380"], distances=[200],
     controlled=[1, 2], washout=0), {1: "repetitive"})``: the first one is driven by that policy; action,
-    observation and reward are those of the second. Infos are the train's.
+    observation and reward are those of the second, and so is whether it counts. Other infos are the train's.
     """
 
     def __init__(self, env: gymnasium.Env[Observation, Observation], policies: Mapping[int, Any]) -> None:
@@ -89,6 +89,7 @@ class DrivenByPolicies(
                 let_act(task, row, driver, actions[row])
         _, _, terminated, truncated, info = self.env.step(actions.reshape(-1))
         reward = float(task.results.values[self._rows, REWARD].mean())
+        info["counts"] = bool(task.counts()[self._rows].any())
         return self._seen(), reward, terminated, truncated, info
 
     def _seen(self) -> Observation:

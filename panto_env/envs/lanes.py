@@ -51,13 +51,14 @@ class Answer(NamedTuple):
     results: Results
     speed_kmh: Array  # (lanes,): km/h
     lanes: Flags  # (lanes,): which lanes have results; the others are zero
+    counts: Flags  # (lanes,): whether the reward counts
 
     def of(self, lanes: Flags) -> Answer:
         """A copy with the results of these lanes only."""
         values = self.results.values.copy()
         values[~lanes] = 0.0
         speed_kmh = np.where(lanes, self.speed_kmh, 0.0)
-        return Answer(self.results._replace(values=values), speed_kmh, lanes.copy())
+        return Answer(self.results._replace(values=values), speed_kmh, lanes.copy(), self.counts & lanes)
 
 
 class VectorLanes:
@@ -144,7 +145,10 @@ class VectorLanes:
 
     def answer(self) -> Answer:
         """Results of all lanes."""
-        return Answer(self._results, self._speed_kmh.copy(), np.ones(self.count, dtype=np.bool_))
+        counts = self.usual.counts()
+        for task, its in self._others:
+            counts[its] = task.counts()[its]
+        return Answer(self._results, self._speed_kmh.copy(), np.ones(self.count, dtype=np.bool_), counts)
 
     def task_of(self, lane: int) -> tuple[Task, int]:
         """The task that a lane runs, and its number there."""
@@ -242,6 +246,7 @@ class LaneGroups:
             Results(*(np.concatenate(parts) for parts in results)),
             np.concatenate([each.speed_kmh for each in answers]),
             np.concatenate([each.lanes for each in answers]),
+            np.concatenate([each.counts for each in answers]),
         )
 
     def task_of(self, lane: int) -> tuple[Task, int]:
@@ -294,10 +299,13 @@ def final_figures(task: Task, row: int = 0) -> dict[str, float]:
     return {name: value for name, value in figures.items() if math.isfinite(value)}
 
 
-def own_info(values: Array) -> dict[str, Any]:
-    """Info of one of several controlled pantographs; values: its rows of ``Result``."""
+def own_infos(task: Task) -> list[dict[str, Any]]:
+    """Info of each of several controlled pantographs of the only lane of a task."""
     own = {"reward": REWARD, "cost": COST, "contact_force": CONTACT_FORCE, "position": POSITION}
-    return {name: float(values[row]) for name, row in own.items()}
+    return [
+        {name: float(values[row]) for name, row in own.items()} | {"counts": counts}
+        for values, counts in zip(task.results.values, task.counts().tolist(), strict=True)
+    ]
 
 
 def lane_infos(answer: Answer) -> dict[str, Any]:
@@ -306,12 +314,13 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     Each key holds an array with a value per lane, or a dictionary of such arrays; "_key" marks the lanes
     that have a value.
     """
-    (_, values, _), speed_kmh, lanes = answer
+    (_, values, _), speed_kmh, lanes, counts = answer
     rows = values.T
     infos: dict[str, Any] = {}
     for name, row in INFOS:
         infos[name], infos[f"_{name}"] = rows[row], lanes
     infos["speed_kmh"], infos["_speed_kmh"] = speed_kmh, lanes
+    infos["counts"], infos["_counts"] = counts, lanes
     infos["reward_terms"], infos["_reward_terms"] = {}, lanes
     for name, row in REWARD_TERMS:
         infos["reward_terms"][name], infos["reward_terms"][f"_{name}"] = rows[row], lanes
@@ -346,5 +355,6 @@ def first_info(task: Task) -> dict[str, Any]:
 
     observation, values, flags = task.results
     first = Results(observation[:1], values[:1], flags[:1])
-    answer = Answer(first, to_kmh(task.speed), np.ones(1, dtype=np.bool_))
+    none = np.zeros(1, dtype=np.bool_)  # nothing counts yet
+    answer = Answer(first, to_kmh(task.speed), ~none, none)
     return of_lane(lane_infos(answer))

@@ -33,8 +33,8 @@ class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
     ``panto_env.parallel_env(pantographs=["dsa380", "dsa380"], distances=[200], controlled=[1, 2])`` is a thin
     view of ``PantographEnv`` with the same arguments: the same task, of which each agent sees its own
     observation and reward. All act in every step, and their episodes end together; one that has not come onto
-    the line yet waits, and its reward is 0. The info of an agent has its contact force, position, reward and
-    cost, the last one its figures.
+    the line yet waits, and its reward is 0. The info of an agent has its contact force, position, reward,
+    cost and whether they count, the last one its figures.
     """
 
     metadata: dict[str, Any] = {"name": "pantograph_v0", "is_parallelizable": True}  # noqa: RUF012 - as PettingZoo declares it

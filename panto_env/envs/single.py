@@ -14,7 +14,9 @@ from ..control import Context, Task
 from ..control.arguments import checked, takes
 from ..control.observation import BOUND
 from ..control.settings import read_settings
+from ..control.state import TaskRow
 from ..metrics.trajectory import Trajectory
+from ..plant.state import Row
 from .episodes import (
     CopiedAlone,
     Episodes,
@@ -24,13 +26,13 @@ from .episodes import (
     one_at_a_time,
     refuse,
 )
-from .lanes import CONTACT_FORCE, REWARD, final_figures, first_info, own_info
+from .lanes import CONTACT_FORCE, REWARD, final_figures, first_info, own_infos
 from .settings import OF_VECTORS, EnvironmentSettings, described, render_metadata
 
 if TYPE_CHECKING:
     from ..render.viewer import Viewer
 
-SEEN = ("_shape", "_observation", "_values", "_flags")
+SEEN = ("_shape", "_observation", "_values", "_flags", "_steps", "_counted_from")
 """Attributes that ``PantographEnv._watch`` sets from the task."""
 
 
@@ -102,20 +104,22 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
     `reset` and `step` give the same keys: contact force (N), heights of head and wire (m), forces of the
     actuators (N), position (m), speed (km/h), the reward's terms, and the cost of safe learning: the share of
     the step without contact, with an uplift beyond its limit at a support, and with a low-passed contact
-    force beyond the line's maximum, in sum, with the weights of `cost`. The last info of an episode has one
-    key more, as Gymnasium's "episode" is: `info["figures"]`, its figures over the part that counts for the
-    reward, after `run_in` and `settle`, to the end. `trajectory.summary()` has those of whole spans after the
-    start has died out, which the benchmark compares. A figure that the run does not have, such as uplift
-    where no support is passed, is left out. A `TimeLimit` ends episodes without the environment's knowledge:
-    `trajectory.summary("all")` has the figures of all of it then, too.
+    force beyond the line's maximum, in sum, with the weights of `cost`. `info["counts"]` is whether reward
+    and cost of the step count: neither at `reset` nor in the spans of `settle` do they. The last info of an
+    episode has one key more, as Gymnasium's "episode" is: `info["figures"]`, its figures over the part that
+    counts for the reward, after `run_in` and `settle`, to the end. `trajectory.summary()` has those of whole
+    spans after the start has died out, which the benchmark compares. A figure that the run does not have,
+    such as uplift where no support is passed, is left out. A `TimeLimit` ends episodes without the
+    environment's knowledge: `trajectory.summary("all")` has the figures of all of it then, too.
 
     ## Several Pantographs
     `pantographs=["dsa380", "dsa380"], distances=[200]` is a train; `controlled=2` controls the second one,
     whose episode begins where it comes onto the line, while the first is passive. With `controlled=[1, 2]`
     observation and action hold those of the first, then those of the second, and the reward is the mean of
-    theirs; `info["pantographs"]` has each one's contact force, position, reward and cost, in the last info
-    with its figures. `trajectory.train` has the records of all. `panto_env.parallel_env` is the same task as
-    a PettingZoo environment, an agent for each controlled pantograph.
+    theirs; `info["pantographs"]` has each one's contact force, position, reward, cost and whether they
+    count, in the last info with its figures. `trajectory.train` has the records of all.
+    `panto_env.parallel_env` is the same task as a PettingZoo environment, an agent for each controlled
+    pantograph.
 
     ## Arguments
     {arguments}
@@ -183,7 +187,7 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
             self._show()
         info = first_info(task)
         if task.agents > 1:
-            info["pantographs"] = [own_info(own) for own in task.results.values]
+            info["pantographs"] = own_infos(task)
         return self._observation.copy(), info
 
     def _watch(self, task: Task) -> None:
@@ -193,6 +197,9 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
         results = task.results
         self._observation, self._values = results.observation.reshape(-1), results.values[0]
         self._flags = results.flags[0]
+        first = int(task.episode.controlled[0])
+        self._steps = task.plant.run.table[first, 0, Row.STEP, ...]
+        self._counted_from = task.episode.table[0, TaskRow.COUNTED_FROM, ...]
 
     def _state(self) -> dict[str, Any]:
         """State without the views of the task's arrays, which a copy makes again, and without the window."""
@@ -234,6 +241,7 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
             "position": position,
             "cost": cost,
             "speed_kmh": self._speed_kmh,
+            "counts": terminated or self._steps.item() > self._counted_from.item(),
             "reward_terms": {
                 "cost_function": cost_function,
                 "contact_loss": contact_loss,
@@ -245,7 +253,8 @@ class PantographEnv(CopiedAlone, gymnasium.Env[NDArray[np.float32], NDArray[np.f
         }
         if several:
             reward = float(self.task.results.values[:, REWARD].mean())
-            info["pantographs"] = [own_info(own) for own in self.task.results.values]
+            info["pantographs"] = own_infos(self.task)
+            info["counts"] = any(own["counts"] for own in info["pantographs"])
         if terminated or truncated:
             self._running = False
             info["figures"] = final_figures(self.task)

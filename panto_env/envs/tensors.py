@@ -179,12 +179,13 @@ class PantographTensorEnv(SharedByLanes):
 
     def _answer(self, lanes: torch.Tensor) -> Any:
         speed_kmh = to_kmh(self._lanes.speeds()).repeat_interleave(self._agents)
-        answer: Any = Answer(self._lanes.results(), speed_kmh, lanes)
+        answer: Any = Answer(self._lanes.results(), speed_kmh, lanes, self._lanes.counts())
         return answer if bool(lanes.all()) else self._of(answer, lanes)
 
     def _of(self, answer: Any, lanes: torch.Tensor) -> Any:
         values = answer.results.values * lanes[:, None]
-        return Answer(answer.results._replace(values=values), answer.speed_kmh * lanes, lanes)
+        counts = answer.counts & lanes
+        return Answer(answer.results._replace(values=values), answer.speed_kmh * lanes, lanes, counts)
 
     def _figures(self, ended: torch.Tensor) -> dict[str, Any]:
         """Figures of the lanes whose episodes have ended, which the processor works out."""

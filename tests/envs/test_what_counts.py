@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from panto_baselines.policies.repetitive import Washout, WashoutSettings
-from panto_env import InputError, simulate
+from panto_env import InputError, parallel_env, simulate
 from panto_env.control.reward import REWARDS
-from panto_env.envs import BARE
+from panto_env.envs import BARE, DrivenByPolicies
 from panto_env.metrics.low_pass import low_pass
 from panto_env.policies import find_policy, wishes
+
+from ..marks import some_at_once
 
 LIGHT = "panto_env:PantographStiffness-v0"
 LINES = {
@@ -69,6 +71,67 @@ def test_the_line_is_longer_by_what_settles_and_without_it_nothing_changes():
     np.testing.assert_array_equal(zero, default)
 
 
+FLEXIBLE = "panto_env:Pantograph-v0"
+TWO = BARE | {
+    "pantographs": ["en50318-2002"] * 2,
+    "distances": [100.0],
+    "controlled": [1, 2],
+    "accuracy": "fast",
+}
+SIBLINGS = {
+    "single": lambda settings: gymnasium.make(LIGHT, **settings),
+    "train": lambda settings: gymnasium.make(FLEXIBLE, **TWO | settings),
+    "driven": lambda settings: DrivenByPolicies(gymnasium.make(FLEXIBLE, **TWO | settings), {1: "passive"}),
+    "agents": lambda settings: parallel_env(**TWO | settings),
+    **{
+        mode: lambda settings, mode=mode: gymnasium.make_vec(LIGHT, 2, autoreset_mode=mode, **settings)
+        for mode in ("NextStep", "SameStep", "Disabled")
+    },
+    "lines": lambda settings: gymnasium.make_vec(LIGHT, 2, **settings | {"catenary": ["periodic-stiffness"]}),
+    "vector of trains": lambda settings: gymnasium.make_vec(FLEXIBLE, 4, **TWO | settings),
+    "tensors": lambda settings: gymnasium.make_vec(LIGHT, 2, device="cpu", **settings),
+    "tensors of trains": lambda settings: gymnasium.make_vec(FLEXIBLE, 4, device="cpu", **TWO | settings),
+}
+
+
+def steps_of(env):
+    """Rewards and what infos say counts, one or more each, at the start and in each step of an episode."""
+    agents, ended = getattr(env, "possible_agents", None), False
+    space = env.action_space(agents[0]) if agents else env.action_space
+    action = np.zeros(space.shape, np.float32)
+    if hasattr(env.unwrapped, "device"):
+        action = pytest.importorskip("torch").from_numpy(action)
+    info = env.reset(seed=0)[1]
+    yield 0.0, np.asarray([each["counts"] for each in info.values()] if agents else info["counts"])
+    while not ended:
+        taken = env.step(dict.fromkeys(agents, action) if agents else action)
+        _, reward, *ends, info = (list(each.values()) for each in taken) if agents else taken
+        counts = [each["counts"] for each in info] if agents else info.get("final_info", info)["counts"]
+        ended = np.asarray(ends).any()
+        yield np.asarray(reward), np.asarray(counts)
+
+
+@pytest.mark.parametrize("name", some_at_once(SIBLINGS, set(SIBLINGS) - {"tensors of trains"}))
+def test_infos_say_whether_a_reward_counts(name):
+    """A reward of 0 does not, in any kind of environment: that of a step that counts is never so exact."""
+    (_, first), *steps = steps_of(SIBLINGS[name]({"distance": 100.0, "settle": 2.0, "run_in": 1.0}))
+    assert first.dtype == np.bool_
+    assert not first.any()
+    for reward, counts in steps:
+        np.testing.assert_array_equal(reward != 0, counts)
+    share = np.mean([counts for _, counts in steps])
+    assert 0.2 < share < 0.8
+
+
+def test_after_a_reset_at_once_the_last_info_says_so():
+    env = SIBLINGS["SameStep"]({"distance": 50.0, "settle": 1.0})
+    env.reset(seed=0)
+    while "final_info" not in (info := env.step(np.zeros((2, 1), np.float32))[-1]):
+        pass
+    assert info["final_info"]["counts"].all()
+    assert not info["counts"].any()
+
+
 def test_an_episode_of_which_nothing_would_count_is_refused():
     env = gymnasium.make("panto_env:Pantograph-v0", spans=8, settle=8.0)
     with pytest.raises(InputError, match="nothing of the episode is left to count"):
@@ -79,6 +142,7 @@ def test_an_early_end_before_anything_counts_is_charged_for_what_would_have_coun
     settings = {"distance": 100.0, "settle": 2.0, "actuator": {"force_limit": 2000.0}}
     env = gymnasium.make(LIGHT, **settings).unwrapped
     rewards, _, info = episode(env, action=[-1.0])
+    assert info["counts"]
     assert env.trajectory.terminated
     counted = 100.0 / (env.context.speed * env.context.control_interval)
     assert rewards[:-1].any() == 0

@@ -86,6 +86,13 @@ SHORTENED = {
         "n_steps=512, batch_size=4096": "n_steps=64, batch_size=64",
         "learn(500_000)": "learn(100)",
     },
+    "docs/how-to.md": {
+        "num_envs=32": "num_envs=2",
+        '"n_steps": 512, "batch_size": 4096': '"n_steps": 16, "batch_size": 32',
+        "learn(200_000": "learn(32",
+        "n_eval_episodes=32": "n_eval_episodes=1",
+        "n_trials=20": "n_trials=2",
+    },
 }
 """Text in the Python of a page, and what runs instead."""
 EPISODE = "panto dataset episodes dataset-known-line --only fitted-fb-ff --episodes 1 --workers 1"

@@ -12,7 +12,7 @@ import pytest
 from panto_env import simulate
 from panto_env.metrics.low_pass import in_band
 
-from ..notebook import LEARNING, UNSEEN_LINE, changes, executed, told
+from ..notebook import FIRST, LEARNING, NOTEBOOKS, UNSEEN_LINE, changes, executed, told
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -216,6 +216,35 @@ def test_notebook_shows_what_it_prints_now():
     assert [cell for cell in stored.cells if cell.cell_type == "code" and not cell.execution_count] == []
     assert LEARNING.stat().st_size < 300_000
     assert changes(stored)["SAC"] < changes(stored)["Damper"]
+
+
+def test_notebooks_start_alike_wherever_they_are_opened():
+    """By the same cell, whose address a release fills in: from the copy they lie in, or what is published."""
+    firsts = {
+        next(cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code")
+        for path in NOTEBOOKS
+    }
+    (first,) = firsts
+    assert 'find_spec("panto_env") is None' in first
+    assert "[agents,render] @ {at}" in first
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["own_line", "own_record"])
+def test_notebooks_for_engineers_show_what_they_print_now(name, tmp_path):
+    (path,) = (each for each in NOTEBOOKS if each.stem == name)
+    stored = told(nbformat.read(path, as_version=4))
+    assert told(executed(path, folder=tmp_path)) == stored
+    assert path.stat().st_size < 300_000
+
+
+@pytest.mark.slow
+def test_the_first_notebook_learns_in_a_minute_as_it_shows(tmp_path):
+    stored = nbformat.read(FIRST, as_version=4)
+    again = changes(executed(FIRST, before="## The film", folder=tmp_path))
+    assert again["mine"] == pytest.approx(changes(stored)["mine"], abs=5.0)
+    assert changes(stored)["mine"] < -10
+    assert FIRST.stat().st_size < 600_000
 
 
 @pytest.mark.slow

@@ -2,10 +2,12 @@
 
 import email
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tomllib
 import venv
 import zipfile
@@ -160,7 +162,8 @@ def test_what_is_published_names_authors_and_addresses_that_a_release_fills_in(t
     if not all(address.startswith("https://example.org/panto-env") for address in addresses):
         assert not any("example.org" in address for address in addresses)
         return
-    filled_in = ("pyproject.toml", "CITATION.cff", "examples/unseen_line.ipynb")
+    notebooks = [f"examples/{path.name}" for path in (ROOT / "examples").glob("*.ipynb")]
+    filled_in = ("pyproject.toml", "CITATION.cff", *notebooks)
     (tmp_path / "examples").mkdir()
     for name in ("Makefile", *filled_in):
         shutil.copy(ROOT / name, tmp_path / name)
@@ -188,3 +191,20 @@ def test_the_wheel_says_for_whom_it_is_and_what_it_needs(wheel):
     minimum = told["Requires-Python"].removeprefix(">=")
     assert f"Programming Language :: Python :: {minimum}" in classifiers
     assert [each.partition(", ")[0] for each in told.get_all("Project-URL")]
+    source = dict(each.split(", ") for each in told.get_all("Project-URL"))["Source"]
+    assert told["Description-Content-Type"] == "text/markdown"
+    links = re.findall(r"\]\((.+?)\)", told.get_payload())  # a hub has no files beside it
+    assert f"{source}/raw/main/docs/films/passive-and-agent.gif" in links
+    assert f"{source}/blob/main/LICENSE" in links
+    assert [link for link in links if not link.startswith("https://")] == []
+
+
+@pytest.mark.slow
+def test_the_packed_sources_hold_what_the_checkout_does(wheel):
+    listed = run(["git", "ls-files"], cwd=ROOT)
+    if listed.returncode != 0:
+        pytest.skip("this is no checkout")
+    (packed,) = wheel.parent.glob("*.tar.gz")
+    with tarfile.open(packed) as sources:
+        inside = {name.partition("/")[2] for name in sources.getnames()}
+    assert set(listed.stdout.split()) <= inside
