@@ -16,6 +16,8 @@ from panto_env.studies.permissible.scan import WAVES, Broken, Pass
 from panto_env.studies.permissible.shown import answers_table
 from panto_env.studies.permissible.study import Case
 
+from ..pages import DOCS, tables_of
+
 FORCE, SPEED = (
     Broken("max", "maximum", 2, 360.0, "at most 350 N"),
     Broken(WAVES, "v/c", 1, 0.8, "at most 0.7"),
