@@ -345,8 +345,8 @@ def _sigmas(axes: Axes, cells: list[Cell], lines_of: Mapping[str, Mapping[str, A
     first = _by_speed(cells, next(iter(lines_of)))
     limit = [en50367.STD_OF_MEAN * cell.figures["mean"] for cell in first]
     words = f"{en50367.SOURCE}: σ of at most {en50367.STD_OF_MEAN:g} F_m ({first[0].policy})"
-    style: dict[str, Any] = {"linestyle": "-.", "marker": "_", "linewidth": 0.9}  # not as the force's
-    axes.plot([cell.speed_kmh for cell in first], limit, label=words, color=LIMIT, **style)
+    dashed: dict[str, Any] = {"linestyle": "-.", "marker": "_", "linewidth": 0.9}  # not as the force's
+    axes.plot([cell.speed_kmh for cell in first], limit, label=words, color=LIMIT, **dashed)
     axes.set(xlabel="speed (km/h)", ylabel=LABELS["std"].heading, xticks=sorted({c.speed_kmh for c in cells}))
     axes.set_ylim(bottom=0)
 

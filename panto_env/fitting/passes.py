@@ -59,7 +59,7 @@ class Measured:
     @cached_property
     def from_middle(self) -> Array:
         """Way from the middle of what is compared, (places,) (m)."""
-        return self.place - 0.5 * (self.place[0] + self.place[-1])
+        return np.asarray(self.place - 0.5 * (self.place[0] + self.place[-1]))
 
     def force(self, shift: float = 0.0, scale: float = 0.0) -> Array:
         """Measured force (N), (places,), where the record's positions are short.
