@@ -15,7 +15,9 @@ def app(
     port: Annotated[
         int, Option(min=1024, max=65535, help="Port of this machine at which it is served.")
     ] = 5006,
-    browser: Annotated[bool, Option(help="Whether the page is opened in a browser.")] = True,
+    no_browser: Annotated[
+        bool, Option("--no-browser", help="Only serve the page, and open no browser.")
+    ] = False,
 ) -> None:
     """Serve a page on which line, pantograph, speed and policy are chosen and their run is seen at once.
 
@@ -31,7 +33,7 @@ def app(
 
     def ready(address: str) -> None:
         console.print(f"The page is {address}; Ctrl+C ends it.", soft_wrap=True)
-        if browser:
+        if not no_browser:
             webbrowser.open(address)
 
     serve(port, ready)
