@@ -91,7 +91,7 @@ def line(
 def pantograph(
     table: Mapping[str, Any], like: str | Path | PantographData | None = None, name: str | None = None
 ) -> PantographData:
-    """A pantograph in memory, as ``line`` makes lines; lists such as ``masses`` are given whole."""
+    """A pantograph in memory, as ``line`` makes lines; ``{"masses.1": 9.0}`` changes the first mass alone."""
     return parse_pantograph(*_changed("pantograph", table, like, name))
 
 
@@ -136,8 +136,29 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
             if given & changes.keys() and not dropped & changes.keys():
                 found = {key: value for key, value in found.items() if key not in dropped}
     for key, value in changes.items():
+        if _numbered(value) and key in found and not _numbered(found[key]):
+            found[key] = _with_elements(key, found[key], value)
+            continue
         tables = isinstance(value, Mapping) and isinstance(found.get(key), Mapping) and "value" not in value
         found[key] = _merged(found[key], value) if tables else value
+    return found
+
+
+def _numbered(value: Any) -> bool:
+    """Whether it holds elements of a list by their numbers."""
+    return isinstance(value, Mapping) and bool(value) and all(str(number).isdigit() for number in value)
+
+
+def _with_elements(key: str, given: Any, changes: Mapping[str, Any]) -> list[Any]:
+    """A list with other elements, which count from 1. Raises InputError for one that it doesn't have."""
+    whole = given["value"] if isinstance(given, Mapping) and "value" in given else given
+    if not isinstance(whole, list | tuple):
+        raise InputError(f"'{key}' is no list of the entry that is changed, so it has no element by number.")
+    found = list(whole)
+    for number, value in changes.items():
+        if not 1 <= int(number) <= len(found):
+            raise InputError(f"'{key}' has elements 1 to {len(found)}, not {number}; they count from 1.")
+        found[int(number) - 1] = value
     return found
 
 

@@ -71,3 +71,13 @@ def test_what_cannot_be_is_refused(table, like, message):
     with pytest.raises(InputError) as caught:
         line(table, like=like)
     assert message in str(caught.value)
+
+
+def test_single_elements_of_a_list_count_from_1():
+    masses = load_pantograph("dsa380").masses
+    changed = pantograph({"masses.1": 9.0, "masses.3": 8.0}, like="dsa380")
+    assert changed.masses == (9.0, masses[1], 8.0)
+    with pytest.raises(InputError, match="'masses' has elements 1 to 3, not 0; they count from 1"):
+        pantograph({"masses.0": 9.0}, like="dsa380")
+    with pytest.raises(InputError, match="'static_force' is no list"):
+        pantograph({"static_force.1": 9.0}, like="dsa380")
