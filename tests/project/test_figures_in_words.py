@@ -171,6 +171,10 @@ SENTENCES = {
             ),
         ),
         (
+            "`agent-robust` reduces σ by {:.1f} % there, `agent-any-pantograph` by {:.1f} %; `repetitive` is not",
+            lambda: [less("permissible", each)[0] for each in ("agent-robust", "agent-any-pantograph")],
+        ),
+        (
             "`agent-any-pantograph` reduces σ by {:.1f} % there, after {:.1f} % at first",
             lambda: [-one for one in windows("long", "agent-any-pantograph")[::-1]],
         ),
