@@ -109,7 +109,8 @@ def literal(value: Any, kind: str) -> str:
     if kind == INT:
         return str(int(value))
     if not math.isfinite(value):
-        return "INFINITY" if value > 0 else "-INFINITY"
+        huge = "HUGE_VALF" if kind == SINGLE else "HUGE_VAL"  # INFINITY is a float
+        return huge if value > 0 else f"-{huge}"
     return f"{np.float32(value)}f" if kind == SINGLE else repr(float(value))
 
 
@@ -281,7 +282,7 @@ class _Body:
             case ast.Attribute(value=ast.Name(id=table), attr=name) if table in self._tables:
                 return self._entry(table, name, node)
             case ast.Attribute(value=ast.Name(id="math"), attr="inf"):
-                return "INFINITY", LITERAL
+                return literal(math.inf, DOUBLE), LITERAL
             case ast.Subscript(value=array, slice=place):
                 return self._element(array, place)
             case ast.BinOp(left=left, op=operator, right=right):
