@@ -328,7 +328,7 @@ class DAgger(InRounds):
     from the environment, not the reward. The agent may see less than the teacher.
     """
 
-    batch_size: Count = Field(32, description="parts of passes in a minibatch, each of about a second")
+    batch_size: Count = Field(32, description="parts of passes in a minibatch, of 64 control steps each")
 
     teacher: str = Field(description="agent whose actions are learnt: one network, with the same washout")
 

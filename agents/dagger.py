@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from copy import deepcopy
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -19,7 +19,7 @@ from panto_env.control.lines import on_example
 from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.control.settings import run_settings
 
-from .algorithm import agent_alone
+from .algorithm import DAgger, agent_alone
 from .apg import Network
 from .device_ppo import OwnLearner
 from .linear_pass import Numbers, begun
@@ -27,10 +27,7 @@ from .model_file import Actor, Needs
 from .policy import WashedOut
 from .settings import Training
 
-if TYPE_CHECKING:
-    from .algorithm import DAgger
-
-PART, LED_IN = 96, 32
+PART, LED_IN = 64, 24
 """Control steps of a part of a pass that is learnt from, and the first of them, which do not count, since a
 recurrent unit begins with nothing there."""
 
@@ -48,6 +45,7 @@ class TaughtLanes:
     def __init__(self, training: Training) -> None:
         """Raises InputError where the teacher does not fit the environment, or sees less than the agent."""
         settings = training.hyperparameters
+        assert isinstance(settings, DAgger)
         teacher = agent_alone(settings.teacher, "dagger")
         asked = {name: getattr(teacher.facts.needs, name) for name in OBSERVATION_SETTINGS}
         self._settings = [run_settings(each | asked) for each in training.environments]

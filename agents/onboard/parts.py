@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from . import acting, seeing
 from .guarding import SHOWN
 
 Table = dict[str, Any]
-Feedback = Proportional | ProportionalDerivative | FeedbackFeedforward
+Feedback: TypeAlias = Proportional | ProportionalDerivative | FeedbackFeedforward
 
 
 def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
