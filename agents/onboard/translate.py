@@ -71,10 +71,8 @@ class Translation:
         for name, value in self.used.items():
             kind = type_of(value)
             if np.ndim(value):
-                array = np.asarray(value)
-                numbers = ", ".join(literal(each, kind) for each in array.ravel())
-                flat = "\n    ".join(textwrap.wrap(numbers, 104))
-                lines.append(f"static const {kind} {name}{_sizes(array)} = {_braces(array, flat, kind)};")
+                initial = _braces(np.asarray(value), kind)
+                lines.append(f"static const {kind} {name}{_sizes(value)} = {initial};")
             elif kind != INT:
                 lines.append(f"static const {kind} {name} = {literal(value, kind)};")
         return "\n".join(lines)
@@ -85,15 +83,12 @@ class Translation:
         return "\n".join(f"    {type_of(value)} {name}{_sizes(value)};" for name, value in entries)
 
 
-def _braces(array: Any, flat: str, kind: str) -> str:
+def _braces(array: Any, kind: str) -> str:
     """Initialiser of an array, with the braces of its dimensions."""
-    if array.ndim == 1:
-        return "{\n    " + flat + "}"
-    rows = []
-    for row in array:
-        numbers = ", ".join(literal(each, kind) for each in row.ravel())
-        rows.append(_braces(row, "\n    ".join(textwrap.wrap(numbers, 104)), kind))
-    return "{" + ",\n".join(rows) + "}"
+    if array.ndim > 1:
+        return "{" + ",\n".join(_braces(row, kind) for row in array) + "}"
+    numbers = textwrap.wrap(", ".join(literal(each, kind) for each in array), 104)
+    return "{\n    " + "\n    ".join(numbers) + "}"
 
 
 def type_of(value: Any) -> str:
