@@ -210,7 +210,7 @@ class _Body:
             self._put(f"{own} {target.id} = {text};")
             return
         place, own = self._expression(target)
-        self._put(f"{place} = {f'(float)({text})' if (own, kind) == (SINGLE, DOUBLE) else text};")
+        self._put(f"{place} = {f'({own})({text})' if {own, kind} == {SINGLE, DOUBLE} else text};")
 
     def _if(self, test: ast.expr, body: list[ast.stmt], otherwise: list[ast.stmt]) -> None:
         known = self._known(test)
