@@ -90,7 +90,7 @@ def test_each_is_small_holds_nothing_pickled_and_says_what_made_it(name):
         assert facts.needs.observation in ("measured", "deviations")
 
 
-def test_the_small_one_has_less_than_4_kB_of_weights():
+def test_the_small_one_has_less_than_four_kilobytes_of_weights():
     assert sum(each.nbytes for each in load_file(FOLDER / "small.safetensors").values()) < 4000
 
 
