@@ -10,12 +10,13 @@ from pydantic import Field
 
 from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive, Settings
-from panto_env.policies import find_policy
+from panto_env.policies import check_named, find_policy
 
 from .model_file import Actor, RecurrentActor
 
 if TYPE_CHECKING:
     from .cloning import Demonstrations
+    from .policy import TrainedPolicy
     from .settings import Training
 
 
@@ -233,7 +234,30 @@ class SAC(Algorithm):
         return self.actor_from_layers(model.actor.latent_pi, model.actor.mu).squash()
 
 
-class APG(Algorithm):
+class InRounds(Algorithm):
+    """Hyperparameters of a learner of ours that runs whole passes in rounds, with one network."""
+
+    updates: Count = Field(100, description="steps of the optimiser in a round")
+    max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
+    recurrent_units: Annotated[int, Field(ge=0, le=MOST_UNITS, strict=True)] = Field(
+        0, description="width of a gated recurrent unit after the first layer; 0: none"
+    )
+
+    def check(self, training: Training) -> None:
+        """Raise InputError for parts of a training that passes have no use for."""
+        if (training.lines, training.episodes_per_line) != (None, 1):
+            raise InputError(
+                f"{training.algorithm} draws a line for each pass; leave out lines and episodes_per_line"
+            )
+
+    def actor(self, model: Any) -> Actor:
+        """Deterministic policy: the network's output, squashed by tanh."""
+        plain = self.actor_from_layers(model.network.first, model.network.rest).squash()
+        cell = model.network.arrays()
+        return plain if cell is None else RecurrentActor(**vars(plain), cell=cell)
+
+
+class APG(InRounds):
     """Hyperparameters of the analytic policy gradient.
 
     Each round measures new passes of the present policy, as many as there are lanes, as exact linear
@@ -244,7 +268,6 @@ class APG(Algorithm):
 
     takes_over: ClassVar[bool] = True
 
-    updates: Count = Field(100, description="steps of the optimiser in a round")
     rounds_kept: Count = Field(4, description="rounds whose passes are learnt from")
     rate_weight: NonNegative = Field(
         1.0, description="weight of the mean square of a control step's change of the action beyond rate_free"
@@ -255,10 +278,6 @@ class APG(Algorithm):
     mean_weight: NonNegative = Field(
         0.1,
         description="weight of the square of the mean force's shift beyond 0.5 %, in halves of a per cent",
-    )
-    max_grad_norm: NonNegative = Field(0.5, description="clip of the gradient")
-    recurrent_units: Annotated[int, Field(ge=0, le=MOST_UNITS, strict=True)] = Field(
-        0, description="width of a gated recurrent unit after the first layer; 0: none"
     )
     response_steps: Count = Field(
         180, description="control steps after which the response to an action is taken to be over"
@@ -276,14 +295,13 @@ class APG(Algorithm):
 
     def check(self, training: Training) -> None:
         """Raise InputError for parts of a training that passes have no use for."""
+        super().check(training)
         if training.start_from is not None:
             self._check_shape(training.start_from)
-        if (training.lines, training.episodes_per_line) != (None, 1):
-            raise InputError("apg draws a line for each pass; leave out lines and episodes_per_line")
 
     def _check_shape(self, agent: str) -> None:
         """Raise InputError unless an agent's network has the shape of a learner's."""
-        actor = _actor_of(agent)
+        actor = agent_alone(agent, "apg").actor
         cell = actor.cell if isinstance(actor, RecurrentActor) else None
         units = 0 if cell is None else cell.weight_state.shape[1]
         widths = tuple(len(each) for each in actor.biases[:-1])
@@ -295,26 +313,51 @@ class APG(Algorithm):
 
     def begin_as(self, model: Any, agent: str) -> None:
         """Give a new learner the network of an agent."""
-        actor = _actor_of(agent)
+        actor = agent_alone(agent, "apg").actor
         pairs = [each for pair in zip(actor.weights, actor.biases, strict=True) for each in pair]
         cell = actor.cell if isinstance(actor, RecurrentActor) else ()
         model.network.take([*pairs[:2], *cell, *pairs[2:]])
 
-    def actor(self, model: Any) -> Actor:
-        """Deterministic policy: the network's output, squashed by tanh."""
-        plain = self.actor_from_layers(model.network.first, model.network.rest).squash()
-        cell = model.network.arrays()
-        return plain if cell is None else RecurrentActor(**vars(plain), cell=cell)
+
+class DAgger(InRounds):
+    """Hyperparameters of imitation in rounds (DAgger: Ross, Gordon and Bagnell, AISTATS 2011).
+
+    In the first round the teacher acts, in all others what has been learnt so far; the teacher says what it
+    would do in each step. After each round the network is fitted to what the teacher said in all of them, by
+    least squares, each pass relative to the teacher's own actions. It takes lines, speeds and observation
+    from the environment, not the reward. The agent may see less than the teacher.
+    """
+
+    batch_size: Count = Field(32, description="parts of passes in a minibatch, of 64 control steps each")
+
+    teacher: str = Field(description="agent whose actions are learnt: one network, with the same washout")
+
+    def make_learner(self, lanes: Any, seed: int) -> Any:
+        """Learner that takes its passes from the lanes' environments."""
+        from .dagger import DAggerLearner
+
+        return DAggerLearner(self, lanes, seed)
+
+    def check(self, training: Training) -> None:
+        """Raise InputError where the teacher or parts of a training do not fit."""
+        super().check(training)
+        if given := [name for name in ("start_from", "residual_of") if getattr(training, name)]:
+            raise InputError(f"dagger learns from its teacher alone; leave out {given[0]}")
+        check_named(self.teacher, "it")
+        if agent_alone(self.teacher, "dagger").facts.washout != training.washout:
+            raise InputError(
+                f"'{self.teacher}' has another washout; set [washout] as in the teacher's training"
+            )
 
 
-def _actor_of(agent: str) -> Actor:
-    """Network of an agent. Raises InputError for a policy that is not one network alone."""
+def agent_alone(agent: str, algorithm: str) -> TrainedPolicy:
+    """An agent. Raises InputError for a policy that is not one network alone."""
     from .policy import TrainedPolicy
 
     found = find_policy(agent)
     if isinstance(found, TrainedPolicy) and found.facts.residual_of is None and not found.facts.steps_before:
-        return found.actor
+        return found
+    or_else = "; or it adds to a policy by residual_of" if algorithm == "apg" else ""
     raise InputError(
-        f"apg starts from the network of an agent that acts alone, which '{agent}' is not; or it adds to a "
-        "policy by residual_of"
+        f"{algorithm} starts from the network of an agent that acts alone, which '{agent}' is not{or_else}"
     )

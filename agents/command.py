@@ -113,7 +113,7 @@ EXPORTS = {"safetensors": ".safetensors", "c": ".c", "fmu": ".fmu", "onnx": ".on
 """Suffix of the file that each format of `panto export` has."""
 
 
-@with_settings(only=("catenary", "pantograph", "actuator", "sensors"), defaults=False)
+@with_settings(only=("catenary", "pantograph", "controlled", "actuator", "sensors"), defaults=False)
 def export(
     settings: dict[str, Any],
     policy: Annotated[str, typer.Argument(help="Model file, or a policy's name (with parameters).")],
@@ -133,7 +133,8 @@ def export(
     safetensors: only what the policy needs, as arrays and JSON, with nothing pickled; it is the same policy,
     but cannot be trained further. onnx: its network. c: one C99 file and its header, which need nothing but
     libm. fmu: a co-simulation unit of FMI 3.0 with this C. The options say which line, pantograph and
-    actuator the constants of the last two are for, by default those of its training.
+    actuator the constants of the last two are for, by default those of its training: of several pantographs
+    of a train those of the first that is controlled.
     """
     from .onboard import exported, write_fmu, write_onnx
     from .onboard.export import name_in_c
@@ -149,7 +150,7 @@ def export(
         driver = find_policy(policy)
         if settings:
             raise InputError(
-                "A model file holds nothing of line, pantograph, actuator or sensors; leave them out."
+                "A model file holds nothing of line, train, actuator or sensors; leave them out."
             )
         if kind == "onnx":
             write_onnx(driver, _announced(path, output))

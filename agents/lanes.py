@@ -20,7 +20,7 @@ from panto_env.envs import IDS, PantographVectorEnv
 from panto_env.envs.settings import Whole
 from panto_env.policies import errors_name, find_policy
 
-from .algorithm import APG
+from .algorithm import APG, DAgger
 from .policy import added
 from .settings import Training
 
@@ -269,6 +269,10 @@ def make_lanes(training: Training) -> Any:
 
         settings = training.hyperparameters
         return PassLanes(training, Pulsing(settings.response_steps, settings.pulse_spacing))
+    if isinstance(training.hyperparameters, DAgger):
+        from .dagger import TaughtLanes
+
+        return TaughtLanes(training)
     if training.device is not None:
         from .device_ppo import DeviceLanes
 

@@ -109,6 +109,21 @@ class Pulsing(NamedTuple):
         return -(-self.length // self.spacing)
 
 
+def begun(settings: RunSettings, seed: int, lanes: int = 1) -> Task:
+    """Task at the start of a pass, alike in all lanes, on a line and at a speed drawn by a seed.
+
+    Raises InputError for settings that do not fit.
+    """
+    random = np.random.default_rng(seed)
+    drawn = on_drawn_line(settings, lambda: random)
+    speed = float(random.uniform(*drawn.speed_kmh))
+    # A pass begins at the line's start, as those of a benchmark do.
+    alone = drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0})
+    task = Task(alone, lanes=lanes, threads=1)  # passes run side by side
+    task.reset(np.arange(lanes), lambda _: np.random.default_rng(seed))
+    return task
+
+
 def measure(
     settings: RunSettings, policy: Policy, seed: int, pulsing: Pulsing, base: Base | None = None
 ) -> LinearPass:
@@ -117,17 +132,8 @@ def measure(
     base: to which the policy adds; it reacts to pulses. Raises InputError where the pass ends early, or for
     settings that do not fit.
     """
-    random = np.random.default_rng(seed)
-    drawn = on_drawn_line(settings, lambda: random)
-    speed = float(random.uniform(*drawn.speed_kmh))
-    # A pass begins at the line's start, as those of a benchmark do.
-    task = Task(
-        drawn.model_copy(update={"speed_kmh": (speed, speed), "run_in": 0.0}),
-        lanes=pulsing.lanes + 2,
-        threads=1,  # passes run side by side
-    )
+    task = begun(settings, seed, lanes=pulsing.lanes + 2)
     columns = columns_of(task.layout)
-    task.reset(np.arange(task.lanes), lambda _: np.random.default_rng(seed))
     # A pantograph behind another one comes onto the line later.
     first = int(task.plant.of(0, Row.STEP, task.episode.controlled[0])) // task.length.control_steps
     context = task.context(0)

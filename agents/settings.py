@@ -20,9 +20,9 @@ from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
 from panto_env.policies import check_named, find_fitting_policy
 
-from .algorithm import APG, PPO, SAC, Algorithm, Cloning, Count, Share
+from .algorithm import APG, PPO, SAC, Algorithm, Cloning, Count, DAgger, Share
 
-ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC, "apg": APG}
+ALGORITHMS: dict[str, type[Algorithm]] = {"ppo": PPO, "sac": SAC, "apg": APG, "dagger": DAgger}
 
 
 MOST_LANES = 65_536

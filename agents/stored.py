@@ -91,6 +91,14 @@ def any_pantograph(seed: int = 0) -> TrainedPolicy:
     return _trained("any-pantograph", seed)
 
 
+def small(seed: int = 0) -> TrainedPolicy:
+    """Agent for a small processor, with less than 4 kB of weights, where agent-any-pantograph is for.
+
+    It learnt from that one by imitation in rounds, and sees less.
+    """
+    return _trained("small", seed)
+
+
 def robust(seed: int = 0) -> TrainedPolicy:
     """Agent for any line, section and place in a train, with sensors and actuators that fail.
 

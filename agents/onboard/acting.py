@@ -9,6 +9,7 @@ import math
 from collections.abc import MutableSequence
 
 from .guarding import act_within_guard, begin_guard, check_readings
+from .learning import act_by_learning, model_force
 from .seeing import (
     PLACE,
     Constants,
@@ -26,8 +27,8 @@ from .seeing import (
 
 Forces = MutableSequence[float]
 
-NETWORK, FEEDBACK = range(2)
-"""Kinds of policy."""
+NONE, FEEDBACK, REPETITIVE = range(3)
+"""Laws that act alone, or that a network adds to."""
 
 
 def begin(c: Constants, s: State) -> None:
@@ -58,10 +59,18 @@ def decide(c: Constants, s: State) -> None:
     see(c, s)
     if c.guarded:
         check_readings(c, s)
-    if c.kind == NETWORK:
-        act_by_network(c, s)
-    else:
+    if c.law == FEEDBACK:
         act_by_feedback(c, s)
+    if c.law == REPETITIVE:
+        force = washed_out(c, s, c.actions, act_by_learning(c, s))
+        model_force(c, s, force)
+        s.action[0] = force / c.force_limit
+    if c.layers > 0:
+        for a in range(c.actions):
+            s.base[a] = min(1.0, max(-1.0, s.action[a]))
+        act_by_network(c, s)
+        for a in range(c.actions):
+            s.action[a] = s.base[a] + c.network_share * s.action[a]
     for a in range(c.actions):
         s.action[a] = min(1.0, max(-1.0, s.action[a]))
     if c.guarded:
@@ -117,7 +126,7 @@ def act_by_network(c: Constants, s: State) -> None:
             value = math.tanh(value)
         s.action[a] = min(1.0, max(-1.0, value))
         if c.washes_out:
-            s.action[a] = washed_out(c, s, a) / c.force_limit
+            s.action[a] = washed_out(c, s, a, s.action[a] * c.force_limit) / c.force_limit
 
 
 def prepare(c: Constants, s: State) -> None:
@@ -198,20 +207,22 @@ def kept(c: Constants, s: State, row: int) -> Single:
     return total
 
 
-def washed_out(c: Constants, s: State, a: int) -> Number:
+def washed_out(c: Constants, s: State, w: int, requested: float) -> Number:
     """Force (N) requested minus its slow average, which goes on by the actuator's force as modelled.
 
-    The actuator moves at its limit of rate, then by its lag (``repetitive.Washout``).
+    w: number of the average: of an actuator's network, or, after these, of the law's. The actuator moves at
+    its limit of rate, then by its lag (``repetitive.Washout``).
     """
-    left = min(c.force_limit, max(-c.force_limit, s.action[a] * c.force_limit - s.average_force[a]))
-    ahead = left - s.actuator_force[a]
+    left = min(c.force_limit, max(-c.force_limit, requested - s.average_force[w]))
+    ahead = left - s.actuator_force[w]
     distance = abs(ahead)
     change = distance
-    if c.lag > 0.0:
-        by_rate = min(max(distance - c.rate * c.lag, 0.0), c.rate * c.interval)
-        change = by_rate - (distance - by_rate) * math.expm1(-(c.interval - by_rate / c.rate) / c.lag)
+    lag = c.lag[w]
+    if lag > 0.0:
+        by_rate = min(max(distance - c.rate[w] * lag, 0.0), c.rate[w] * c.interval)
+        change = by_rate - (distance - by_rate) * math.expm1(-(c.interval - by_rate / c.rate[w]) / lag)
     if ahead < 0.0:
         change = -change
-    s.actuator_force[a] += change
-    s.average_force[a] += c.average_of_force * s.actuator_force[a]
+    s.actuator_force[w] += change
+    s.average_force[w] += c.average_of_force[w] * s.actuator_force[w]
     return left

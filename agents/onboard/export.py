@@ -6,7 +6,6 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,11 +30,7 @@ from .parts import Table, new_state, parts_of, without_guard
 from .translate import Translation
 
 READINGS = (
-    (
-        "head_displacement",
-        "m",
-        "of the head, up, from the wire's height at rest",
-    ),
+    ("head_displacement", "m", "of the head, up, from the wire's height at rest"),
     ("frame_displacement", "m", "of the frame, up, from the height that goes with it"),
     ("head_velocity", "m/s", "positive upwards"),
     ("frame_velocity", "m/s", "positive upwards"),
@@ -109,7 +104,8 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
 
     policy: a model file, a name, or an object, as ``simulate`` takes it. name: for C; by default made of the
     policy's. settings: those of a run, such as catenary and pantograph; others are as in the policy's
-    training, and for one that was not trained those of Pantograph-v0. Scales of readings, the length of
+    training, and for one that was not trained those of Pantograph-v0. Of several pantographs that are
+    controlled it is for the first. Scales of readings, the length of
     spans, the guard's model and the force limit come from them.
 
     Raises InputError, one sentence, for a policy that has no form in C or does not fit the settings, and for
@@ -142,19 +138,13 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
     outputs = tuple(
         Variable(f"{each}_force", "N", f"of the actuator on the {each}, {limit}") for each in places
     )
-    form = _Form(called, tuple(inputs), outputs, context.control_interval, constants, state)
-    card = _card(words, driver, task)
-    return Exported(
-        name=called,
-        source=form.source(card),
-        header=form.header(card),
-        inputs=form.inputs,
-        outputs=outputs,
-        interval=context.control_interval,
-        card=card,
-        constants=constants,
-        state=state,
-    )
+    translation = Translation(constants, state, f"{called}_state")
+    translation.add(acting.begin)
+    translation.add(acting.step)
+    card, interval = _card(words, driver, task), context.control_interval
+    source = _source(called, inputs, translation, card)
+    header = _header(called, inputs, outputs, translation, interval, card)
+    return Exported(called, source, header, tuple(inputs), outputs, interval, card, constants, state)
 
 
 def name_in_c(words: str) -> str:
@@ -184,7 +174,7 @@ def _card(name: str, driver: Any, task: Task) -> str:
     """Facts of a policy, in lines of plain text."""
     inner = without_guard(driver)
     context = task.context(0)
-    low, high = map(to_kmh, task.settings.speeds)
+    low, high, count = *map(to_kmh, task.settings.speeds), len(context.train.collectors)
     lines = [f"Policy {name}, exported by panto-env {__version__}."]
     if isinstance(inner, TrainedPolicy):
         facts = inner.facts
@@ -204,77 +194,60 @@ def _card(name: str, driver: Any, task: Task) -> str:
         f"Its constants are for the line {context.catenary.name}, mean length of a span "
         f"{context.alignment.mean_length:.4g} m, pantograph {context.pantograph.name}, "
         f"{low:.4g} to {high:.4g} km/h.",
+        *([f"It is for pantograph {context.collector + 1} of {count} of a train."] if count > 1 else ()),
         f"A call every {context.control_interval:g} s; force limit {context.force_limit:g} N.",
         "It was trained and judged in simulation alone; nobody has run it on a train.",
     ]
     return "\n".join(lines)
 
 
-class _Form:
-    """The two files of a controller."""
+def _source(name: str, inputs: Sequence[Variable], translation: Translation, card: str) -> str:
+    """The C file."""
+    values = ",\n".join(f"        readings->{each.name}" for each in inputs)
+    parts = [
+        _comment(card),
+        f'#include <math.h>\n#include "{name}.h"',
+        translation.constant_tables(),
+        "\n".join(translation.declarations),
+        *translation.functions.values(),
+        f"void {name}_init({name}_state *state)\n{{\n    "
+        f"*state = ({name}_state){{0}};\n    begin(state);\n}}",
+        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force)\n{{\n"
+        f"    const double given[{len(inputs)}] = {{\n{values}}};\n    "
+        f"step(state, given, force);\n}}",
+    ]
+    return "\n\n".join(parts) + "\n"
 
-    def __init__(
-        self,
-        name: str,
-        inputs: tuple[Variable, ...],
-        outputs: tuple[Variable, ...],
-        interval: float,
-        constants: Table,
-        state: Table,
-    ) -> None:
-        self.name, self.inputs, self.outputs, self.interval = name, inputs, outputs, interval
-        self._tables = constants, state
 
-    @cached_property
-    def _translation(self) -> Translation:
-        translation = Translation(*self._tables, f"{self.name}_state")
-        translation.add(acting.begin)
-        translation.add(acting.step)
-        return translation
-
-    def source(self, card: str) -> str:
-        """The C file."""
-        name, translation = self.name, self._translation
-        values = ",\n".join(f"        readings->{each.name}" for each in self.inputs)
-        parts = [
-            _comment(card),
-            f'#include <math.h>\n#include "{name}.h"',
-            translation.constant_tables(),
-            "\n".join(translation.declarations),
-            *translation.functions.values(),
-            f"void {name}_init({name}_state *state)\n{{\n    "
-            f"*state = ({name}_state){{0}};\n    begin(state);\n}}",
-            f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force)\n{{\n"
-            f"    const double given[{len(self.inputs)}] = {{\n{values}}};\n    "
-            f"step(state, given, force);\n}}",
-        ]
-        return "\n\n".join(parts) + "\n"
-
-    def header(self, card: str) -> str:
-        """The header."""
-        name = self.name
-        readings = "\n".join(
-            f"    double {each.name}; /* {each.unit}: {each.description} */" for each in self.inputs
-        )
-        forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(self.outputs))
-        guard = f"{name.upper()}_H"
-        call = (
-            f"One control step, every {self.interval:g} s. force: {forces}. A reading that is no finite "
-            f"number, or above {seeing.LARGEST:g}, counts as its last good one; until each was good once, "
-            "force is 0. It stays finite and within its limit whatever is read."
-        )
-        start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
-        return (
-            f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
-            '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
-            f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
-            "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
-            f"typedef struct {{\n{self._translation.state_fields()}\n}} {name}_state;\n\n"
-            f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
-            f"{_comment(call)}\n"
-            f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
-            "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
-        )
+def _header(
+    name: str,
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    translation: Translation,
+    interval: float,
+    card: str,
+) -> str:
+    """The header."""
+    readings = "\n".join(f"    double {each.name}; /* {each.unit}: {each.description} */" for each in inputs)
+    forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
+    guard = f"{name.upper()}_H"
+    call = (
+        f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite "
+        f"number, or above {seeing.LARGEST:g}, counts as its last good one; until each was good once, "
+        "force is 0. It stays finite and within its limit whatever is read."
+    )
+    start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
+    return (
+        f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
+        '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
+        f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
+        "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
+        f"typedef struct {{\n{translation.state_fields()}\n}} {name}_state;\n\n"
+        f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
+        f"{_comment(call)}\n"
+        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
+        "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
+    )
 
 
 def _comment(text: str) -> str:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from panto_baselines.policies.fb_ff import FORCE_RANGE, FeedbackFeedforward
 from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
 from panto_baselines.policies.guarded import FORCES, Guard, Guarded
+from panto_baselines.policies.line_model import Sampled, line_model, mean_line
+from panto_baselines.policies.repetitive import PEAKS, WASHED, Repetitive, WashoutSettings, harmonics
 from panto_env.base.arrays import METRES_PER_SECOND
 from panto_env.base.errors import InputError
 from panto_env.control import Context, Task
@@ -23,6 +25,7 @@ from panto_env.control.entries import (
     Entry,
     present,
 )
+from panto_env.policies import find_policy
 
 from ..model_file import Actor, Facts, RecurrentActor
 from ..policy import TrainedPolicy
@@ -30,8 +33,7 @@ from . import acting, seeing
 from .guarding import SHOWN
 
 Table = dict[str, Any]
-WITHOUT_GUARD = TrainedPolicy | Proportional | ProportionalDerivative | FeedbackFeedforward
-"""Policies that can be described."""
+Feedback: TypeAlias = Proportional | ProportionalDerivative | FeedbackFeedforward
 
 
 def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
@@ -40,16 +42,25 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
     Raises InputError, one sentence with the policy's name, where the description does not cover it.
     """
     context, inner = task.context(0), without_guard(policy)
-    if not isinstance(inner, WITHOUT_GUARD):
+    law = inner
+    if isinstance(inner, TrainedPolicy):
+        base = inner.facts.residual_of
+        law = None if base is None else find_policy(base)
+    if not (law is None or isinstance(law, Feedback) or type(law) is Repetitive):  # not what is made of it
         raise InputError(
-            f"The policy '{name}' cannot be exported: only a trained agent, p, pd and fb+ff can, each also "
-            "with guarded: before its name; of an ensemble export one member, such as agent-any-line:seed=1."
+            f"The policy '{name}' cannot be exported: only p, pd, fb+ff, repetitive and a trained agent can, "
+            "each also with guarded: before its name; of an ensemble export one member, such as "
+            "agent-any-line:seed=1."
         )
     constants, state = _seen(name, task, context)
+    constants |= {"law": acting.NONE, "layers": 0}
+    if isinstance(law, Repetitive):
+        law.reset(context)
+        _add_repetitive(constants, state, law, task, name)
+    elif law is not None:
+        _add_feedback(constants, state, law, context, name)
     if isinstance(inner, TrainedPolicy):
-        _add_network(constants, state, inner.facts, inner.actor, name)
-    else:
-        _add_feedback(constants, state, inner, context, name)
+        _add_network(constants, state, inner.facts, inner.actor)
     constants["guarded"] = isinstance(policy, Guarded)
     if isinstance(policy, Guarded):
         _add_guard(constants, state, Guard(context, *policy.delays), context)
@@ -120,8 +131,13 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "time": 0,
         "seen": np.zeros(len(layout.entries), dtype=np.float32),
         "action": np.zeros(actions),
+        "base": np.zeros(actions),
         "washed": np.zeros(actions),
+        "average_force": np.zeros(actions + 1),
+        "actuator_force": np.zeros(actions + 1),
     }
+    for each in ("lag", "rate", "average_of_force"):  # of a network's actions, and of the law's
+        constants[each] = np.zeros(actions + 1)
     return constants, state
 
 
@@ -146,18 +162,13 @@ def _source(entry: Entry, front: int, actions: int) -> tuple[int, int]:
     return simple[name], 0
 
 
-def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor, name: str) -> None:
-    if facts.residual_of is not None:
-        raise InputError(
-            f"The policy '{name}' cannot be exported: it adds to '{facts.residual_of}', which has no form in "
-            "C; take an agent that acts alone."
-        )
+def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor) -> None:
     cell = actor.cell if isinstance(actor, RecurrentActor) else None
     units = 0 if cell is None else cell.weight_state.shape[1]
     rows = np.array([len(bias) for bias in actor.biases])
     columns = np.array([weight.shape[1] for weight in actor.weights])
     constants |= {
-        "kind": acting.NETWORK,
+        "network_share": 1.0 if facts.residual_of is None else facts.residual_share,
         "layers": len(rows),
         "rows": rows,
         "columns": columns,
@@ -173,14 +184,16 @@ def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor, nam
     if cell is not None:
         constants |= cell._asdict()
     if facts.washout is not None:
-        share = 1.0 - math.exp(-constants["interval"] / facts.washout.time_constant)
-        constants |= {"lag": facts.washout.lag, "rate": facts.washout.rate, "average_of_force": share}
+        _add_washout(constants, facts.washout, slice(constants["actions"]))
     wide = add_steps_before(constants, state, facts)
     widest = max(wide, *rows.tolist(), *columns.tolist())
     for each, size in (("values", widest), ("following", widest), ("hidden", max(units, 1))):
         state[each] = np.zeros(size, dtype=np.float32)
-    for each in ("average_force", "actuator_force"):
-        state[each] = np.zeros(constants["actions"])
+
+
+def _add_washout(constants: Table, washout: WashoutSettings, which: slice) -> None:
+    constants["lag"][which], constants["rate"][which] = washout.lag, washout.rate
+    constants["average_of_force"][which] = 1.0 - math.exp(-constants["interval"] / washout.time_constant)
 
 
 def add_steps_before(constants: Table, state: Table, facts: Facts) -> int:
@@ -214,13 +227,13 @@ def add_steps_before(constants: Table, state: Table, facts: Facts) -> int:
 def _add_feedback(
     constants: Table,
     state: Table,
-    policy: Proportional | ProportionalDerivative | FeedbackFeedforward,
+    policy: Feedback,
     context: Context,
     name: str,
 ) -> None:
     velocity = next(each for each in context.layout.entries if each.name == "frame velocity")
     constants |= {
-        "kind": acting.FEEDBACK,
+        "law": acting.FEEDBACK,
         "feeds_forward": isinstance(policy, FeedbackFeedforward),
         "dead_zone": 0.0,
         "derivative": getattr(policy, "derivative", 0.0),
@@ -244,6 +257,46 @@ def _add_feedback(
         "lowest": FORCE_RANGE[0],
         "highest": FORCE_RANGE[1],
     }
+
+
+def _add_repetitive(constants: Table, state: Table, policy: Repetitive, task: Task, name: str) -> None:
+    context, actions = task.context(0), constants["actions"]
+    if not policy.counts and constants["sight"] == 0.0:
+        raise InputError(
+            f"The policy '{name}' cannot be exported: these sensors do not measure the place; take "
+            "repetitive:place='counted'."
+        )
+    model = line_model(context, mean_line(context), *policy.delays)
+    sampled = Sampled(model, constants["interval"])
+    poles, modes = np.linalg.eig(model.a)
+    residues = (model.c[0] @ modes) * np.linalg.solve(modes, model.b[:, 0]) / (2 * math.pi)
+    poles /= 2 * math.pi  # Hz
+    learning, forgetting, response = np.abs(policy.gains)
+    slowest = task.settings.speeds[0]
+    most = len(harmonics(slowest / context.alignment.mean_length))
+    constants |= {
+        "law": acting.REPETITIVE,
+        "counts": policy.counts,
+        "learning": float(learning),
+        "forgetting": float(forgetting),
+        "response": float(response),
+        "most_harmonics": most,
+        "line_states": sampled.size,
+        "line_a": sampled.a,
+        "line_b": sampled.b,
+        "line_c": sampled.c[0],
+        "line_modes": len(poles),
+        "pole": np.array([poles.real, poles.imag]),
+        "residue": np.array([residues.real, residues.imag]),
+        "line_delay": model.delay,
+        "sine": np.sin(2 * np.pi * np.arange(PEAKS) / PEAKS),
+    }
+    _add_washout(constants, WASHED, slice(actions, None))
+    state |= {name: np.zeros((2, most)) for name in ("turn", "towards", "learnt")}
+    state |= {name: np.zeros(sampled.size) for name in ("line", "following_line")}
+    state |= {"sums": np.zeros(4), "harmonics": 0}
+    numbers = "force_average force_share counted measured_speed learns_at span_share spans sum_steps"
+    state |= dict.fromkeys((*numbers.split(), "first_spans", "first_count", "trust"), 0.0)
 
 
 def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -> None:

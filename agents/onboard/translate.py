@@ -71,10 +71,8 @@ class Translation:
         for name, value in self.used.items():
             kind = type_of(value)
             if np.ndim(value):
-                array = np.asarray(value)
-                numbers = ", ".join(literal(each, kind) for each in array.ravel())
-                flat = "\n    ".join(textwrap.wrap(numbers, 104))
-                lines.append(f"static const {kind} {name}{_sizes(array)} = {_braces(array, flat, kind)};")
+                initial = _braces(np.asarray(value), kind)
+                lines.append(f"static const {kind} {name}{_sizes(value)} = {initial};")
             elif kind != INT:
                 lines.append(f"static const {kind} {name} = {literal(value, kind)};")
         return "\n".join(lines)
@@ -85,15 +83,12 @@ class Translation:
         return "\n".join(f"    {type_of(value)} {name}{_sizes(value)};" for name, value in entries)
 
 
-def _braces(array: Any, flat: str, kind: str) -> str:
+def _braces(array: Any, kind: str) -> str:
     """Initialiser of an array, with the braces of its dimensions."""
-    if array.ndim == 1:
-        return "{\n    " + flat + "}"
-    rows = []
-    for row in array:
-        numbers = ", ".join(literal(each, kind) for each in row.ravel())
-        rows.append(_braces(row, "\n    ".join(textwrap.wrap(numbers, 104)), kind))
-    return "{" + ",\n".join(rows) + "}"
+    if array.ndim > 1:
+        return "{" + ",\n".join(_braces(row, kind) for row in array) + "}"
+    numbers = textwrap.wrap(", ".join(literal(each, kind) for each in array), 104)
+    return "{\n    " + "\n    ".join(numbers) + "}"
 
 
 def type_of(value: Any) -> str:
@@ -109,7 +104,8 @@ def literal(value: Any, kind: str) -> str:
     if kind == INT:
         return str(int(value))
     if not math.isfinite(value):
-        return "INFINITY" if value > 0 else "-INFINITY"
+        huge = "HUGE_VALF" if kind == SINGLE else "HUGE_VAL"  # INFINITY is a float
+        return huge if value > 0 else f"-{huge}"
     return f"{np.float32(value)}f" if kind == SINGLE else repr(float(value))
 
 
@@ -214,7 +210,7 @@ class _Body:
             self._put(f"{own} {target.id} = {text};")
             return
         place, own = self._expression(target)
-        self._put(f"{place} = {f'(float)({text})' if (own, kind) == (SINGLE, DOUBLE) else text};")
+        self._put(f"{place} = {f'({own})({text})' if {own, kind} == {SINGLE, DOUBLE} else text};")
 
     def _if(self, test: ast.expr, body: list[ast.stmt], otherwise: list[ast.stmt]) -> None:
         known = self._known(test)
@@ -281,7 +277,7 @@ class _Body:
             case ast.Attribute(value=ast.Name(id=table), attr=name) if table in self._tables:
                 return self._entry(table, name, node)
             case ast.Attribute(value=ast.Name(id="math"), attr="inf"):
-                return "INFINITY", LITERAL
+                return literal(math.inf, DOUBLE), LITERAL
             case ast.Subscript(value=array, slice=place):
                 return self._element(array, place)
             case ast.BinOp(left=left, op=operator, right=right):

@@ -251,12 +251,12 @@ class Repetitive(TunableLaw):
         super().__init__(gains)
         if place not in PLACES:
             raise ValueError(f"place must be one of {', '.join(PLACES)}, not {shown(place)}")
-        self._delays, self._counts = (delay, lag), place == "counted"
+        self.delays, self.counts = (delay, lag), place == "counted"
 
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
-        model = line_model(context, mean_line(context), *self._delays)
+        model = line_model(context, mean_line(context), *self.delays)
         interval, limit = context.control_interval, context.force_limit
         pace = Pace(*self.gains[-len(Pace._fields) :])
         self._model, self._speed, self._learns_at = model, context.speed, context.speed
@@ -286,10 +286,10 @@ class Repetitive(TunableLaw):
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         self._follow(float(self.read(observations, "speed").mean()))
         error = self._from_average(self.read(observations, "contact force"))
-        if self._counts:
+        if self.counts:
             way = self.read(observations, "speed") * self.context.control_interval
             self._counted = self._counted + 2 * np.pi * way / self.context.alignment.mean_length
-        angle = self._counted if self._counts else self.span_angle(observations)
+        angle = self._counted if self.counts else self.span_angle(observations)
         learnt = self._learner(error, self._sampled.c[0] @ self._state, angle)
         force = self._washout(self.whole(observations, learnt))
         self._state = self._sampled.a @ self._state + np.multiply.outer(self._sampled.b, force)

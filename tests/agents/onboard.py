@@ -1,4 +1,4 @@
-"""A controller in C beside the environment's policy: built by gcc, loaded, and given the same readings."""
+"""A controller in C beside the environment's policy: compiled, loaded, and given the same readings."""
 
 import ctypes
 import shutil
@@ -18,6 +18,10 @@ EXACT = {"kind": "delayed", "delay": 0.005}
 scales by the true speed; a controller on a train has only what it reads."""
 AS_BUILT = {"actuator": "realistic", "sensors": EXACT, "line_condition": "as-built", "accuracy": "fast"}
 needs_gcc = pytest.mark.skipif(GCC is None, reason="there is no gcc")
+COMPILERS = [
+    pytest.param(each, marks=pytest.mark.skipif(shutil.which(each) is None, reason=f"there is no {each}"))
+    for each in ("gcc", "clang")
+]
 
 SIZE = """
 #include "{name}.h"
@@ -42,11 +46,11 @@ int main(void)
 """
 
 
-def build(exported, folder, target, extra, *options):
+def build(exported, folder, target, extra, *options, compiler="gcc"):
     """Compile a controller with some more C, and return the file made."""
     exported.write(folder / f"{exported.name}.c")
     (folder / "extra.c").write_text(extra.format(name=exported.name, outputs=len(exported.outputs)))
-    command = [GCC, *STRICT, *options, f"{exported.name}.c", "extra.c", "-o", target, "-lm"]
+    command = [compiler, *STRICT, *options, f"{exported.name}.c", "extra.c", "-o", target, "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return folder / target
@@ -55,8 +59,9 @@ def build(exported, folder, target, extra, *options):
 class Compiled:
     """A controller in C, as a library in this process."""
 
-    def __init__(self, exported, folder):
-        path = build(exported, folder, f"{exported.name}.so", SIZE, "-shared", "-fPIC")
+    def __init__(self, exported, folder, compiler="gcc"):
+        name = f"{exported.name}-{compiler}.so"
+        path = build(exported, folder, name, SIZE, "-shared", "-fPIC", compiler=compiler)
         library = ctypes.CDLL(str(path))
         library.size.restype = ctypes.c_ulong
         self.bytes_of_state = library.size()
@@ -75,9 +80,9 @@ class Compiled:
         return list(self._force)
 
 
-def fed(exported, folder, readings):
+def fed(exported, folder, readings, compiler="gcc"):
     """Forces, (steps, outputs), of a program with sanitizers that is fed readings, (steps, inputs)."""
-    program = build(exported, folder, "feed", FEED, *SANITIZED)
+    program = build(exported, folder, "feed", FEED, *SANITIZED, compiler=compiler)
     done = subprocess.run([program], input=np.ascontiguousarray(readings).tobytes(), capture_output=True)
     assert done.returncode == 0, done.stderr
     assert not done.stderr, done.stderr

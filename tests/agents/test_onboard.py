@@ -1,6 +1,7 @@
 """Policies as C: the same actions as in the environment, the same pass, and no harm whatever is read."""
 
 import subprocess
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,11 +13,12 @@ from panto_agents.onboard import exported
 from panto_agents.onboard.parts import new_state, parts_of
 from panto_agents.onboard.translate import Translation
 from panto_agents.policy import Prepared
+from panto_baselines.policies.repetitive import Repetitive
 from panto_env import InputError
 from panto_env.analysis.simulation import ready_pass
 from panto_env.cli import make_app
 
-from .onboard import AS_BUILT, GCC, STRICT, Compiled, fed, needs_gcc, passed
+from .onboard import AS_BUILT, COMPILERS, GCC, STRICT, Compiled, fed, needs_gcc, passed
 
 HIGH_SPEED = {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": 280.0, "distance": 900.0} | AS_BUILT
 FAST_LINE = HIGH_SPEED | {"catenary": "section:fast-line"}
@@ -36,7 +38,8 @@ IN_HEAD = HIGH_SPEED | {
 SHINKANSEN = HIGH_SPEED | {"catenary": "shinkansen-simple", "pantograph": "identified-2dof"}
 FAULTY = HIGH_SPEED | {"faults": ["readings-silent"], "distance": 1500.0}
 FROZEN = HIGH_SPEED | {"faults": ["force-frozen"], "distance": 1500.0}
-OF_A_PASS = ("distance", "speed_kmh", "line_condition", "faults")
+BRAKING = HIGH_SPEED | {"speed_profile": "place:0=280,600=280,1100=230,1400=230", "distance": 1700.0}
+OF_A_PASS = ("distance", "speed_kmh", "speed_profile", "line_condition", "faults")
 CASES = {
     "any-pantograph": ("agent-any-pantograph", HIGH_SPEED),
     "robust": ("agent-robust", HIGH_SPEED),
@@ -53,6 +56,11 @@ CASES = {
     "pd": ("pd", HIGH_SPEED),
     "forward": ("fb+ff:dead_zone=10,gain=0.3", HIGH_SPEED),
     "centred": ("pd", HIGH_SPEED | {"observation": "centred"}),
+    "repetitive": ("repetitive", HIGH_SPEED),
+    "repetitive-counted": ("repetitive:place='counted'", HIGH_SPEED),
+    "guarded-repetitive": ("guarded:repetitive", HIGH_SPEED | {"distance": 1500.0}),
+    "added": ("agent-train", BEHIND),
+    "small": ("agent-small", HIGH_SPEED),
     "washout": ("p:gain=0.3,washout=1.0", HIGH_SPEED),
 }
 """Policies, and the passes in which they are compared."""
@@ -82,7 +90,9 @@ def check_same(case, folder):
     compiled.begin()
     closed, _ = passed(policy, settings | {"washout": 0.0}, compiled, closes=True)
     assert closed == pytest.approx(sigma, rel=5e-5)
-    size = subprocess.run(["size", folder / f"{controller.name}.so"], capture_output=True, text=True).stdout
+    size = subprocess.run(
+        ["size", folder / f"{controller.name}-gcc.so"], capture_output=True, text=True
+    ).stdout
     print(f"{case}: {most:.1e}, sigma {sigma:.4f} and {closed:.4f} N, state {compiled.bytes_of_state} bytes")
     print(size)
 
@@ -116,25 +126,61 @@ def hostile(inputs, count, seed=0):
     return read
 
 
-def check_unharmed(policy, settings, folder, count):
+def check_unharmed(policy, settings, folder, count, compiler="gcc"):
     controller = made(policy, settings)
-    forces = fed(controller, folder, hostile(len(controller.inputs), count))
+    forces = fed(controller, folder, hostile(len(controller.inputs), count), compiler)
     assert len(forces) == count
     assert np.isfinite(forces).all()
     assert np.abs(forces).max() <= controller.constants["force_limit"]
     assert np.ptp(forces) > 1.0
 
 
-@needs_gcc
-def test_whatever_is_read_the_force_is_finite_and_within_its_limit(tmp_path):
-    check_unharmed("guarded:pd", HIGH_SPEED, tmp_path, 100_000)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_whatever_is_read_the_force_is_finite_and_within_its_limit(compiler, tmp_path):
+    check_unharmed("guarded:pd", HIGH_SPEED, tmp_path, 100_000, compiler)
 
 
 @needs_gcc
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["any-pantograph", "robust", "high-speed", "trailing", "guarded", "washout"])
+@pytest.mark.parametrize(
+    "case", ["any-pantograph", "robust", "high-speed", "trailing", "guarded", "guarded-repetitive", "washout"]
+)
 def test_whatever_any_policy_reads(case, tmp_path):
     check_unharmed(*CASES[case], tmp_path, 100_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_million_readings_of_a_network(compiler, tmp_path):
+    check_unharmed("agent-small", HIGH_SPEED, tmp_path, 1_000_000, compiler)
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("policy", ["repetitive", "agent-small"])
+def test_every_compiler_s_code_does_what_the_description_does(policy, compiler, tmp_path):
+    controller = made(policy, HIGH_SPEED)
+    compiled, plain = Compiled(controller, tmp_path, compiler), controller.controller()
+    steps = np.arange(800)
+    readings = np.tile([0.05, 0.08, 0.1, 0.1, 120.0, 0.0, 80.0], (len(steps), 1))
+    readings[:, 5] = 0.0123 * steps
+    readings += np.random.default_rng(0).normal(0, [0.01, 0.01, 0.1, 0.1, 10.0, 0.0, 0.1], readings.shape)
+    readings[:, 4] += 40 * np.sin(2 * np.pi * readings[:, 5])
+    forces = np.array([compiled.step(read) for read in readings])
+    np.testing.assert_allclose(forces, [plain.step(read) for read in readings], atol=1e-3)
+    assert np.ptp(forces) > 1.0
+
+
+class FromStart(Repetitive):
+    """It begins with the speed at the start of a pass, as in C, not with the mean of all."""
+
+    def begin(self, context, lanes):
+        super().begin(replace(context, speed=280 / 3.6), lanes)
+
+
+@needs_gcc
+def test_repetitive_control_learns_on_at_another_speed(tmp_path):
+    controller = Compiled(made("repetitive", BRAKING), tmp_path)
+    assert passed(FromStart(), BRAKING, controller)[1] < CLOSE
 
 
 def test_plain_python_bears_the_same():
@@ -189,10 +235,9 @@ def test_a_model_with_steps_before_its_network_sees_the_same():
 
 
 REFUSED = {
-    "repetitive": "only a trained agent, p, pd and fb\\+ff",
+    "adaptive": "only p, pd, fb\\+ff, repetitive and a trained agent",
     "fb+ff:reading='printed'": "only with one gain",
     "agent-any-line-five": "export one member",
-    "agent-train": "it adds to 'repetitive'",
 }
 
 

@@ -25,7 +25,14 @@ from panto_env.policies import find_policy
 from ..marks import some_at_once
 from .test_stored_agents import given
 
-NAMES = ["agent-any-pantograph", "agent-robust", "agent-any-line", "agent-high-speed", "agent-head"]
+NAMES = [
+    "agent-any-pantograph",
+    "agent-small",
+    "agent-robust",
+    "agent-any-line",
+    "agent-high-speed",
+    "agent-head",
+]
 
 
 class Listener:

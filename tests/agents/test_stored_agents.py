@@ -28,6 +28,7 @@ AGENTS = {
     "any-line": ("agent-any-line", 0.6),
     "any-pantograph": ("agent-any-pantograph", 0.6),
     "robust": ("agent-robust", 0.6),
+    "small": ("agent-small", 0.65),
     "trailing": ("agent-trailing", 0.6),
     "trailing-alone": ("agent-trailing-alone", 0.6),
 }
@@ -87,6 +88,10 @@ def test_each_is_small_holds_nothing_pickled_and_says_what_made_it(name):
         assert "dirty" not in facts.commit
         assert find_policy(f"agent-{name}:seed={seed}").facts == facts
         assert facts.needs.observation in ("measured", "deviations")
+
+
+def test_the_small_one_has_less_than_four_kilobytes_of_weights():
+    assert sum(each.nbytes for each in load_file(FOLDER / "small.safetensors").values()) < 4000
 
 
 @pytest.mark.parametrize("name", NAMES)
