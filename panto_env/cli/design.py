@@ -22,9 +22,7 @@ from ..terminal import Json, bars, console, print_json, print_table
 
 
 def design(
-    study: Annotated[
-        str, Argument(help="TOML file: what is searched, at which speeds; docs/design.md.")
-    ],
+    study: Annotated[str, Argument(help="TOML file: what is searched, at which speeds; docs/design.md.")],
     output: Annotated[
         Path, Option(help="Folder of what was tried, which a search that was broken off goes on from.")
     ] = Path("runs/design"),
