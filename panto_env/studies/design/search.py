@@ -172,6 +172,7 @@ def _judged(arguments: dict[str, Any]) -> Found:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AccuracyWarning)
+            warnings.simplefilter("ignore", UnusualWarning)
             run = simulate(**arguments)
     except InputError as error:
         return Found(math.nan, REFUSED, (), str(error))
