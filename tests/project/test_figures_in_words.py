@@ -171,7 +171,7 @@ SENTENCES = {
             ),
         ),
         (
-            "`agent-robust` reduces σ by {:.1f} % there, `agent-any-pantograph` by {:.1f} %; `repetitive` is not",
+            "`agent-robust` reduces σ by {:.1f} % there, `agent-any-pantograph` by {:.1f} %; `repetitive` is",
             lambda: [less("permissible", each)[0] for each in ("agent-robust", "agent-any-pantograph")],
         ),
         (
