@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .fit import Found
+from .fit import Found, slack_droppers
 from .stored import Stored
 
 SMALLER = 0.5
@@ -40,8 +40,8 @@ class Drift:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Why it is less sure than it says."""
-        return *self.earlier.notes, *self.later.notes
+        """Droppers that became slack, and why it is less sure than it says."""
+        return *slack_droppers(self.changed), *self.earlier.notes, *self.later.notes
 
 
 def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None = None) -> Drift:

@@ -18,6 +18,8 @@ from .problem import problem
 from .solve import Fitting, Solution
 from .values import USUAL, Value
 
+SLACK = 0.015
+"""Length (m) by which a dropper is surely too long to carry anything: three tolerances. Own choice."""
 INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
 IDENTIFIABLE = 0.6
@@ -53,6 +55,16 @@ class Found:
     def differs(self) -> bool:
         """Whether the design's value lies outside the interval."""
         return self.identifiable and abs(self.difference) > INTERVAL * self.deviation
+
+
+def slack_droppers(found: Sequence[Found]) -> list[str]:
+    """A sentence for each dropper that is so much too long that it carries nothing."""
+    return [
+        f"{each.value.name} reads {each.value.scale * each.difference:+.0f} mm: it carries nothing, so it is "
+        "slack, probably broken; the values of its neighbours make up for that and are less sure."
+        for each in found
+        if each.value.kind == "droppers" and each.interval[0] > SLACK
+    ]
 
 
 @dataclass(frozen=True, eq=False)

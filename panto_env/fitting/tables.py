@@ -10,7 +10,7 @@ import numpy as np
 from ..base.plotting import POSITION, legend_above, mark_supports, series_colour, stacked
 from ..base.table import Alarm, Table
 from ..terminal import number
-from .fit import INTERVAL, WHITE, Fit, Found
+from .fit import INTERVAL, WHITE, Fit, Found, slack_droppers
 from .stored import doubts
 from .values import FREE
 
@@ -123,7 +123,7 @@ def remarks(fit: Fit) -> list[str]:
             found.append(f"{what}: the records tell {known or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
-    return [*found, *doubts(fit)]
+    return [*found, *slack_droppers(fit.found), *doubts(fit)]
 
 
 def plain(fit: Fit) -> dict[str, Any]:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from panto_env.base.errors import InputError
-from panto_env.fitting.values import FREE, TOLERANCES, USUAL, WAVES, Design, Values
+from panto_env.fitting.fit import Found, slack_droppers
+from panto_env.fitting.values import FREE, TOLERANCES, USUAL, WAVES, Design, Value, Values
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 
 SPANS = 14
@@ -112,3 +113,9 @@ def test_damping_never_drives_waves_and_none_stays_none(plan):
     undamped = replace(plan, catenary=plan.catenary.model_copy(update={"damping": bare}))
     names = [value.name for value in everything(undamped).all if value.kind == "damping"]
     assert names == ["damping beta"]
+
+
+def test_a_dropper_that_is_far_too_long_is_called_slack():
+    value = Value("droppers", "dropper 4", "mm", 1e3, 5e-3, 130.0, (3,))
+    (sentence,) = slack_droppers([Found(value, by, 1e-3) for by in (0.027, 0.015, -0.03)])
+    assert "dropper 4 reads +27 mm: it carries nothing, so it is slack, probably broken" in sentence
