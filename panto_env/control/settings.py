@@ -484,7 +484,8 @@ class RunSettings(Numerics):
         slow, quick = self.speeds
         drift = largest_drift(self.drift)
         train = self.train
-        hard = any(collector.pantograph.hard_contact for collector in train.collectors)
+        contacts = [own.pantograph for own in train.collectors if own.pantograph.hard_contact]
+        hard = max((float(own.contact_stiffness) for own in contacts), default=0.0)
         speeds, conditions = (slow - drift, quick + drift), self.line_condition
         return Runs(speeds, self.control_interval, conditions, hard, train.length)
 

@@ -59,7 +59,7 @@ class Runs(NamedTuple):
     speeds: tuple[float, float] = (from_kmh(250), from_kmh(300))  # lowest and highest (m/s)
     control_interval: float = 0.01  # s, a multiple of the time step unless that is given
     conditions: Sequence[LineCondition] = (LineCondition(),)
-    hard_contact: bool = False  # whether a contact is stiffer or more damped than a collector strip's
+    hard_contact: float = 0.0  # stiffness (N/m) of one stiffer or more damped than a collector strip's
     train_length: float = 0.0  # from the first collector to the last one (m)
 
     def whole_part(self, longest: float) -> float:
