@@ -259,7 +259,10 @@ def check(case):
         return "too stiff to be compared"
     where = ", spans that differ" * bool(case["sequence"]) + ", drawn section" * section
     where += ", stitched" * bool(case["stitch"]) + ", side wind" * ("side_wind" in case["line_condition"])
-    assert not fine.terminated
+    if fine.terminated:  # by a limit that this run came close to
+        assert "at a support, all the room" in fine.ending
+        assert run.uplift.max() > 0.95 * fine.uplift.max()
+        return "ended on the finer grid"
     ours, true = run.summary(spans), fine.summary(spans)
     if pantograph.hard_contact:
         assert ours.mean == pytest.approx(true.mean, rel=HARD_CONTACT_MEAN_ERROR / 100, abs=0.2)
