@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 
@@ -30,11 +31,17 @@ def port():
         free.bind(("127.0.0.1", 0))
         number = free.getsockname()[1]
     words = [sys.executable, "-c", "from panto_env.cli import main; main()", "app", "--no-browser"]
-    with subprocess.Popen([*words, "--port", str(number)], stdout=subprocess.PIPE, text=True) as command:
-        assert command.stdout.readline() == f"The page is http://127.0.0.1:{number}/; Ctrl+C ends it.\n"
-        yield number
-        command.send_signal(signal.SIGINT)
-        assert command.wait(60) == 0
+    # Whoever runs tests in the background may have interrupts ignored, and children inherit that.
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    given = {"stdout": subprocess.PIPE, "text": True, "preexec_fn": heard}
+    with subprocess.Popen([*words, "--port", str(number)], **given) as command:
+        try:
+            assert command.stdout.readline() == f"The page is http://127.0.0.1:{number}/; Ctrl+C ends it.\n"
+            yield number
+            command.send_signal(signal.SIGINT)
+            assert command.wait(60) == 0
+        finally:
+            command.kill()  # or a page that does not end would hold up all tests
 
 
 @pytest.fixture
