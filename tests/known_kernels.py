@@ -16,6 +16,8 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from filelock import FileLock
+
 from panto_env.backend.kept_kernels import BROUGHT, CLASS
 from panto_env.base.machine import cores
 
@@ -51,11 +53,16 @@ def compile_all(statements: tuple[str, ...], environment: dict[str, str]) -> Non
         list(processes.map(run, statements))
 
 
+BUILDING = FileLock(Path(tempfile.gettempdir()) / "panto-env-build.lock")
+"""Held while sources are packed, which writes into the checkout: two at once are in each other's way."""
+
+
 def build_wheel(folder: Path, statements: tuple[str, ...] = USUAL) -> None:
     """Build a wheel of the packed sources with the kernels of these statements."""
     own = [sys.executable, "-m", "build", "--no-isolation"]
     with tempfile.TemporaryDirectory() as made:
-        subprocess.run([*own, "--sdist", "--outdir", made, ROOT], check=True, stdout=subprocess.DEVNULL)
+        with BUILDING:
+            subprocess.run([*own, "--sdist", "--outdir", made, ROOT], check=True, stdout=subprocess.DEVNULL)
         (packed,) = Path(made).glob("*.tar.gz")
         with tarfile.open(packed) as sources:
             sources.extractall(made, filter="data")

@@ -16,12 +16,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from filelock import FileLock
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 import panto_env
 
-from ..known_kernels import BEGIN, USUAL, build_wheel
+from ..known_kernels import BEGIN, BUILDING, USUAL, build_wheel
 
 ROOT = Path(panto_env.__file__).parents[1]
 FOLDERS = {"agents": "panto_agents", "baselines": "panto_baselines", "configs": "panto_configs"}
@@ -42,10 +43,14 @@ print(f"{deviation:.3f}", panto_env.__file__)
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """A wheel, built from the packed sources."""
-    folder = tmp_path_factory.mktemp("dist")
-    built = run([sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT])
-    assert built.returncode == 0, built.stderr
+    """A wheel, built from the packed sources, one for all processes that test it."""
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared.parent if "PYTEST_XDIST_WORKER" in os.environ else shared
+    folder = shared / "dist"
+    with FileLock(shared / "dist.lock"), BUILDING:
+        if not list(folder.glob("*.whl")):
+            built = run([sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT])
+            assert built.returncode == 0, built.stderr
     (path,) = folder.glob("*.whl")
     return path
 
