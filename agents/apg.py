@@ -33,7 +33,7 @@ from panto_env.control.lines import on_example
 from panto_env.control.settings import run_settings
 from panto_env.policies import Policy, find_policy
 
-from .device_ppo import OwnLearner
+from .device_ppo import L, OwnLearner
 from .linear_pass import Base, Columns, LinearPass, Numbers, Pulsing, columns_of, measure
 from .model_file import Actor, Cell
 from .policy import WashedOut
@@ -41,7 +41,7 @@ from .rollout import Entries, Given, Slopes, Trace, Washout, Weights, backward, 
 from .settings import Training
 
 if TYPE_CHECKING:
-    from .algorithm import APG
+    from .algorithm import APG, InRounds
 
 FIRST = 0.01
 """Factor on the last layer's initial weights: the first passes are nearly passive."""
@@ -339,22 +339,30 @@ class PassLanes:
         """Do nothing: nothing is open."""
 
 
-class APGLearner(OwnLearner[PassLanes]):
-    """Measures passes in rounds, and descends the variance of the contact force through the latest ones."""
+class NetworkLearner(OwnLearner[L]):
+    """Learns a ``Network`` from whole passes."""
 
-    def __init__(self, settings: APG, lanes: PassLanes, seed: int) -> None:
-        """lanes: where passes are measured. seed: of network and minibatches."""
+    def __init__(self, settings: InRounds, lanes: L, entries: int, seed: int) -> None:
+        """lanes: where passes are run. entries: of an observation. seed: of network and minibatches."""
         super().__init__(lanes, seed)
         self._settings = settings
         kwargs = settings.policy_kwargs()
         shape = tuple(kwargs["net_arch"]), kwargs["activation_fn"]
-        self.network = Network(lanes.entries, *shape, settings.recurrent_units)
+        self.network = Network(entries, *shape, settings.recurrent_units)
         self._optimiser = torch.optim.Adam(self.network.parameters())
-        self._rounds: deque[list[Group]] = deque(maxlen=settings.rounds_kept)
 
     def set_random_seed(self, seed: int) -> None:
         """Seed of the minibatches."""
         self._random = np.random.default_rng(seed)
+
+
+class APGLearner(NetworkLearner[PassLanes]):
+    """Measures passes in rounds, and descends the variance of the contact force through the latest ones."""
+
+    def __init__(self, settings: APG, lanes: PassLanes, seed: int) -> None:
+        """lanes: where passes are measured. seed: of network and minibatches."""
+        super().__init__(settings, lanes, lanes.entries, seed)
+        self._rounds: deque[list[Group]] = deque(maxlen=settings.rounds_kept)
 
     def _collect(self) -> list[Group]:
         groups, steps = self._lanes.measure(self._settings.actor(self))

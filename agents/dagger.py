@@ -20,8 +20,7 @@ from panto_env.control.observation import OBSERVATION_SETTINGS
 from panto_env.control.settings import run_settings
 
 from .algorithm import DAgger, agent_alone
-from .apg import Network
-from .device_ppo import OwnLearner
+from .apg import Network, NetworkLearner
 from .linear_pass import Numbers, begun
 from .model_file import Actor, Needs
 from .policy import WashedOut
@@ -94,22 +93,13 @@ class TaughtLanes:
         """Do nothing: nothing is open."""
 
 
-class DAggerLearner(OwnLearner[TaughtLanes]):
+class DAggerLearner(NetworkLearner[TaughtLanes]):
     """Lets its network act in rounds of passes, and fits it to what the teacher would have done."""
 
     def __init__(self, settings: DAgger, lanes: TaughtLanes, seed: int) -> None:
         """lanes: where passes are run. seed: of network and minibatches."""
-        super().__init__(lanes, seed)
-        self._settings = settings
-        kwargs = settings.policy_kwargs()
-        shape = tuple(kwargs["net_arch"]), kwargs["activation_fn"]
-        self.network = Network(lanes.entries, *shape, settings.recurrent_units)
-        self._optimiser = torch.optim.Adam(self.network.parameters())
+        super().__init__(settings, lanes, lanes.entries, seed)
         self._lessons: list[Lesson] = []
-
-    def set_random_seed(self, seed: int) -> None:
-        """Seed of the minibatches."""
-        self._random = np.random.default_rng(seed)
 
     def _collect(self) -> list[Lesson]:
         lessons = self._lanes.teach(self._settings.actor(self) if self._n_updates else None)

@@ -98,17 +98,23 @@ def passive_at_mean(
     Raises InputError as ``simulate`` does.
     """
     given = {"catenary": _LINE, "pantograph": _PANTOGRAPH} | settings | {"mean_force": mean_force}
-    checked = far_enough(on_drawn_line(run_settings(given), lambda: np.random.default_rng(seed)))
+    checked = _on_its_line(given, np.random.default_rng(seed))
     met: deque[Trajectory] = deque(maxlen=1)
     if all(each == each.in_still_air for each in checked.line_condition):  # it is trimmed in still air
         trim_of_pass(checked, seed, trimmed_over, partial(passive_mean, keep=met.append))
-    again = partial(simulate, **given, seed=seed, trimmed_over=trimmed_over, record_droppers=False)
-    return met[0] if met else again()
+    if met:
+        return met[0]
+    return simulate(**given, seed=seed, trimmed_over=trimmed_over, record_droppers=False)
+
+
+def _on_its_line(given: dict[str, Any], random: np.random.Generator) -> RunSettings:
+    """Settings of a pass, on the line that it has."""
+    return far_enough(on_drawn_line(run_settings(given), lambda: random))
 
 
 def _ready(given: dict[str, Any], seed: int, trimmed_over: SpanChoice, record_droppers: bool) -> Task:
     random = np.random.default_rng(seed)
-    checked = far_enough(on_drawn_line(run_settings(given), lambda: random))
+    checked = _on_its_line(given, random)
     trim = trim_of_pass(checked, seed, trimmed_over, passive_mean)
     task = Task(checked, record_droppers=record_droppers, trim=trim)
     task.reset(0, random)

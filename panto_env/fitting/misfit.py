@@ -132,7 +132,7 @@ class Problem:
             by_own[0, k] = (near[0] - near[1]) / (2 * sample)
             by_own[1, k] = (target - target.mean() * by_static) / gain
             by_own[2, k] = -by_static / gain
-            by_own[3, k] = by_own[0, k] * part.measured.from_middle
+            by_own[3, k] = by_own[0, k] * (part.measured.place - part.measured.middle)
             jacobian.append(part.measured.coefficients(np.vstack([by_value, *by_own])).T)
             residual.append(part.measured.coefficients(target - force))
         return replace(state, static_forces=static), np.concatenate(jacobian), np.concatenate(residual)

@@ -56,10 +56,10 @@ class Measured:
         """Force of the record, low-passed (N), (samples,)."""
         return zero_phase_low_pass(self.piece.force, self.piece.time_step)
 
-    @cached_property
-    def from_middle(self) -> Array:
-        """Way from the middle of what is compared, (places,) (m)."""
-        return np.asarray(self.place - 0.5 * (self.place[0] + self.place[-1]))
+    @property
+    def middle(self) -> float:
+        """Middle of what is compared (m)."""
+        return float(0.5 * (self.place[0] + self.place[-1]))
 
     def force(self, shift: float = 0.0, scale: float = 0.0) -> Array:
         """Measured force (N), (places,), where the record's positions are short.
@@ -67,7 +67,7 @@ class Measured:
         shift: by how much in the middle of what is compared (m). scale: by which share from there on.
         """
         position = self.piece.position - self.offset
-        position = position + shift + scale * (position - 0.5 * (self.place[0] + self.place[-1]))
+        position = position + shift + scale * (position - self.middle)
         return between(self.smooth, np.interp(self.place, position, np.arange(len(position))))
 
     @cached_property

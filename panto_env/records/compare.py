@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, to_kmh
+from ..base.arrays import METRES_PER_SECOND, Array, to_kmh
 from ..base.errors import InputError
 from ..base.table import Table
 from ..metrics.compliance import Criterion, criteria_table
@@ -20,7 +20,7 @@ from ..metrics.figures import LABELS, STATISTICS, statistics
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
-from .likeness import PER_HOUR, SUM, UNLIKE, check_period, check_reading, doubts
+from .likeness import SUM, UNLIKE, check_period, check_reading, doubts
 from .record import Record, Samples, Shift, find_shift
 
 SAME_SPEED = 0.03
@@ -86,8 +86,9 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     begin, end = run.alignment.limits(covered)
     check_period(Samples(record), run.alignment.mean_length)
     same, notes = _at_speed(record, run)
-    found = find_shift(Samples(same), run, begin, end, shift)
-    check_reading(Samples(same), run, begin, end, shift, found)
+    unmoved = Samples(same)
+    found = find_shift(unmoved, run, begin, end, shift)
+    check_reading(unmoved, run, begin, end, shift, found)
     moved = [replace(piece, position=piece.position + found.value) for piece in same.pieces]
     samples = Samples(replace(same, pieces=tuple(moved)))
     spans, own, other = _spans(samples, run, begin, end)
@@ -95,14 +96,14 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     uplift, where = _uplift(samples, run, begin, end)
     heights = np.array([each.height_range for each in spans if not math.isnan(each.height_range[0])])
     height = 1e3 * float((heights[:, 1] - heights[:, 0]).mean()) if len(heights) else math.nan
-    notes += doubts(found, figures["mean"])
+    ratio = figures["mean"][0] / figures["mean"][1]
+    notes += doubts(found, ratio)
     range_of_height = "range of the contact point's height"
     values = {"uplift at a support": uplift, range_of_height: height}
     missing = tuple(name for name, value in values.items() if math.isnan(value))
     alike = Criterion(
         "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
     )
-    ratio = figures["mean"][0] / figures["mean"][1]
     heights_note = "mean over the spans of the range within each, low-passed at 20 Hz"
     criteria = (
         Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
@@ -128,7 +129,7 @@ def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
     same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
     if not same:
         ratio = run.speed / record.longest.speed
-        if abs(ratio / PER_HOUR - 1) <= SAME_SPEED:
+        if abs(ratio / METRES_PER_SECOND - 1) <= SAME_SPEED:
             raise InputError(
                 f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's "
                 f"{run.speed_kmh:.1f} km/h, 3.6 times as much: if the speed was recorded in m/s, tell: "

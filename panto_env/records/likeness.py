@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..base.arrays import METRES_PER_SECOND, Array
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
 from .record import Piece, Samples, Shift, find_shift
@@ -22,8 +22,6 @@ BETTER = 0.1
 """How much more another reading of a record must correlate to be called the right one. Own choice."""
 SUM = 1.5
 """Ratio of mean forces from which on they can't be of one pantograph under the same force. Own choice."""
-PER_HOUR = 3.6
-"""km/h in 1 m/s: positions that were made from a speed in the wrong unit are wrong by it."""
 PERIODIC, MORE, FEWEST = 0.3, 0.2, 8
 """Share of a force's variance that must repeat at another period to call that the spans', how much more than
 repeats at their own, and how often it must do so. On equal spans, as built or worn, 0.63 to 0.92 repeat."""
@@ -80,7 +78,7 @@ def check_period(samples: Samples, length: float) -> None:
     """
     position, force = samples.position, samples.in_place
     own = repeated(position, force, length)
-    for factor, read, other in ((PER_HOUR, "km/h", "m/s"), (1 / PER_HOUR, "m/s", "km/h")):
+    for factor, read, other in ((METRES_PER_SECOND, "km/h", "m/s"), (1 / METRES_PER_SECOND, "m/s", "km/h")):
         share = repeated(position, force, length * factor)
         if share >= max(PERIODIC, own + MORE) and np.ptp(position) >= FEWEST * length * factor:
             raise InputError(
@@ -99,13 +97,9 @@ def repeated(position: Array, force: Array, period: float) -> float:
     return float(np.average((mean - force.mean()) ** 2, weights=count[met]) / force.var())
 
 
-def doubts(found: Shift, means: tuple[float, float]) -> list[str]:
-    """Sentences on what is unusual: the correlation, and the ratio of the mean forces.
-
-    means: of the record and of the run (N).
-    """
+def doubts(found: Shift, ratio: float) -> list[str]:
+    """Sentences on what is unusual: the correlation, and the ratio of the mean forces, record over run."""
     sentences = []
-    ratio = means[0] / means[1]
     if not 1 / SUM < ratio < SUM:
         sentences.append(
             f"The record's mean force is {ratio:.2g} times the run's: it may be the sum of two pantographs, "

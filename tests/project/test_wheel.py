@@ -16,7 +16,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from filelock import FileLock
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
@@ -47,7 +46,7 @@ def wheel(tmp_path_factory):
     shared = tmp_path_factory.getbasetemp()
     shared = shared.parent if "PYTEST_XDIST_WORKER" in os.environ else shared
     folder = shared / "dist"
-    with FileLock(shared / "dist.lock"), BUILDING:
+    with BUILDING:
         if not list(folder.glob("*.whl")):
             built = run([sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT])
             assert built.returncode == 0, built.stderr

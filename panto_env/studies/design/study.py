@@ -130,8 +130,7 @@ def _plain_replaced(one: Replaced) -> dict[str, Any]:
 
 
 def _plain(one: Checked) -> dict[str, Any]:
-    parts = ("searched", "held_out", "as_built")
-    return one._asdict() | {part: asdict(getattr(one, part)) for part in parts}
+    return one._asdict() | {part: asdict(getattr(one, part)) for part in PARTS}
 
 
 def outcome_of(numbers: Numbers) -> Outcome:
@@ -170,12 +169,11 @@ def _policies(case: Numbers) -> Iterator[str]:
 
 def bought_table(cases: Sequence[Numbers]) -> Table:
     """σ/F_m without design and control, with either, and with both; a row for each line and policy."""
-    rows = [
-        (case["name"], policy, *(f"{ratio:.2f}" for part in ("held_out", "as_built") for ratio in four(part)))
-        for case in cases
-        for policy in _policies(case)
-        for four in [lambda part, case=case, policy=policy: _four(case, policy, part)]
-    ]
+    rows = []
+    for case in cases:
+        for policy in _policies(case):
+            ratios = (*_four(case, policy, "held_out"), *_four(case, policy, "as_built"))
+            rows.append((case["name"], policy, *(f"{ratio:.2f}" for ratio in ratios)))
     names = ("as it is", "control", "design", "both")
     headings = ("search", "control by", *names, *(f"{name}, built" for name in names))
     return Table("Largest σ/F_m at held-out speeds and seeds", headings, rows, text_columns=2)
