@@ -97,7 +97,8 @@ def test_one_moves_and_picks_and_sees(tab):
     assert copied == "panto simulate --catenary re250 --pantograph dsa380 --speed 80"
     for width in (1400, 400):
         tab.set_viewport_size({"width": width, "height": 900})
-        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        # A page lays itself out anew some frames after the window has changed.
+        tab.wait_for_function(f"document.documentElement.scrollWidth <= {width}")
 
 
 @pytest.mark.parametrize(("origin", "status"), [("http://example.org", 403), (None, 101)])
