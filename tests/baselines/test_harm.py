@@ -10,7 +10,7 @@ from panto_baselines.benchmark.harm import harm_of, window_changes
 from panto_baselines.benchmark.overall import standings
 from panto_baselines.benchmark.report import harm_table, kilometre_tables, margins_table
 from panto_baselines.benchmark.run import evaluated_windows
-from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
+from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows, load_benchmark
 from panto_baselines.benchmark.statistics import compare
 from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
@@ -143,6 +143,11 @@ def test_no_oracle_is_that_of_a_line_of_another_length():
     found = {fingerprint(cell), fingerprint(cell | {"spans": 122}), fingerprint(cell | {"distance": 3000.0})}
     assert len(found) == 3
     assert fingerprint(cell | {"spans": 122}) == fingerprint(cell | {"spans": 122, "distance": 1000.0})
+
+
+def test_headline_tracks_have_two_windows():
+    for track in ("any-line", "high-speed-as-built", "train-both", "train-trailing", "unknown-line"):
+        assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)
 
 
 def test_a_case_changes_the_runs_of_its_line_and_keeps_its_rows_apart():
