@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from panto_baselines.benchmark.settings import TRAINING, check_seeds
@@ -117,8 +118,8 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(self._get_indices(indices))
+        """True for ``Monitor``, whose "episode" a lane's info holds; no lane has another wrapper of its own."""
+        return [wrapper_class is Monitor] * len(self._get_indices(indices))
 
 
 class PolicyLanes:
@@ -253,8 +254,9 @@ class SideBySide(VecEnv):  # type: ignore[misc]
         return [every[lane] for lane in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for each lane: no lane has a wrapper of its own."""
-        return [False] * len(self._get_indices(indices))
+        """As each of them says."""
+        every = [said for part in self._parts for said in part.env_is_wrapped(wrapper_class)]
+        return [every[lane] for lane in self._get_indices(indices)]
 
 
 def make_lanes(training: Training) -> Any:

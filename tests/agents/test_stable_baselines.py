@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from gymnasium.wrappers.vector import NormalizeObservation
 from stable_baselines3 import A2C, PPO, SAC, TD3
+from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import (
     DummyVecEnv,
@@ -340,6 +341,16 @@ def test_seed_of_lane_i_is_seed_plus_i():
     for lane in range(3):
         single = gymnasium.make("panto_env:PantographStiffness-v0", sensors="realistic")
         np.testing.assert_array_equal(observation[lane], single.reset(seed=4 + lane)[0])
+
+
+def test_an_agent_is_evaluated_without_a_wrapper(recwarn):
+    env = make_lanes()
+    env.seed(4)
+    mean, _ = evaluate_policy(PPO("MlpPolicy", env, seed=0), env, n_eval_episodes=3)
+    assert not [one for one in recwarn if "Monitor" in str(one.message)]
+    env.seed(4)
+    watched, _ = evaluate_policy(PPO("MlpPolicy", env, seed=0), VecMonitor(env), n_eval_episodes=3)
+    assert mean == pytest.approx(watched, rel=1e-6)
 
 
 def test_rest_of_the_interface():
