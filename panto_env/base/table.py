@@ -6,7 +6,7 @@ import codecs
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -48,6 +48,17 @@ class Table:
     def cells(self) -> list[tuple[str, ...]]:
         """The rows as text, in which no zero has a sign."""
         return [tuple(map(_cell, row)) for row in self.rows]
+
+    def of_largest(self, sizes: Sequence[float], most: int, what: str) -> Self:
+        """At most so many rows, in their order: those with the largest sizes; the title says so.
+
+        sizes: one for each row; what: name of the sizes.
+        """
+        if len(self.rows) <= most:
+            return self
+        kept = sorted(sorted(range(len(self.rows)), key=lambda row: -sizes[row])[:most])
+        title = f"{self.title}: the {most} of {len(self.rows)} with the largest {what}"
+        return replace(self, title=title, rows=[self.rows[row] for row in kept], section_ends=())
 
     @property
     def markdown(self) -> str:

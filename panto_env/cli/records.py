@@ -79,6 +79,9 @@ Page = Annotated[
     into_file("Write a page with tables and charts to this file", PAGES),
 ]
 
+PRINTED = 12
+"""Most rows of a table of parts in the terminal; files and pages have all."""
+
 
 def reading(
     unit: list[str] | None, column: list[str] | None, mass: float | None, filtered: float | None
@@ -144,7 +147,7 @@ def record(
         if json:
             print_json(plain(found))
             return
-        for table in (whole_table(found, title), requirements_table(found), *part_tables(found)):
+        for table in (whole_table(found, title), requirements_table(found), *part_tables(found, PRINTED)):
             print_table(table)
         for sentence in requirement_remarks(found):
             console.print(sentence, soft_wrap=True)
@@ -201,7 +204,7 @@ def compare(
 def _print_comparison(found: Comparison, title: str) -> None:
     console.print(title, soft_wrap=True)
     console.print(shift_sentence(found), soft_wrap=True)
-    for table in (figures_table(found), spans_table(found), acceptance_table(found)):
+    for table in (figures_table(found), spans_table(found, PRINTED), acceptance_table(found)):
         print_table(table)
     for line in criterion_notes(found):
         console.print(line, soft_wrap=True)

@@ -244,8 +244,11 @@ def acceptance_table(found: Comparison) -> Table:
     return Table(table.title, ("deviation of", *table.headings[1:]), rows)
 
 
-def spans_table(found: Comparison) -> Table:
-    """Figures span by span: record, run, and for the standard deviation how much they differ."""
+def spans_table(found: Comparison, most: int | None = None) -> Table:
+    """Figures span by span: record, run, and for the standard deviation how much they differ.
+
+    most: rows at most, those whose σ differs most.
+    """
     rows = [
         (
             found.run.alignment.span_name(each.span),
@@ -256,7 +259,9 @@ def spans_table(found: Comparison) -> Table:
         for each in found.spans
     ]
     short = [f"{LABELS[key].short} {whose}" for key in STATISTICS for whose in ("rec.", "run")]
-    return Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
+    table = Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
+    sizes = [abs(deviation(each.std)) for each in found.spans]
+    return table.of_largest(sizes, most or len(rows), "difference of σ")
 
 
 def deviation(pair: tuple[float, float]) -> float:

@@ -277,8 +277,11 @@ def whole_table(found: Judgement, title: str) -> Table:
     return Table(title, ("figure", "value"), rows)
 
 
-def part_tables(found: Judgement) -> list[Table]:
-    """Tables by run, speed, section and span, of those kinds that have more than one part, or are spans."""
+def part_tables(found: Judgement, most: int | None = None) -> list[Table]:
+    """Tables by run, speed, section and span, of those kinds that have more than one part, or are spans.
+
+    most: rows of each at most, those with the largest σ.
+    """
     tables = []
     for kind, title in TITLES.items():
         parts, long = found.of(kind), [] if kind == "span" else ["distance (m)"]
@@ -294,7 +297,9 @@ def part_tables(found: Judgement) -> list[Table]:
         ]
         if len(parts) > 1 or (kind == "span" and parts):
             short = [LABELS[key].short_heading for key in SHOWN]
-            tables.append(Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows))
+            table = Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
+            sizes = [part.figures.std for part in parts]
+            tables.append(table.of_largest(sizes, most or len(parts), "σ"))
     return tables
 
 

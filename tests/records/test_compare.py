@@ -8,7 +8,7 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.metrics.low_pass import low_pass
-from panto_env.records.compare import acceptance_table, compare, shift_sentence, spans_table
+from panto_env.records.compare import acceptance_table, compare, deviation, shift_sentence, spans_table
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
 
@@ -50,6 +50,10 @@ def test_figures_of_spans_are_those_of_the_run(run):
     one = found.spans[3]
     assert one.std[1] == pytest.approx(run.summary((13, 13)).std)
     assert len(spans_table(found).rows) == 10
+    short = spans_table(found, 2)
+    assert "the 2 of 10 with the largest difference of σ" in short.title
+    largest = sorted(found.spans, key=lambda each: -abs(deviation(each.std)))[:2]
+    assert [row[0] for row in short.rows] == [f"{span}" for span in sorted(each.span for each in largest)]
 
 
 def test_a_shift_that_is_given_is_searched_about(run):

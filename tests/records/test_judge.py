@@ -108,6 +108,12 @@ def test_sections_and_spans():
     assert judge(record, section=2500.0).of("section")[0].figures.distance == pytest.approx(1000)
     assert "Supports are taken to stand every 50 m from 0 m on." in found.notes
     assert [table.title for table in part_tables(found)] == ["By section", "By span"]
+    whole, short = (part_tables(found, most)[1] for most in (None, 3))
+    assert short.title == "By span: the 3 of 50 with the largest σ"
+    largest = sorted(found.of("span"), key=lambda part: -part.figures.std)[:3]
+    assert [row[0] for row in short.rows] == [
+        row[0] for row in whole.rows if row[0] in {p.where for p in largest}
+    ]
 
 
 def test_sections_from_overlap_to_overlap(run):
