@@ -269,8 +269,9 @@ def _read_places(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> 
 
 @in_python(_gather_plain)
 def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
-    """``gather(rows, places, i)``: the numbers of a table (..., rows, WIDTH), counted row by row, at the
-    places in row i of ``places``, (n, WIDTH), as a vector.
+    """``gather(rows, places, i)``: a vector of numbers from a table (..., rows, WIDTH).
+
+    Row i of ``places``, (n, WIDTH), says where they stand, counted row by row.
     """
     if not (_is_table(rows, (2, 3)) and _are_places(places) and isinstance(i, types.Integer)):
         return None

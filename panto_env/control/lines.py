@@ -76,7 +76,7 @@ def line_of_seed(lines: DrawnLines, seed: int) -> tuple[CatenaryData, tuple[floa
 
 
 def on_example(settings: R) -> R:
-    """Settings on one line: their own, the first of a list, or one drawn, always the same one."""
+    """Settings on one example line: their own, the first of a list, or one drawn by a fixed seed."""
     if isinstance(settings.catenary, tuple):
         return settings.on_line(settings.catenary[0])
     return on_drawn_line(settings, lambda: np.random.default_rng(EXAMPLE))

@@ -118,7 +118,7 @@ class Fit:
 
     @cached_property
     def whiteness(self) -> list[Whiteness]:
-        """Of the residual of each part, over its noise: whether it is as random as noise."""
+        """Whether the residual of each part, divided by its noise, is white; one result per part."""
         deviation = self.solution.state.noise.ravel()[self.problem.band]
         parts = self.problem.by_part(self.solution.residual / deviation)
         return [whiteness(own[:, None]) for own in parts]

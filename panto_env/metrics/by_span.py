@@ -169,9 +169,9 @@ class MovingDropper(NamedTuple):
 
 
 def evaluated(run: Trajectory, spans: SpanChoice = None) -> tuple[Array, NDArray[np.intp]]:
-    """Forces (N) in the droppers of the evaluated spans over the evaluated run, and which droppers these are.
+    """Forces (N) in droppers of the evaluated spans, (n, droppers), and these droppers' numbers, (droppers,).
 
-    (n, droppers) and (droppers,); no droppers where none are recorded. Raises InputError as
+    n samples lie within these spans. Both are empty where no dropper is recorded. Raises InputError as
     ``Trajectory.spans`` does.
     """
     covered, own = run.spans(spans), np.arange(run.dropper_force.shape[1])

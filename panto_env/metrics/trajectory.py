@@ -102,7 +102,7 @@ class Trajectory:
     def worst_controlled(self, spans: SpanChoice = None) -> Trajectory:
         """Record of the controlled collector by which a train is judged: that with the largest sigma.
 
-        spans: as in ``summary``. The first one where the run ended early. Raises InputError as ``summary``.
+        If the run ended early, the first controlled one. spans and InputError: as in ``summary``.
         """
         numbers = self.identity.controlled
         if len(numbers) == 1 or self.terminated:

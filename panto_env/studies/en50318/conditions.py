@@ -89,7 +89,7 @@ LEVEL_SEEDS = 8
 
 @dataclass(frozen=True)
 class ConditionCheck:
-    """Figures on lines in one condition, over the default spans: means, and spreads over the seeds."""
+    """Figures over the default spans on lines in one condition: means over the seeds, and their spreads."""
 
     catenary: str
     pantograph: str
