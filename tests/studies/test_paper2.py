@@ -17,6 +17,8 @@ LEFT_TO_THE_COMMAND = (
     "Noticed, and within a dropper interval, by severity",
     "Taken for (%), mean of 3",
     "Motors of at most 50 N",
+    "Motors at 300 km/h",
+    "Parameters from one pass",
 )
 """What titles of tables begin with that no page shows."""
 pytestmark = pytest.mark.study
