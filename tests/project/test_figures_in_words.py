@@ -301,6 +301,10 @@ SENTENCES = {
             lambda: np.array(less("train-trailing", "agent-trailing"))[[0, 2, 1]],
         ),
         (
+            "−{:.1f} % on the track train-trailing (−{:.1f} to −{:.1f}), ahead of every classical policy",
+            lambda: np.array(less("train-trailing", "agent-trailing-alone"))[[0, 2, 1]],
+        ),
+        (
             "reduces σ by {:.0f} to {:.0f} %, {:.0f} to {:.0f} points less than `fitted-fb+ff` there",
             lambda: (
                 *ends(cells("head", "agent-head").values()),

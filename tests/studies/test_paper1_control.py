@@ -19,6 +19,8 @@ from . import made, table
 PAGE = "paper1-control.md"
 CLAIMS = "The paper's claims beside ours"
 LEFT_TO_THE_COMMAND = (
+    "Phase angle of the feed-forward",
+    "Linear model",
     "Over speed",
     "What the contact force",
     "CL (%) of FB+FF",

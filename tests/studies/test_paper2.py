@@ -17,6 +17,9 @@ LEFT_TO_THE_COMMAND = (
     "Noticed, and within a dropper interval, by severity",
     "Taken for (%), mean of 3",
     "Motors of at most 50 N",
+    "Motors at 300 km/h",
+    "Parameters from one pass",
+    "own-two-mass on en50318-2002, ideal actuator on the frame",
 )
 """What titles of tables begin with that no page shows."""
 pytestmark = pytest.mark.study
