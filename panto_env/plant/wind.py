@@ -28,7 +28,7 @@ from .functions import cosine_of_turns
 from .pantograph.schema import PantographData
 
 LONGEST_GUST, SHORTEST_GUST = 5000.0, 5.0
-"""Wavelengths of gusts (m), own choice: 95 % of the spectrum's variance. Longer ones are a steady wind to a
+"""Wavelengths of gusts (m), own choice: 96 % of the spectrum's variance. Longer ones are a steady wind to a
 run of some km. A train at 300 km/h passes the shortest at 17 to 20 Hz, where EN 50317's low-pass ends."""
 BANDS = 30  # cosines, ten to a tenfold of wavelength (own choice)
 DAVENPORT = 1200.0  # length scale of Davenport's spectrum of the wind along its mean (m) (recalled)
