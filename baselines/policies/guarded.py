@@ -17,7 +17,6 @@ import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter_zi
 
 from panto_env.control.entries import (
     AVERAGED,
@@ -280,6 +279,8 @@ class Monitor:
         self._means = np.zeros((2, 3))  # over both windows: of the force, without control, and what that adds
         self._squares, self._added = np.zeros((2, 3)), 0.0
         self._begun = False
+        from scipy.signal import butter, lfilter_zi  # slow to import
+
         self.low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
         self.at_rest = lfilter_zi(*self.low_pass)
         self.gate, self.low = 0.0, False
