@@ -91,6 +91,7 @@ def learner(training, folder):
     return train.Run(training, folder, train.make_lanes(training))
 
 
+@pytest.mark.slow
 def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -230,6 +231,7 @@ class TestPolicy:
 
 
 class TestSettings:
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", names("training"))
     def test_our_configurations_are_valid(self, name):
         assert load_training(name).total_steps > 0
@@ -426,6 +428,7 @@ def linear(tmp_path, monkeypatch):
 
 
 class TestStart:
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["ppo", "sac"])
     def test_an_agent_does_what_it_has_cloned(self, kind, linear, tmp_path):
         training = settings(
@@ -485,6 +488,7 @@ class TestResidual:
         np.testing.assert_array_equal(ours, theirs)
         assert not np.array_equal(trained, theirs)
 
+    @pytest.mark.slow
     def test_takes_part_in_the_benchmark_and_asks_for_what_it_sees(self, added):
         from panto_baselines.benchmark.run import run
         from panto_baselines.benchmark.settings import BenchmarkSettings, Line

@@ -109,6 +109,7 @@ def case(request):
     return training, made, seed, own_pass(made, training, seed)
 
 
+@pytest.mark.slow
 def test_a_network_repeats_its_own_pass(case):
     """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
     _, made, _, own = case
@@ -211,6 +212,7 @@ class _Script:
         return np.array([self._actions.get(self._step, 0.0)])
 
 
+@pytest.mark.slow
 def test_a_training_lowers_sigma_and_its_model_runs_as_a_policy(tmp_path):
     training = settings(
         total_steps=300_000,

@@ -83,6 +83,7 @@ def test_whoever_learns_sees_a_part_and_hears_the_teacher():
     np.testing.assert_allclose([actor.act(seen)[0] for seen in whole.observations], whole.wanted, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_it_learns_to_do_most_of_what_its_teacher_does(tmp_path):
     facts, actor = read_model(train(settings(), tmp_path / "run", progress=False).best)
     assert facts.algorithm == "dagger"

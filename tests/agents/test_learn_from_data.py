@@ -33,6 +33,7 @@ def _minari_s_folder_is_put_back(monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", "")
 
 
+@pytest.mark.slow
 def test_offline_data_are_read_back_and_replayed(capsys):
     returns, same = load("offline_data").main()
     assert same

@@ -135,6 +135,7 @@ def check_unharmed(policy, settings, folder, count, compiler="gcc"):
     assert np.ptp(forces) > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_whatever_is_read_the_force_is_finite_and_within_its_limit(compiler, tmp_path):
     check_unharmed("guarded:pd", HIGH_SPEED, tmp_path, 100_000, compiler)
@@ -155,6 +156,7 @@ def test_a_million_readings_of_a_network(compiler, tmp_path):
     check_unharmed("agent-small", HIGH_SPEED, tmp_path, 1_000_000, compiler)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("policy", ["repetitive", "agent-small"])
 def test_every_compiler_s_code_does_what_the_description_does(policy, compiler, tmp_path):

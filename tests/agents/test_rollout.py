@@ -135,6 +135,7 @@ CASES = {
 QUICK = ("layers", "recurrent", "an actuator that is slow", "no memory")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", some_at_once(CASES, QUICK))
 def test_rollouts_and_their_derivatives_are_those_of_torch(case):
     """Eleven passes of unequal lengths: two groups, one of them not full."""

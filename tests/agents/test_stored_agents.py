@@ -94,6 +94,7 @@ def test_the_small_one_has_less_than_four_kilobytes_of_weights():
     assert sum(each.nbytes for each in load_file(FOLDER / "small.safetensors").values()) < 4000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_steadies_the_force_at_its_mean(name):
     passive, steadied = (

@@ -53,6 +53,7 @@ def test_it_is_the_filter_of_its_equation():
     np.testing.assert_allclose(ours, lfilter([1.0, -1.0], [1.0, -pole], forces, axis=0), atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", some_at_once([1e9, 2500.0], [2500.0]))
 def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side(rate):
     """A pulse of 120 N for a quarter of the time, which limits of force and rate cut, and nothing between."""

@@ -258,6 +258,7 @@ def test_the_table_of_drawn_lines_cell_by_cell():
     assert set(told[0]) == {each.name for each in fields(DrawnLine)} | {"outside"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["family:high-speed", "section:main-line"])
 def test_values_are_those_of_the_line_that_an_environment_has(source):
     family = load_drawn(source)

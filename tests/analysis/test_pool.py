@@ -25,6 +25,7 @@ def environment_and_process():
     return os.environ.get("OPENBLAS_NUM_THREADS"), os.getpid()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [one_by_one, in_threads, in_processes])
 def test_results_are_in_the_order_of_the_jobs_and_progress_counts_every_job(run):
     done = []
@@ -33,6 +34,7 @@ def test_results_are_in_the_order_of_the_jobs_and_progress_counts_every_job(run)
     assert done == [(1, 3), (2, 3), (3, 3)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [one_by_one, in_threads, in_processes])
 def test_the_error_of_a_job_is_raised(run):
     with pytest.raises(InputError, match="This job fails"):
@@ -84,6 +86,7 @@ def test_each_result_is_reported_as_soon_as_it_is_there():
     assert collect([], None) == []
 
 
+@pytest.mark.slow
 def test_a_script_without_main_guard_is_told_what_to_do(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(

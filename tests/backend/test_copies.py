@@ -65,6 +65,7 @@ def test_copies_go_on_bit_for_bit_and_touch_no_other(name, lanes):
     np.testing.assert_equal(run(twin, 150, seed=1), run(env, 150, seed=1))
 
 
+@pytest.mark.slow
 def test_copy_goes_on_in_another_process(tmp_path):
     env = make("Pantograph-v0")
     env.reset(seed=4)

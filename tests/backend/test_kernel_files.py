@@ -80,6 +80,7 @@ def test_processes_that_compile_at_once_never_run_one_another_s_kernel(start, tm
     assert start(code % ("1.5", "2")).communicate(timeout=120) == ("4.5 6.0\n", "")
 
 
+@pytest.mark.slow
 def test_of_processes_that_need_the_same_one_only_one_compiles(start, tmp_path):
     """The others wait for it, and have it from the disk."""
     started = [start(START + CALL) for _ in range(4)]
@@ -89,6 +90,7 @@ def test_of_processes_that_need_the_same_one_only_one_compiles(start, tmp_path):
     assert sorted(hits for _, hits in told) == ["0", "1", "1", "1"]
 
 
+@pytest.mark.slow
 def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(start, tmp_path):
     compiling = "module.thrice._compiler.compile = lambda *_: print(flush=True) or time.sleep(600)"
     still = start(f"import module, time; {compiling}; module.thrice(1.5)")

@@ -109,6 +109,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_only_what_kernels_are_made_of_counts(change, sources, tmp_path):
     file, before, after, counts = CHANGES[change]

@@ -95,6 +95,7 @@ thread.join()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 @pytest.mark.skipif(not JIT, reason="plain Python takes too long")
 def test_forked_while_another_thread_steps_it_is_refused_or_steps():

@@ -207,6 +207,7 @@ def in_the_other_way(names):
     return dict(zip(names, json.loads(result.stdout), strict=True))
 
 
+@pytest.mark.slow
 @CHOSEN
 def test_plain_python_and_compiled_kernels_agree(name):
     others = in_the_other_way(LONG if name in LONG else USUAL)

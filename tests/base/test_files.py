@@ -154,6 +154,7 @@ def refused(*words):
     return last
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "flag"), list(outputs(whole())))
 def test_an_output_that_can_t_be_written_is_refused_before_the_work(words, flag, old, tmp_path, monkeypatch):
     name = " ".join(words)
@@ -291,6 +292,7 @@ def shell(text, folder):
     return subprocess.run(["sh", "-c", text], cwd=folder, env=environment, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 def test_output_on_a_full_disk_is_told_in_one_sentence(tmp_path):
     done = shell(f"{PANTO} list > /dev/full", tmp_path)
@@ -298,6 +300,7 @@ def test_output_on_a_full_disk_is_told_in_one_sentence(tmp_path):
     assert done.returncode == 2
 
 
+@pytest.mark.slow
 def test_a_file_is_written_though_nothing_can_be_printed(tmp_path):
     """Where nobody reads on, or output or error are closed, there is no traceback."""
     for end in ("| true", ">&-", "2>&-"):

@@ -135,6 +135,7 @@ def test_the_settings_of_a_training_s_folder(evil, tmp_path):
         folder.read_settings()
 
 
+@pytest.mark.slow
 def test_a_result_that_is_played_again_runs_no_policy(evil, tmp_path):
     line = STIFFNESS | {"speeds_kmh": [300], "spans": (2, 4)}
     given = {"policies": ["pd"], "lines": [line], "seeds": 1}

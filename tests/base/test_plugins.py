@@ -97,6 +97,7 @@ def test_a_missing_package_is_named():
         plugins.load(point)
 
 
+@pytest.mark.slow
 @quiet
 def test_a_plug_in_that_can_t_be_loaded_stops_no_other_command(site):
     for words in ("--version", "--help", "simulate --help", "list pd"):

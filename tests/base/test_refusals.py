@@ -201,6 +201,7 @@ def test_what_is_wrong_with_a_policy_s_file_is_said(own, name, message):
         find_policy(f"{own.parent}/{name}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "message"),
     [

@@ -99,6 +99,7 @@ def test_only_trusted_and_installed_policies_run_beside_the_plant(tmp_path):
     assert not isinstance(find_apart("pd", trusted=True), PolicyApart)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -122,6 +123,7 @@ def test_a_policy_that_fails_is_named_and_leaves_no_process(body, words, tmp_pat
     wait_for(lambda: not any(map(alive, set(family(os.getpid())) - others)), 5)
 
 
+@pytest.mark.slow
 def test_a_policy_that_cannot_be_loaded_is_named(tmp_path):
     policy = written(tmp_path, "pass")
     file = Path(policy.partition(":")[0])

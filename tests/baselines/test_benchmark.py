@@ -80,6 +80,7 @@ def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Bench
     assert outcome.rows[0].action_rate == outcome.rows[0].figures.effort == 0
 
 
+@pytest.mark.slow
 def test_outcome_does_not_depend_on_workers_and_repeats(outcome: Benchmark) -> None:
     calls: list[tuple[int, int]] = []
     again = benchmark.run(settings(), workers=2, progress=lambda *call: calls.append(call))
@@ -109,6 +110,7 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
     assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
 
 
+@pytest.mark.slow
 def test_a_bias_within_what_qualifies_gains_nothing(tmp_path: Path) -> None:
     """It lowers sigma, by as much as the passive pantograph's falls at that mean."""
     path = tmp_path / "mine.py"
@@ -142,6 +144,7 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
 # --- what is not valid ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -191,6 +194,7 @@ def test_no_workers_are_refused() -> None:
 # --- files ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
 def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
     track = load_benchmark(f"benchmark/{path.stem}")
