@@ -44,7 +44,14 @@ def doubts(fit: Fit) -> list[str]:
     if unlike:
         found.append(
             f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
-            "intervals are too narrow."
+            "intervals may be too narrow."
+        )
+    if fit.moved:
+        design = fit.problem.values.design
+        names = [design.layout.alignment.span_name(span + design.first_span) for span in fit.moved]
+        found.append(
+            f"More is left than noise in span{'s' if len(names) > 1 else ''} {', '.join(names)}: the model "
+            "lacks something there, and intervals are wider by what it moves."
         )
     if not fit.solution.converged:
         found.append("The fit has not settled; intervals are not to be relied on.")
@@ -120,7 +127,7 @@ def knowledge(fit: Fit, records: str) -> Stored:
         value if value.place is None else replace(value, place=value.place + before)
         for value in fitting.values.all
     )
-    difference, covariance = fit.solution.state.x[:count], fit.solution.covariance[:count, :count]
+    difference, covariance = fit.solution.state.x[:count], fit.covariance[:count, :count]
     if before:
         turn = turned(values, -before)
         difference, covariance = turn @ difference, turn @ covariance @ turn.T

@@ -49,7 +49,8 @@ def made_up(ready, differences, shift=0.0, silent=()):
     x[len(fitting.values) :][: len(fitting.parts)] = shift
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
     residual = np.random.default_rng(0).standard_normal(len(fitting.band))
-    return Fit(ready, Solution(state, np.diag(deviation**2), np.empty((0, 0)), residual, True))
+    nothing = np.zeros((len(residual), len(x)))
+    return Fit(ready, Solution(state, np.diag(deviation**2), nothing, residual, True))
 
 
 @pytest.fixture(scope="module")
