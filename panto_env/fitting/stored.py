@@ -15,12 +15,18 @@ from ..base.arrays import Array
 from ..base.checksums import checksum, read_arrays, write_arrays
 from ..base.errors import InputError
 from ..base.settings import Settings
+from ..plant.catenary.schema import CLEAR
 from ..records.record import Record
 from .fit import WHITE, Fit
 from .misfit import OWN, State
 from .passes import BANDS
 from .values import WAVES, Place, Value
 
+GOES_ON = (
+    "The fitted line goes on as it is; in the real one, an anchor or overlap up to "
+    f"{CLEAR} spans ahead of a train sends waves back, which look like defects."
+)
+"""What is said of a line without ends: no record tells what lies ahead of it."""
 STRANGE = 0.3
 """Residual over the force, by standard deviation, from which on the fit is called wrong. Own choice."""
 
