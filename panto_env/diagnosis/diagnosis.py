@@ -15,8 +15,9 @@ from ..base.errors import beside
 from ..base.plotting import BLUE, LIMIT, ORANGE, POSITION, legend_above, mark_supports, stacked
 from ..base.table import Table
 from ..catalog import load_pantograph
-from ..fitting.stored import Stored
+from ..fitting.stored import GOES_ON, Stored
 from ..metrics.trajectory import Trajectory
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
 from .features import (
@@ -119,7 +120,9 @@ def diagnose_records(
     """
     passes, reference, notes = measured_passes(records, known, seed)
     found = judge(passes, Healthy.of(reference), false_alarms, classifier)
-    return replace(found, notes=(*notes, *known.notes, *found.notes))
+    line = FlexibleCatenaryData.model_validate_json(known.line)
+    ahead = [GOES_ON] if found.findings and not line.ends else []
+    return replace(found, notes=(*notes, *known.notes, *ahead, *found.notes))
 
 
 def judge(

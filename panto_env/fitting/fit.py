@@ -16,6 +16,7 @@ from ..records.record import Record
 from .misfit import Part, State
 from .problem import problem
 from .solve import Fitting, Solution
+from .spans import moved, wider
 from .values import USUAL, Value
 
 SLACK = 0.015
@@ -80,10 +81,20 @@ class Fit:
         return self.problem.parts
 
     @cached_property
+    def moved(self) -> dict[int, Array]:
+        """Simulated spans that have more left than noise, and by how much it moves all values, (n,)."""
+        return moved(self.problem, self.solution)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(n, n), of all values: of the solution, and of what moves them."""
+        return wider(self.solution.covariance, self.moved.values(), self.problem.prior)
+
+    @cached_property
     def found(self) -> tuple[Found, ...]:
         """All values, of droppers and supports only those along what was compared."""
         values = self.problem.values.all
-        deviations = np.sqrt(np.diag(self.solution.covariance))
+        deviations = np.sqrt(np.diag(self.covariance))
         triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
         every = (Found(*each) for each in triples)
         begin, end = self.problem.stretch
@@ -104,7 +115,7 @@ class Fit:
         values = self.problem.values.all
         names = {each.value.name for each in self.found if each.identifiable}
         which = [k for k, value in enumerate(values) if value.name in names]
-        covariance = self.solution.covariance[np.ix_(which, which)]
+        covariance = self.covariance[np.ix_(which, which)]
         scale = np.sqrt(np.diag(covariance))
         matrix = np.triu(covariance / np.outer(scale, scale), 1)
         pairs = np.argwhere(np.abs(matrix) > CORRELATED)

@@ -92,11 +92,11 @@ class Measured:
         return float(np.sqrt(np.sum(coefficients**2) / len(self.place)))
 
     def back(self, coefficients: Array) -> Array:
-        """Force (N), (places,), that has these coefficients, (coefficients,), and no others."""
+        """Force (N), (..., places), that has these coefficients, (..., coefficients), and no others."""
         from scipy.fft import idct  # slow to import
 
-        whole = np.zeros(len(self.place))
-        whole[self.compared] = coefficients
+        whole = np.zeros((*coefficients.shape[:-1], len(self.place)))
+        whole[..., self.compared] = coefficients
         return np.asarray(idct(whole, norm="ortho"))
 
 

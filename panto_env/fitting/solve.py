@@ -97,7 +97,7 @@ class Solution:
     """The end of a fit."""
 
     state: State
-    covariance: Array  # (n, n), of the values as in ``State.x``
+    covariance: Array  # (n, n), of the values as in ``State.x``, where only noise is left
     jacobian: Array  # (coefficients, n)
     residual: Array  # (coefficients,): measured less simulated (N)
     converged: bool  # whether a further step would change little

@@ -15,12 +15,18 @@ from ..base.arrays import Array
 from ..base.checksums import checksum, read_arrays, write_arrays
 from ..base.errors import InputError
 from ..base.settings import Settings
+from ..plant.catenary.schema import CLEAR
 from ..records.record import Record
 from .fit import WHITE, Fit
 from .misfit import OWN, State
 from .passes import BANDS
 from .values import WAVES, Place, Value
 
+GOES_ON = (
+    "The fitted line goes on as it is; in the real one, an anchor or overlap up to "
+    f"{CLEAR} spans ahead of a train sends waves back, which look like defects."
+)
+"""What is said of a line without ends: no record tells what lies ahead of it."""
 STRANGE = 0.3
 """Residual over the force, by standard deviation, from which on the fit is called wrong. Own choice."""
 
@@ -44,7 +50,14 @@ def doubts(fit: Fit) -> list[str]:
     if unlike:
         found.append(
             f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
-            "intervals are too narrow."
+            "intervals may be too narrow."
+        )
+    if fit.moved:
+        design = fit.problem.values.design
+        names = [design.layout.alignment.span_name(span + design.first_span) for span in fit.moved]
+        found.append(
+            f"More is left than noise in span{'s' if len(names) > 1 else ''} {', '.join(names)}: the model "
+            "lacks something there, and intervals are wider by what it moves."
         )
     if not fit.solution.converged:
         found.append("The fit has not settled; intervals are not to be relied on.")
@@ -120,7 +133,7 @@ def knowledge(fit: Fit, records: str) -> Stored:
         value if value.place is None else replace(value, place=value.place + before)
         for value in fitting.values.all
     )
-    difference, covariance = fit.solution.state.x[:count], fit.solution.covariance[:count, :count]
+    difference, covariance = fit.solution.state.x[:count], fit.covariance[:count, :count]
     if before:
         turn = turned(values, -before)
         difference, covariance = turn @ difference, turn @ covariance @ turn.T

@@ -11,7 +11,7 @@ from ..base.plotting import POSITION, legend_above, mark_supports, series_colour
 from ..base.table import Alarm, Table
 from ..terminal import number
 from .fit import INTERVAL, WHITE, Fit, Found, slack_droppers
-from .stored import doubts
+from .stored import GOES_ON, doubts
 from .values import FREE
 
 if TYPE_CHECKING:
@@ -123,6 +123,8 @@ def remarks(fit: Fit) -> list[str]:
             found.append(f"{what}: the records tell {known or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
+    if not fit.problem.values.design.catenary.ends:
+        found.append(GOES_ON)
     return [*found, *slack_droppers(fit.found), *doubts(fit)]
 
 

@@ -14,7 +14,7 @@ from panto_env.diagnosis.measured_passes import HEALTHY, measured_passes
 from panto_env.fitting import problem as preparing
 from panto_env.fitting.misfit import OWN
 from panto_env.fitting.passes import BANDS
-from panto_env.fitting.stored import Stored, store
+from panto_env.fitting.stored import GOES_ON, Stored, store
 from panto_env.plant.numerics import Numerics
 from panto_env.records.measured import measured
 from panto_env.records.record_file import write_record
@@ -111,6 +111,7 @@ def test_what_is_left_out_and_what_a_record_says_is_among_the_notes(healthy_reco
     found = diagnose_records(given, known)
     assert found.notes[0] == "250 km/h: Said."
     assert found.notes[1].startswith("b (run 'May') is left out: It has only")
+    assert (GOES_ON in found.notes) is bool(found.findings)
 
 
 def test_what_cannot_be_judged_is_refused(healthy_record, known):
@@ -133,6 +134,7 @@ def test_the_command(known, tmp_path, monkeypatch):
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert any("has not settled" in note for note in told["notes"])
+    assert GOES_ON in told["notes"]
     assert [finding["kind"] for finding in told["findings"]] == ["broken dropper"]
     assert (tmp_path / "found.png").read_bytes().startswith(b"\x89PNG")
     for words, sentence in (

@@ -5,6 +5,7 @@ python -m tests.fitting.coverage FOLDER --wrong pantograph    # the model wrong,
 python -m tests.fitting.coverage FOLDER --passes 1            # fewer passes
 python -m tests.fitting.coverage FOLDER --line section        # lines whose spans differ, each drawn
 python -m tests.fitting.coverage FOLDER --line midst          # records from the midst of a line
+python -m tests.fitting.coverage FOLDER --freed               # the pantograph's values fitted, too
 python -m tests.fitting.coverage FOLDER --diagnose            # and what later passes over these lines show
 python -m tests.fitting.coverage FOLDER --table
 """
@@ -27,8 +28,10 @@ from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.diagnosis import diagnose_records
 from panto_env.fitting.fit import INTERVAL, WHITE, Fit, fit
 from panto_env.fitting.stored import knowledge
+from panto_env.fitting.values import CHAIN, USUAL
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
+from panto_env.plant.pantograph.schema import PantographData
 from panto_env.records.measured import measured
 from panto_env.records.record import Record
 
@@ -74,6 +77,14 @@ def design_of(seed: int, line: str) -> FlexibleCatenaryData:
     return section.draw(np.random.default_rng(seed))[0]
 
 
+def wrong_pantograph(seed: int) -> PantographData:
+    """The pantograph with masses that are 5 % larger or smaller, and springs 5 % stiffer."""
+    pantograph, signs = load_pantograph(PANTOGRAPH), np.random.default_rng(seed).choice([-1, 1], 3)
+    masses = tuple(float(m * (1 + 0.05 * s)) for m, s in zip(pantograph.masses, signs, strict=True))
+    springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
+    return pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
+
+
 def records_of(
     seed: int,
     passes: int,
@@ -101,10 +112,7 @@ def records_of(
         other = damping.model_copy(update={"alpha": 2 * damping.alpha, "beta": 2 * damping.beta})
         line = line.model_copy(update={"damping": other})
     if wrong == "pantograph":
-        signs = np.random.default_rng(seed).choice([-1, 1], 3)
-        masses = tuple(float(m * (1 + 0.05 * s)) for m, s in zip(pantograph.masses, signs, strict=True))
-        springs = (*(float(1.05 * k) for k in pantograph.stiffnesses[:-1]), pantograph.stiffnesses[-1])
-        pantograph = pantograph.model_copy(update={"masses": masses, "stiffnesses": springs})
+        pantograph = wrong_pantograph(seed)
     if wrong == "grid":
         settings |= {"window": 0, "spacing": 0.25, "time_step": 5e-4, "precision": "double"}
     found = []
@@ -143,13 +151,9 @@ def records_of(
     return found
 
 
-def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False) -> dict[str, Any]:
-    """Errors and standard deviations of one fit by kind, in the values' own units.
-
-    diagnose: and what later passes show that are held against it.
-    """
-    records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
-    found = fit(records, line, load_pantograph(PANTOGRAPH))
+def truths_of(found: Fit, seed: int, wrong: str, kind: str) -> dict[str, Any]:
+    """True values by kind and by index of the values of a fit to ``records_of`` these."""
+    line, design = design_of(seed, kind), load_pantograph(PANTOGRAPH)
     first = found.problem.values.design.first_span
     spans = line.spans if line.ends else BEFORE.get(kind, 0) + SPANS + BEYOND
     droppers = len(line.layout(spans).positions)
@@ -157,21 +161,43 @@ def judge(seed: int, passes: int, wrong: str, kind: str, diagnose: bool = False)
     assert true.scatter is not None
     assert true.heights is not None
     phases = 2 * np.pi * (true.waves[:, 2] + found.before * true.waves[:, 1])
-    truths: dict[str, Any] = {
+    pantograph = wrong_pantograph(seed) if wrong == "pantograph" else design
+    return {
         "tensions": np.array(true.tensions) - 1,
         "droppers": true.scatter[first * droppers // spans :],
         "supports": true.heights[first:],
         "damping": dict.fromkeys([("alpha",), ("beta",)], 1.0 if wrong == "damping" else 0.0),
         "unevenness": true.waves[:, :1] * np.stack([np.cos(phases), -np.sin(phases)], axis=1),
+        "pantograph": {
+            (name, k): getattr(pantograph, name)[k] / own - 1
+            for name in CHAIN
+            for k, own in enumerate(getattr(design, name))
+            if own > 0
+        },
     }
-    rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong}
+
+
+def judge(
+    seed: int, passes: int, wrong: str, kind: str, *, diagnose: bool = False, freed: bool = False
+) -> dict[str, Any]:
+    """Errors and standard deviations of one fit by kind, in the values' own units.
+
+    diagnose: and what later passes show that are held against it. freed: whether the pantograph is, too.
+    """
+    records, line = records_of(seed, passes, wrong, kind), design_of(seed, kind)
+    free = (*USUAL, "pantograph") if freed else USUAL
+    found = fit(records, line, load_pantograph(PANTOGRAPH), free=free)
+    by_noise = replace(found, solution=replace(found.solution, residual=0.0 * found.solution.residual))
+    rows: dict[str, Any] = {"line": kind, "seed": seed, "passes": passes, "wrong": wrong, "freed": freed}
+    rows["by_noise"] = {}
     rows["settled"] = found.solution.converged
     rows["left"] = [_short(residual) for _, residual in found.std]
     rows["as_noise"] = [_short(white.probability) for white in found.whiteness]
-    for name, truth in truths.items():
+    for name, truth in truths_of(found, seed, wrong, kind).items():
         own = found.of_kind(name)
         pairs = [(each.difference - float(truth[each.value.index]), each.deviation) for each in own]
         rows[name] = [[_short(number) for number in pair] for pair in pairs]
+        rows["by_noise"][name] = [_short(each.deviation) for each in by_noise.of_kind(name)]
     if diagnose:
         rows["later"] = later(found, partial(records_of, seed, passes, wrong, kind), seed)
     return rows
@@ -224,14 +250,16 @@ def groups(folder: Path) -> Iterator[tuple[tuple[int, int, int], list[Any]]]:
     found: dict[tuple[int, int, int], list[Any]] = {}
     for path in sorted(folder.glob("*-*-*.json")):
         for each in known(path):
-            order = LINES.index(each["line"]), WRONG.index(each["wrong"]), each["passes"]
+            wrong = WRONG.index(each["wrong"]) + len(WRONG) * each.get("freed", False)
+            order = LINES.index(each["line"]), wrong, each["passes"]
             found.setdefault(order, []).append(each)
     yield from sorted(found.items())
 
 
 def model_of(number: int) -> str:
     """What is wrong with the model, in a table's words."""
-    return f"wrong: {WRONG[number]}" if number else "right"
+    freed, wrong = divmod(number, len(WRONG))
+    return f"{f'wrong: {WRONG[wrong]}' if wrong else 'right'}{', pantograph freed' if freed else ''}"
 
 
 def table(folder: Path) -> Iterator[str]:
@@ -239,14 +267,18 @@ def table(folder: Path) -> Iterator[str]:
     yield f"| {' | '.join(HEADINGS)} |"
     yield f"| --- | --- |{' ---: |' * (len(HEADINGS) - 2)}"
     for line, number, passes, own in _rows(folder):
-        cells = []
-        for kind, scale in SCALES.items():
-            errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
-            inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
-            cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
         unlike = np.mean([min(each["as_noise"]) < WHITE for each in own])
-        cells = [line, model_of(number), f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
-        yield f"| {' | '.join(cells)} |"
+        for alone in (False, True) if all("by_noise" in each for each in own) else (False,):
+            cells = []
+            for kind, scale in SCALES.items():
+                errors, deviations = np.array([pair for each in own for pair in each[kind]]).T
+                if alone:
+                    deviations = np.concatenate([each["by_noise"][kind] for each in own])
+                inside = 100 * np.mean(np.abs(errors) < INTERVAL * deviations)
+                cells.append(f"{scale * np.median(np.abs(errors)):.2g}, {inside:.0f} %")
+            model = model_of(number) + (", by noise alone" if alone else "")
+            cells = [line, model, f"{passes}", f"{len(own)}", *cells, f"{100 * unlike:.0f} %"]
+            yield f"| {' | '.join(cells)} |"
 
 
 def _rows(folder: Path) -> Iterator[tuple[str, int, int, list[Any]]]:
@@ -286,16 +318,17 @@ def main(
     passes: int = len(SPEEDS),
     line: str = LINES[0],
     wrong: str = WRONG[0],
+    freed: bool = False,
     diagnose: bool = False,
     only_table: Annotated[bool, typer.Option("--table")] = False,
 ) -> None:
     """Judge lines that are missing, and print the table."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{line}-{wrong}-{passes}.json"
+    path = folder / f"{line}-{wrong}-{passes}{'-freed' if freed else ''}.json"
     done = {row["seed"] for row in known(path) if "later" in row or not diagnose}
     for seed in [] if only_table else sorted(set(range(lines)) - done):
         rows = [other for other in known(path) if other["seed"] != seed]
-        rows.append(judge(seed, passes, wrong, line, diagnose))
+        rows.append(judge(seed, passes, wrong, line, diagnose=diagnose, freed=freed))
         text = ",\n".join(json.dumps(row) for row in sorted(rows, key=lambda row: row["seed"]))
         with write_whole(path) as temporary:
             temporary.write_text(f"[\n{text}\n]\n", encoding="utf-8")

@@ -15,6 +15,7 @@ from panto_env.fitting.fitted_line import with_table, with_value, write_line, wr
 from panto_env.fitting.misfit import State
 from panto_env.fitting.problem import problem
 from panto_env.fitting.solve import Solution
+from panto_env.fitting.stored import GOES_ON
 from panto_env.fitting.tables import remarks, rows_of, summary_table, values_table
 from panto_env.plant.line_condition import LineCondition
 
@@ -49,7 +50,8 @@ def made_up(ready, differences, shift=0.0, silent=()):
     x[len(fitting.values) :][: len(fitting.parts)] = shift
     state = State(x, start.static_forces, np.ones_like(start.noise), 3)
     residual = np.random.default_rng(0).standard_normal(len(fitting.band))
-    return Fit(ready, Solution(state, np.diag(deviation**2), np.empty((0, 0)), residual, True))
+    nothing = np.zeros((len(residual), len(x)))
+    return Fit(ready, Solution(state, np.diag(deviation**2), nothing, residual, True))
 
 
 @pytest.fixture(scope="module")
@@ -179,6 +181,7 @@ def test_tables_say_what_was_found(done):
     notes = remarks(done)
     assert "Lengths of droppers: the records tell 2 of 42." in notes
     assert not [note for note in notes if "settled" in note]
+    assert GOES_ON in notes
 
 
 TEXT = """\
