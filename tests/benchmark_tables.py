@@ -33,7 +33,7 @@ HEADLINE = (
 """Tracks that the page ranks: a policy can't win them without feedback."""
 COLUMNS = ("policy", "Δσ (%)", "95 %", "other lines", "100 spans on", "worst pass (%)", "not ranked, since")
 """Those of a full ranking that the page shows."""
-BEST = 4
+BEST = 3
 """How many of the best policies the page shows of each track."""
 SHOWN = {
     "agent-any-pantograph": "learned, for four pantographs",
