@@ -118,7 +118,7 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """True for ``Monitor``, whose "episode" a lane's info holds; no lane has another wrapper of its own."""
+        """True for ``Monitor``, whose "episode" a lane's info holds; no lane has another wrapper."""
         return [wrapper_class is Monitor] * len(self._get_indices(indices))
 
 

@@ -121,6 +121,7 @@ def test_a_network_repeats_its_own_pass(case):
     assert float(ratios[0]) == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_gradient_is_that_of_the_plant(case):
     """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
     training, made, seed, own = case
@@ -140,6 +141,7 @@ def test_the_gradient_is_that_of_the_plant(case):
         assert (reached[0] - reached[1]) / (2 * step) == pytest.approx(expected, rel=0.1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_responses_are_those_of_single_pulses():
     """A command pulse in the plant moves force and readings as the column of its step says."""
     training = settings()
@@ -238,6 +240,7 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     assert second.updates / first.updates == second.steps / first.steps  # all rounds are alike
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [0, 4])
 def test_a_training_goes_on_with_the_network_that_it_starts_from(units, tmp_path):
     shape = {"updates": 2, "batch_size": 2, "net_arch": [16, 8], "recurrent_units": units}

@@ -100,6 +100,7 @@ def test_a_process_that_stands_still_while_it_compiles_blocks_nobody_for_long(st
     assert start(brief + CALL).communicate(timeout=120) == ("4.5 0\n", "")
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_while_it_compiles_blocks_nobody(call, tmp_path):
     slow = "import module, os; module.thrice._compiler.compile = lambda *_: os._exit(3); module.thrice(1.5)"
     with pytest.raises(AssertionError):
@@ -172,6 +173,7 @@ for folder in sys.argv[1:]:
 """Calls the kernel with one cache after the other."""
 
 
+@pytest.mark.slow
 def test_a_damaged_kernel_is_compiled_anew(call, tmp_path):
     assert call() == (["4.5", "0"], "")
     copies = []
@@ -187,6 +189,7 @@ def test_a_damaged_kernel_is_compiled_anew(call, tmp_path):
     assert call() == (["4.5", "1"], "")
 
 
+@pytest.mark.slow
 def test_where_the_disk_is_full_it_runs_and_says_that_nothing_is_kept(call):
     def no_room():
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))

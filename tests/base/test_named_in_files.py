@@ -91,6 +91,7 @@ def test_the_base_of_a_model_file_and_of_its_base(model, tmp_path):
             load_it(path)
 
 
+@pytest.mark.slow
 def test_no_command_runs_the_base_of_a_model_file(model, tmp_path):
     for given in (
         ("evaluate", model),

@@ -140,6 +140,7 @@ def test_a_policy_that_cannot_be_loaded_is_named(tmp_path):
             play(policy)
 
 
+@pytest.mark.slow
 def test_its_python_may_be_another(monkeypatch, tmp_path):
     other = tmp_path / "bin" / "python3"
     other.parent.mkdir()

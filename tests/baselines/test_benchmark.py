@@ -268,6 +268,7 @@ def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> 
 # --- the command ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_json_gives(
     tmp_path: Path,
 ) -> None:
@@ -294,6 +295,7 @@ def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
     assert files[1].read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -42,6 +42,7 @@ def drawn_anew(lines, repetitions=6000):
     return stats.iqr(means, rng=(15.866, 84.134)) / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "seeds", "freedom"),
     [([(9, 1)], 9, 8), ([(9, 5)], 9, 8), ([(4, 2), (6, 3)], 10, 8)],
@@ -123,6 +124,7 @@ def test_intervals_cover_the_truth_in_95_percent_of_draws(kind, seeds, speeds):
     assert 93 <= coverage("mean", kind, seeds, speeds, repetitions=2500 if speeds == 1 else 1200) <= 97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_intervals_of_shares_cover_the_truth_in_95_percent_of_draws(kind):
     assert 93 <= coverage("share of 0.7", kind, 8, 5, repetitions=2500) <= 98

@@ -124,6 +124,7 @@ def test_what_cannot_be_a_train_is_refused_in_a_sentence():
         simulate(**TRAIN, controlled=[1, 2], policy=["pd"] * 3)
 
 
+@pytest.mark.slow
 def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
     lone = {"pantograph": "dsa380", "speed_kmh": SPEED_KMH}
     train = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": SPEED_KMH}

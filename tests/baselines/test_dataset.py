@@ -349,6 +349,7 @@ class TestDesigns:
         assert "A contact stiffer than" in warned["accuracy_warning"]
         assert warned["std"] > 0
 
+    @pytest.mark.slow
     def test_a_table_tells_what_it_is(self, tmp_path):
         found = few_designs(ranges=RANGES | {"catenary.encumbrance": (0.5, 1.3)}, count=8)
         made = make_designs.make_designs(found, tmp_path, workers=1)

@@ -145,6 +145,7 @@ def test_no_oracle_is_that_of_a_line_of_another_length():
     assert fingerprint(cell | {"spans": 122}) == fingerprint(cell | {"spans": 122, "distance": 1000.0})
 
 
+@pytest.mark.slow
 def test_tracks_of_lines_that_nobody_fitted_have_two_windows():
     for track in ("any-line", "unknown-line", "long"):
         assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)

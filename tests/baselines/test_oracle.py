@@ -207,6 +207,7 @@ def test_every_iteration_is_better_and_the_mean_stays(short: Problem, descent: s
     assert descent.iterations[-1].mean == pytest.approx(passive.mean, rel=search.MEAN_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_an_oracle_is_found_where_wires_change():
     asked = Problem(OVERLAP, seed=3, spans=SPANS)
     found = descend(asked, "zero", np.zeros((asked.count, 1)), iterations=3)
@@ -273,6 +274,7 @@ def test_response_along_directions_is_that_of_their_knots(monkeypatch: pytest.Mo
     np.testing.assert_allclose(asked.response_along(knots, basis), asked.response(knots) @ basis, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkeypatch: pytest.MonkeyPatch):
     begun: list[np.ndarray] = []
 
@@ -338,6 +340,7 @@ def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
         assert stored_ratio(given | other, spans) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("track", "config"),
     [
@@ -366,6 +369,7 @@ def called(*arguments: str) -> Any:
     return CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
 
 
+@pytest.mark.slow
 def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
     file, picture = tmp_path / "o.json", tmp_path / "o.png"

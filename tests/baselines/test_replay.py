@@ -73,6 +73,7 @@ def changed(result, folder, change):
     return path
 
 
+@pytest.mark.slow
 def test_every_figure_follows_from_the_actions(result):
     again = replay(result, workers=1)
     assert len(again.rows) == 3
@@ -83,6 +84,7 @@ def test_every_figure_follows_from_the_actions(result):
     assert some.follows is None
 
 
+@pytest.mark.slow
 def test_a_better_figure_or_rank_than_the_actions_give_is_found(result, tmp_path):
     def better(table, passes):
         table["rows"][-1]["std"] *= 1 - 1e-12
@@ -96,6 +98,7 @@ def test_a_better_figure_or_rank_than_the_actions_give_is_found(result, tmp_path
     assert replay(changed(result, tmp_path, first), workers=1).follows is False
 
 
+@pytest.mark.slow
 def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
     def nudged(table, passes):
         passes[-1].actions[40] += 1e-9
@@ -187,6 +190,7 @@ def checked(folder, *arguments):
     return CliRunner().invoke(replay_command.submission, [*words, *arguments], env={"COLUMNS": "200"})
 
 
+@pytest.mark.slow
 def test_the_example_would_be_ranked(folder, result):
     done = checked(folder, "--against", str(result))
     assert done.exit_code == 0, done.output

@@ -230,6 +230,7 @@ def test_a_browser_is_to_fetch_nothing_for_the_page():
     assert html() == html()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", names("benchmark"))
 def test_the_settings_shown_run_the_same_benchmark(tmp_path, name):
     settings = load_benchmark(name)
@@ -426,6 +427,7 @@ def test_a_short_ranking_has_the_best_policies_and_rows_of_the_full_one(track):
     assert {name for _, name in best} <= {row[1] for row in short.cells}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("track", TRACKS)
 def test_stored_results_are_of_the_tracks_as_they_are(track):
     stored = read_checked(DOCS / f"{track}.json.gz")

@@ -70,6 +70,7 @@ def read(result):
     return parse_result(result.as_dict(), "the outcome")
 
 
+@pytest.mark.slow
 def test_every_policy_of_the_result_has_the_mean_of_its_episodes(read):
     found = returns(read, episodes=2, arguments=SHORT, workers=1)
     assert [each.policy for each in found] == ["passive", "pd", "p:gain=0.1"]
@@ -127,6 +128,7 @@ def result_of_train(controlled):
     return train, SimpleNamespace(cells=cells, standings=standings, settings=settings)
 
 
+@pytest.mark.slow
 def test_a_result_of_a_train_has_returns_of_its_controlled_pantograph():
     at_one = SHORT | {"speed_kmh": 300.0}
     train, result = result_of_train(2)

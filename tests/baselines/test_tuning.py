@@ -386,6 +386,7 @@ def called(*arguments: str) -> Any:
     return CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
 
 
+@pytest.mark.slow
 def test_it_stores_gains_that_the_policy_then_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "mine.toml"
     monkeypatch.setattr("sys.argv", ["/somewhere/panto", "tune", "skyhook", *SMALL])
@@ -433,6 +434,7 @@ def test_what_it_cannot_do_is_said_at_once(
     assert file.read_text() == 'policy = "lqg"\n'
 
 
+@pytest.mark.slow
 def test_parts_of_another_tuning_are_not_taken(tmp_path: Path) -> None:
     settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
     given: dict[str, Any] = {"speeds_kmh": (250.0,), "passes": 11, "workers": 1}

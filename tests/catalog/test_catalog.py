@@ -79,6 +79,7 @@ def test_every_value_has_a_source(family: str, name: str) -> None:
             assert reference[1] in {*entry.sources, *available(family), *available("catenary"), *families}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "name"), [each for each in ENTRIES if each[0] not in LOADERS])
 def test_families_and_sections_have_lines(family: str, name: str) -> None:
     """Loading them takes that for granted."""

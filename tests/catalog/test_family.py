@@ -101,6 +101,7 @@ def test_the_wire_hangs_as_low_as_the_pre_sag_says():
     assert 0.0005 < max(sags) <= 0.001
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 @drawn
 def test_a_seed_is_a_line_and_no_two_seeds_or_episodes_share_one(source):

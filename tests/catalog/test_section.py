@@ -286,6 +286,7 @@ def test_a_section_of_the_catalogue_has_all_values_of_its_base_line(name):
     assert 1000.0 < max(wires[:-1]) <= max(wires) <= 1400.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "speed"), [(name, speed) for name, (_, speed) in FIXED.items()])
 def test_a_section_of_the_catalogue_keeps_the_standards(name, speed):
     """A passive run, gradients, and what the droppers carry at rest."""

@@ -141,6 +141,7 @@ def test_progress_is_shown_on_a_terminal_alone(terminal, monkeypatch):
 # --- validate, simulate, film -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_validate_prints_every_table_that_it_made_and_passes(monkeypatch):
     run = study.run
     validation = run()

@@ -108,6 +108,7 @@ def parts(text):
     return re.sub(r"[ ─━]+", " ", NUMBER.sub("#", text)).split("\n"), numbers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_prints_what_it_did(name):
     words, numbers = parts(printed(name))

@@ -96,6 +96,7 @@ def test_a_training_killed_between_two_checkpoints_loses_only_what_came_after_th
     assert steps_evaluated(folder) == [128 * k for k in range(7)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [{"start_from": "p"}, {"residual_of": "p"}, {}])
 def test_a_training_killed_before_its_first_checkpoint_ends_as_if_it_had_not_been(start, tmp_path):
     training = settings(**start)

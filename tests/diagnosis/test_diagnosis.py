@@ -279,6 +279,7 @@ def test_there_is_one_of_each_severity_and_as_many_broken_droppers_as_wanted(giv
         assert np.isnan(defect.position) if defect.kind == TENSION else begin <= defect.position <= end + 10
 
 
+@pytest.mark.slow
 def test_broken_droppers_are_found_and_named_and_a_healthy_line_is_healthy(healthy_runs):
     """At a speed, under a pantograph, and on lines that the classifier has not seen."""
     places = [(13, 3), (16, 5), (19, 7), (22, 4)]
@@ -375,6 +376,7 @@ def files(healthy_runs, tmp_path_factory):
     return names
 
 
+@pytest.mark.slow
 def test_command_prints_a_table_and_draws(files, tmp_path, monkeypatch):
     monkeypatch.setattr(console, "_width", 200)  # it has asked for its width when it was made
     picture = tmp_path / "line.png"

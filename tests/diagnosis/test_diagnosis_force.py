@@ -146,6 +146,7 @@ def test_a_run_shorter_than_a_span_says_how_far_to_run(runs):
         diagnose([short], runs[1:])
 
 
+@pytest.mark.slow
 def test_the_command_takes_the_pantograph_that_is_known(runs, tmp_path):
     """One whose values the run does not hold is known by its file; what it is changes what is estimated."""
     files = []

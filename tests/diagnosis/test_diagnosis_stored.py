@@ -70,6 +70,7 @@ def flat(value, name=""):
         yield name, value
 
 
+@pytest.mark.slow
 def test_the_same_passes_get_the_same_answer(healthy_runs):
     now, then = dict(flat(results(healthy_runs))), dict(flat(json.loads(STORED.read_text())))
     assert now.keys() == then.keys()

@@ -58,6 +58,7 @@ def run_to_end(env, action=0.0):
             return np.array(seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "limits"),
     [
@@ -148,12 +149,14 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
 # --- lanes -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [FAMILY, SECTION, LIST], ids=["family", "section", "list"])
 def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     ran = check_lanes_are_singles("Pantograph-v0", settings, steps=70)
     assert ran.ends > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_lanes_on_lines_of_their_own_answer_as_gymnasium_s_vector_environment(mode):
     ours = native("Pantograph-v0", autoreset_mode=mode, **FAMILY)
@@ -253,6 +256,7 @@ def test_bad_numbers_of_lines_and_lanes_are_refused(lanes, settings, message):
         make_vec(lanes, **settings)
 
 
+@pytest.mark.slow
 @drawn
 def test_groups_step_on_several_threads_as_on_one(settings, monkeypatch):
     """Over the ends of episodes, with new lines drawn within a step."""

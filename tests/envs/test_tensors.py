@@ -87,6 +87,7 @@ def check_episodes(arrays, tensors, within):
     raise AssertionError("no episode has ended")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", some_at_once(CASES, ["flexible", "stiffness"]))
 def test_lanes_are_those_of_arrays(case):
     name, settings = CASES[case]

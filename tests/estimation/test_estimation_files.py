@@ -79,6 +79,7 @@ def test_a_motion_survives_its_file(motion, record):
         np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_command_prints_compares_and_writes(record, tmp_path, monkeypatch):
     monkeypatch.setattr("panto_env.terminal.console._width", 200)
     output, picture = tmp_path / "force.parquet", tmp_path / "force.png"
@@ -115,6 +116,7 @@ def test_a_table_of_scores_has_the_units_of_its_headings():
     assert table.rows == [("0 to 20 Hz", "1.25", "3.50", "0.9870", "123.45")]
 
 
+@pytest.mark.slow
 def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
     seen = measure(run, rate=250.0, displacement_noise=6e-5)
     write_motion(seen, tmp_path / "noisy.csv")

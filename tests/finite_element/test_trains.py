@@ -46,6 +46,7 @@ def share(pantograph, part):
     return pantograph.model_copy(update=scaled | {key: part * getattr(pantograph, key) for key in single})
 
 
+@pytest.mark.slow
 def test_unequal_parts_side_by_side_are_one_pantograph(system):
     """What a contact's force does to another within the step, droppers slack or not, contact lost or not."""
     whole = DSA.model_copy(update={"contact_damping": 150.0, "aerodynamic_coefficient": 0.0})

@@ -19,6 +19,7 @@ SECTIONS = sections()
 EQUAL = ("en50318-2002", "benchmark-2015", "re330, stitched")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_at_once(EQUAL, ["en50318-2002"]))
 def test_equal_spans_of_a_sequence_move_as_one_span_repeated(name):
     """The shape of a whole line, with half a stitch wire at its ends, and of a periodic span."""

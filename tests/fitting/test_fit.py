@@ -33,6 +33,7 @@ def fitted(record, design, pantograph, coarse, steps):
     )
 
 
+@pytest.mark.slow
 def test_tensions_droppers_and_supports_are_found_within_their_intervals(fitted, truth):
     errors, deviations = (
         {

@@ -26,6 +26,7 @@ def true(ready, truth):
     return np.array([*(truth.of(value) for value in ready.values.all), *(0.0 for _ in OWN)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [0.009, -0.011])
 def test_droppers_that_are_far_off_jump_back(ready, true, by):
     """Both of two, by the distance of a jump each, and no other."""
@@ -40,6 +41,7 @@ def test_droppers_that_are_far_off_jump_back(ready, true, by):
     assert np.flatnonzero(moved).tolist() == off
 
 
+@pytest.mark.slow
 def test_no_dropper_jumps_where_that_makes_nothing_better(ready, true):
     assert ready._jumped(ended(ready, true), lambda doing: None) is None
 

@@ -116,6 +116,7 @@ def test_thousands(tmp_path):
         assert counts["refused"] > 0.3 * counts.total(), kind  # else it is the damage that is none
 
 
+@pytest.mark.slow
 def test_none_of_a_file_with_a_checksum_goes_unnoticed(tmp_path):
     (tmp_path / "files").mkdir()
     for name, subject in subjects(tmp_path / "files").items():

@@ -81,6 +81,7 @@ def test_response_is_exact_for_a_cubic_plate():
     np.testing.assert_allclose(states[-1], exact.y[:, -1], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("excitation", ALL, ids=name_of)
 def test_noise_free_records_give_the_truth_within_half_a_per_cent(excitation):
     fine = clean_record(excitation, TRUTH, time_step=1 / 20_000, duration=10.0)
@@ -101,6 +102,7 @@ def test_noise_ruins_the_printed_equations_and_the_low_pass_mends_them():
     assert (found.fits[OUTPUT_ERROR].std < found.fits[FILTERED].std).all()
 
 
+@pytest.mark.slow
 def test_output_error_goes_to_the_truth_as_noise_goes_to_zero():
     clean = clean_record(FREQUENCY_SWEEP, TRUTH)
     errors = []
@@ -207,6 +209,7 @@ def test_the_band_of_the_excitation_is_not_that_of_the_noise():
     assert excited_band(little) == pytest.approx(excited_band(clean), rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_the_record_does_not_agree_with_is_said():
     record = noisy()
     assert identify(record, KNOWN).doubts == ()

@@ -275,6 +275,7 @@ OTHER = replace(
 """With the frame of another rig: its motion has nothing to do with this plate's."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("record", "arguments", "message"),
     [

@@ -98,6 +98,7 @@ def test_bad_records_are_refused_with_line_and_column(rows, message, tmp_path):
         read_record(written(tmp_path, rows))
 
 
+@pytest.mark.slow
 def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
     result = panto(
         "identify", sweep, *MEASURED, "--free-offset", "--static-force", "54", "--json",

@@ -47,6 +47,7 @@ def test_csv_has_all_samples_with_units(run, tmp_path):
     assert frame["dropper_force at 70 m (N)"].to_numpy() == pytest.approx(run.dropper_force[:, 7])
 
 
+@pytest.mark.slow
 def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
     assert list(book) == ["figures", "droppers", "run", "about"]
     check_samples(book["run"], run)
@@ -112,6 +113,7 @@ def test_only_parquet_is_read_again(run, tmp_path):
         run.save(tmp_path / "run.txt")
 
 
+@pytest.mark.slow
 def test_commands_write_them(tmp_path):
     light = ("--catenary", "re250", "--pantograph", "dsa250", "--speed", 160, "--output")
     files = ("--figures", "figures.xlsx", "--droppers", "droppers.csv")

@@ -87,6 +87,7 @@ def crafted(path):
         yield facts, {name: column[:rows] for name, column in columns.items()}
 
 
+@pytest.mark.slow
 def test_a_crafted_run_is_refused_in_a_sentence_or_shown(tmp_path):
     """With a checksum that fits: no entry leads to anything but figures or one sentence."""
     path, ends = tmp_path / "run.parquet", []

@@ -134,6 +134,7 @@ def test_the_same_seed_gives_the_same_line_and_another_one_another():
     assert np.abs(runs[0].contact_force - runs[2].contact_force).max() > 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [250.0, 300.0, 350.0])
 def test_sigma_spreads_over_seeds(speed):
     """Under "smooth" lines it hardly does. ``pytest -s`` shows the figures."""

@@ -25,6 +25,7 @@ def test_heights_at_droppers_differ_by_as_much_as_is_said(level, twice_rms):
     assert np.abs(differences).max() < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "pantograph", "speed"),
     [("en50318-2002", "en50318-2002", 250.0), ("sweden-st15", "dsa250", 160.0), ("re330", "dsa380", 330.0)],

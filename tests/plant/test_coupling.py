@@ -77,6 +77,7 @@ def test_the_stiffest_explicit_contact_of_modes_is_that_of_one_step_after_anothe
 FINE = {"spacing": 0.125, "time_step": 2.5e-4}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", ["full", "fast"])
 @pytest.mark.parametrize(
     ("catenary", "pantograph", "speed"),

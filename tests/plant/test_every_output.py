@@ -9,6 +9,7 @@ DROPPERS = {"uniform, `en50318-2002`": 3.5}
 """Bound of the largest force of a dropper (N) where it is not 3: 8 spans take 3.4 N of 221 at any step."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_every_output_in_a_window_is_that_of_the_whole_line(name):
     """Droppers ahead of the train too: there new spans come in."""

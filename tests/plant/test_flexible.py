@@ -107,6 +107,7 @@ def undamped(line):
     )
 
 
+@pytest.mark.slow
 @PRECISIONS
 def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     """From an anchor, d'Alembert and one image give w(vt, t) = F v t / (m c (c + v))."""
@@ -196,6 +197,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar, precis
     assert swing(undamped(load_catenary(EN)), 10, 300.0, height, goes_slack, energy, precision)[0] < bar
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", some_at_once([250.0, 300.0], [300.0]))
 def test_agrees_with_finite_elements(speed):
     """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""

@@ -55,6 +55,7 @@ def test_each_cell_finds_the_nearest_dropper(line):
         assert abs(place - (first + cell + 0.5)) == pytest.approx(away[nearest], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:A grid of")
 @pytest.mark.parametrize("catenary", ["en50318-2002", "sweden-st15"])
 def test_slow_trains_pass_droppers_as_on_a_fine_grid(catenary, monkeypatch):

@@ -211,6 +211,7 @@ def test_ice_weighs_on_both_pairs_and_not_on_stitch_wires():
             run(line, line_condition={"temperature": 10.0})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "pantograph", "speed", "distance", "spans"),
     [

@@ -41,6 +41,7 @@ def exact_force(speed_kmh, position, unilateral):
     return push(solution.t, solution.y[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unilateral", [True, False])
 @pytest.mark.parametrize("speed", [160, 250, 350])
 def test_contact_force_matches_scipy(speed, unilateral):

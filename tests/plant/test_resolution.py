@@ -129,6 +129,7 @@ def assert_within_bounds(check, limp=False):
     assert abs(check.contact_loss) < (0.75 if check.drawn else 0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "speed"), [(4, 0.62), (4, 0.7), (8, 0.62), (16, 30.0), (20, 0.5)])
 def test_lines_outside_the_catalogue_are_as_accurate(seed, speed):
     """Wires without bending stiffness, under trams and light trains: sigma was wrong by 1.0 to 1.8 %.
@@ -142,6 +143,7 @@ def test_lines_outside_the_catalogue_are_as_accurate(seed, speed):
     assert_within_bounds(check)
 
 
+@pytest.mark.slow
 def test_a_pantograph_behind_another_on_unlike_spans_is_as_accurate():
     """On the grid of a single one its minimum was wrong by 2.9 % of the mean force, its maximum by 3.1 %."""
     spans = [{"span_length": 65.0 if each == "l" else 30.0} for each in "lsllllllllsllsllllllllls"]

@@ -42,6 +42,7 @@ def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
     assert 0.90 < side_resolved() < 0.92
 
 
+@pytest.mark.slow
 def test_gusts_at_a_place_have_panofsky_s_spectrum_less_what_is_short_along_the_track():
     """Welch's estimate over many lanes; the share within the shortest wave is Cauchy's distribution."""
     step, wind, deviation, found = 0.05, 20.0, 0.5 * 0.17 * 20.0, []

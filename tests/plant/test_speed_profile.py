@@ -68,6 +68,7 @@ def test_the_lift_is_that_of_the_speed_at_each_step():
     assert run.lift == pytest.approx(lift, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_it_agrees_with_finite_elements_while_the_train_brakes_and_speeds_up():
     """Sigma within 2 %, mean, maximum and minimum within 2 % of the mean."""
     points = [(0, 250), (100, 250), (340, 215), (450, 230)]
@@ -86,6 +87,7 @@ def test_it_agrees_with_finite_elements_while_the_train_brakes_and_speeds_up():
     assert ours.minimum == pytest.approx(theirs.minimum, abs=near)
 
 
+@pytest.mark.slow
 def test_the_judge_s_energy_is_balanced_while_the_train_brakes():
     """What lift and train give, F v y' with the speed of each step, is stored and lost."""
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")

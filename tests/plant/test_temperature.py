@@ -78,6 +78,7 @@ def judged(data, ice, tensions):
     return system.nodes, now[:, 2], pull, np.array(slack)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "wires", "weather"), [(k, n, (k + n) % 3) for k in range(3) for n in range(3)]
 )
@@ -157,6 +158,7 @@ def test_a_long_line_of_spans_that_nearly_agree_has_the_tension_of_the_uniform_o
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "weather"),
     [

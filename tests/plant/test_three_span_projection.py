@@ -113,6 +113,7 @@ def ours():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [50, 75, 100])
 def test_the_minimum_after_the_projection_is_that_of_the_printed_equations(ours, modes):
     """SciPy's takes the modes where the pantograph is; ours from a table, in steps of 2.5 ms."""
@@ -122,6 +123,7 @@ def test_the_minimum_after_the_projection_is_that_of_the_printed_equations(ours,
     assert ours[modes].std == pytest.approx(deviation, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_minimum_depends_on_what_the_paper_does_not_print(ours):
     """8 N lie between 50 and 100 modes, and more between ways to treat the velocities."""
     assert ours[50].min - ours[100].min == pytest.approx(9.0, abs=1.5)

@@ -17,6 +17,7 @@ IN_PROOFS = ("both", "stitched-330", "overlap-2002")
 """One of each kind, and "both" is "mixed" under "bridge". The others are compared in `make studies`."""
 
 
+@pytest.mark.slow
 def test_contact_force_and_uplift_on_unlike_spans_are_those_of_finite_elements():
     agrees(SECTIONS["mixed"], element=1.0)
 

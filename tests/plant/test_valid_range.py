@@ -79,6 +79,7 @@ def _ask(line, wire, answer):
     answer[0] = ending_by_wire(line, wire, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_wires_that_touch_at_a_dropper_end_a_run(precision):
     """Mid-span the dropper is 0.741 m long: the messenger may sink by so much, and no more."""

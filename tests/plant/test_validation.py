@@ -65,6 +65,7 @@ def test_finite_elements_are_compared_with_the_default_s_grid_and_step(monkeypat
     assert row_of(capsys.readouterr().out, "300")[1:4] == ["finite differences", "0.312", "1.67"]
 
 
+@pytest.mark.slow
 def test_a_worn_line_has_its_contact_loss_by_default_and_its_low_passed_figures_on_any_grid():
     """What docs/conditions.md says of waves of 0.8 m, of the preset's depth and of 2 mm, and of 0.4 m."""
     fine, full, fast = wear.DISCRETISATIONS

@@ -120,6 +120,7 @@ def test_static_state_agrees_with_finite_elements(name, defects):
     assert np.abs(ours - whole.static[:, 0]).max() > 4e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_at_once(CONDITIONS, ["all"]))
 def test_contact_force_agrees_with_finite_elements(monkeypatch, name):
     condition = LineCondition(**CONDITIONS[name])

@@ -49,6 +49,7 @@ CASES = {
 """Tracks that ask of the policies that win others what no sound pass shows."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_tracks_of_cases_have_pd_and_fb_ff_with_a_washout(name):
     assert {"pd:washout=1", "fb+ff:gain=0.3,washout=1"} <= set(
@@ -56,6 +57,7 @@ def test_tracks_of_cases_have_pd_and_fb_ff_with_a_washout(name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [name for name in names("benchmark") if name.startswith("benchmark/") and name not in CASES] + ["demo"],

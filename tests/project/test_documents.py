@@ -151,6 +151,7 @@ def run(page, folder):
         assert done.returncode == 0, f"{command.place}\nwas run as {line}\n{done.stdout}{done.stderr}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", pages())
 def test_every_command_can_be_given(page):
     for command in commands(page):
@@ -167,6 +168,7 @@ WITH_PYTHON = [page for page in pages() if "```python" in (ROOT / page).read_tex
 LONG = ("docs/datasets.md", "docs/films.md", "docs/gpu.md")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", some_at_once(WITH_PYTHON, set(WITH_PYTHON) - set(LONG)))
 def test_python_of_a_page_runs(page, folder, capsys):
     names = {"__name__": page}

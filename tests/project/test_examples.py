@@ -97,6 +97,7 @@ def test_design_sweep_finds_the_lightest_head_and_the_tightest_wire(run, tmp_pat
     assert best["mean"] == pytest.approx(130.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_identify_from_csv_finds_the_truth(run, tmp_path):
     example, told, said = run("identify_from_csv")
     assert told in said

@@ -227,7 +227,8 @@ SENTENCES = {
             ),
         ),
         (
-            "−{:.1f} % on the track any-line (−{:.1f} to −{:.1f}; `repetitive` −{:.1f} %), in both windows alike",
+            "−{:.1f} % on the track any-line (−{:.1f} to −{:.1f}; `repetitive` −{:.1f} %), in both windows "
+            "alike",
             lambda: (
                 *np.array(less("any-line", "agent-small"))[[0, 2, 1]],
                 less("any-line", "repetitive")[0],
@@ -368,6 +369,7 @@ SENTENCES = {
 """By document: sentences with places for figures, and the figures from the stored results."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", SENTENCES)
 def test_sentences_hold(page):
     text = re.sub(r"\s+", " ", (ROOT / page).read_text(encoding="utf-8").replace("*", ""))

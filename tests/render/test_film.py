@@ -208,6 +208,7 @@ def noise(number=60):
     return (random.integers(0, 255, (*SIZE, 3), dtype=np.uint8) for _ in range(number))
 
 
+@pytest.mark.slow
 @unix
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_full_disk_is_one_sentence_and_the_film_before_stays(suffix, tmp_path, monkeypatch):

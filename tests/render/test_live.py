@@ -135,6 +135,7 @@ def on_terminal(*arguments, interrupt=b""):
     return written, os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
+@pytest.mark.slow
 def test_the_command_draws_on_a_terminal_and_tells_the_same_figures(tmp_path):
     settings = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--speed", 200]
     written, status = on_terminal("simulate", "--live", *settings, "--output", tmp_path / "live.parquet")
@@ -147,6 +148,7 @@ def test_the_command_draws_on_a_terminal_and_tells_the_same_figures(tmp_path):
     np.testing.assert_array_equal(*(run.contact_force for run in runs))
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
     (tmp_path / "slow.py").write_text(
         "import time\nclass Slow:\n    def reset(self, context): pass\n"

@@ -48,6 +48,7 @@ PICTURES = {f"frame-{name}": partial(frame, name) for name in FRAMES}
 PICTURES |= {name: partial(pixels, plot) for name, plot in PLOTS.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_picture_is_as_it_was(name):
     now = np.asarray(PICTURES[name]()).astype(int)

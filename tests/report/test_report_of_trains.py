@@ -79,6 +79,7 @@ def test_samples_of_each_have_its_number_in_the_heading(run, tmp_path):
     np.testing.assert_allclose([float(row["contact_force (N)"]) for row in rows], run.contact_force)
 
 
+@pytest.mark.slow
 def test_a_workbook_has_figures_and_droppers_of_each(run, tmp_path):
     run.save(tmp_path / "t.xlsx")
     book = load_workbook(tmp_path / "t.xlsx", read_only=True)

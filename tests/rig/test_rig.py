@@ -88,6 +88,7 @@ def parts_of_run(data, commands, force):
     return model, heights, cells
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 @pytest.mark.parametrize("delay", [0.0, 0.6e-3])
 def test_the_cylinder_is_its_transfer_function_behind_the_delay(delay):
@@ -182,6 +183,7 @@ def test_the_inverse_is_that_of_cylinder_and_delay_up_to_the_square_of_frequency
 # --- the whole -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_rig_without_faults_is_the_line_itself_the_closer_the_shorter_the_time_step():
     """Whatever its sampling interval: the line is computed where the force was measured."""
     errors = {}

@@ -200,6 +200,7 @@ def test_the_flexible_line_on_a_rig_is_followed_and_three_spans_without_droppers
         )
 
 
+@pytest.mark.slow
 def test_the_command_prints_tables_draws_a_picture_and_gives_json(capsys, tmp_path):
     picture = tmp_path / "rig.png"
     make_app()(["rig", "rig-flexible", "--clock", "0.1", "--plot", str(picture)], standalone_mode=False)

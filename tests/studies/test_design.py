@@ -61,6 +61,7 @@ def test_figures_of_a_design_are_those_of_its_passes(tmp_path):
     assert found.excess == 0 or found.broken
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_where_it_was_broken_off_and_refuses_another_one(tmp_path):
     first = search(design(designs=12), tmp_path)
     known = [trial.values for trial in first.trials]
@@ -164,6 +165,7 @@ distance = 600
 """
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_it_found(tmp_path):
     file, folder = tmp_path / "study.toml", tmp_path / "out"
     file.write_text(STUDY, encoding="utf-8")

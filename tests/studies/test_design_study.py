@@ -45,6 +45,7 @@ def test_what_is_replaced_ends_at_the_first_step_that_is_worse():
     assert refused.equal_std == refused.equal_requirements == refused.steps[0]
 
 
+@pytest.mark.slow
 def test_what_control_replaces_is_what_passes_say(monkeypatch):
     """At 250 km/h on the reference line: without control, and under it with nine tenths of the tension."""
     monkeypatch.setattr(retrofit, "SHARES", (0.9,))

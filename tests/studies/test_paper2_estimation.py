@@ -40,6 +40,7 @@ def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
         assert scores[observation, 1e-4].delay > 1.8 * scores[observation, 1e-5].delay
 
 
+@pytest.mark.slow
 def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
     told = estimation.parameter_information(trajectory)
     true = {"masses.2": 13.0, "stiffnesses.1": 7000.0, "dampings.2": 100.0}

@@ -34,6 +34,7 @@ def changes(one, passive):
     return np.array(one.bands) / np.array(passive.bands) - 1
 
 
+@pytest.mark.slow
 def test_the_frame_is_for_low_frequencies_and_the_head_for_medium_ones(passive, at_15_watts):
     """The paper's words, at equal electrical power."""
     frame, head, both = (changes(at_15_watts[place], passive) for place in motors.PLACES)

@@ -70,6 +70,7 @@ def test_nothing_is_permissible_where_the_lowest_speed_is_forbidden():
 TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [200], "controlled": [1, 2]}
 
 
+@pytest.mark.slow
 def test_a_scan_says_what_its_passes_do():
     """At 245 km/h the second pantograph alone breaks a requirement, that of σ."""
     ideal = {"line_condition": "new", "pantograph_scatter": 0.0, "speed_drift": 0.0, "sensors": "ideal"}
@@ -86,6 +87,7 @@ def test_a_scan_says_what_its_passes_do():
     assert 0 < controlled.watts < 50
 
 
+@pytest.mark.slow
 def test_a_policy_that_refuses_a_speed_forbids_it():
     found = scan([200, 300], ["tuned-pd"], seeds=[0], workers=1, catenary="en50318-2002", distance=700)
     assert math.isnan(found.answer("tuned-pd").limit)
@@ -97,6 +99,7 @@ def test_a_policy_that_is_not_there_is_refused_before_any_pass():
         scan([200], ["nobody"], seeds=[0], workers=1, catenary="en50318-2002")
 
 
+@pytest.mark.slow
 def test_its_command_prints_what_it_writes(tmp_path):
     page, picture = tmp_path / "page.html", tmp_path / "speeds.png"
     given = ["permissible-speed", "re330", "--pantograph", "dsa380", "--speeds", "250:260:10", "--seeds", "1"]
