@@ -260,6 +260,8 @@ class Monitor:
     """Whether control does good: the gate by which a command is multiplied, 0 to 1."""
 
     def __init__(self, context: Context, delay: float, lag: float) -> None:
+        from scipy.signal import butter, lfilter_zi  # slow to import
+
         self._interval, self._limit = context.control_interval, context.force_limit
         line, layout = mean_line(context), context.layout
         self.models = [
@@ -279,8 +281,6 @@ class Monitor:
         self._means = np.zeros((2, 3))  # over both windows: of the force, without control, and what that adds
         self._squares, self._added = np.zeros((2, 3)), 0.0
         self._begun = False
-        from scipy.signal import butter, lfilter_zi  # slow to import
-
         self.low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
         self.at_rest = lfilter_zi(*self.low_pass)
         self.gate, self.low = 0.0, False

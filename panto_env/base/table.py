@@ -49,12 +49,12 @@ class Table:
         """The rows as text, in which no zero has a sign."""
         return [tuple(map(_cell, row)) for row in self.rows]
 
-    def of_largest(self, sizes: Sequence[float], most: int, what: str) -> Self:
-        """At most so many rows, in their order: those with the largest sizes; the title says so.
+    def of_largest(self, sizes: Sequence[float], most: int | None, what: str) -> Self:
+        """At most so many rows, all by None, in their order: those with the largest sizes; the title says so.
 
         sizes: one for each row; what: name of the sizes.
         """
-        if len(self.rows) <= most:
+        if most is None or len(self.rows) <= most:
             return self
         kept = sorted(sorted(range(len(self.rows)), key=lambda row: -sizes[row])[:most])
         title = f"{self.title}: the {most} of {len(self.rows)} with the largest {what}"

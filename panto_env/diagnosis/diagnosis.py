@@ -17,7 +17,6 @@ from ..base.table import Table
 from ..catalog import load_pantograph
 from ..fitting.stored import GOES_ON, Stored
 from ..metrics.trajectory import Trajectory
-from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
 from .features import (
@@ -120,8 +119,7 @@ def diagnose_records(
     """
     passes, reference, notes = measured_passes(records, known, seed)
     found = judge(passes, Healthy.of(reference), false_alarms, classifier)
-    line = FlexibleCatenaryData.model_validate_json(known.line)
-    ahead = [GOES_ON] if found.findings and not line.ends else []
+    ahead = [GOES_ON] if found.findings and not known.design.ends else []
     return replace(found, notes=(*notes, *known.notes, *ahead, *found.notes))
 
 

@@ -22,7 +22,6 @@ from ..fitting.solve import Fitting
 from ..fitting.stored import Stored, turned
 from ..fitting.values import FREE
 from ..plant.alignment import Alignment
-from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
 from .passes import LEAD, SPEEDS, Passes, places_of, places_per_span
@@ -42,7 +41,7 @@ def measured_passes(
     that cover no two spans of the fit's stretch together, and as ``fitting.problem.problem`` does.
     """
     try:
-        line = FlexibleCatenaryData.model_validate_json(known.line)
+        line = known.design
         pantograph = PantographData.model_validate_json(known.pantograph)
     except ValidationError as error:
         raise InputError(

@@ -15,6 +15,7 @@ from ..base.arrays import Array
 from ..base.checksums import checksum, read_arrays, write_arrays
 from ..base.errors import InputError
 from ..base.settings import Settings
+from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CLEAR
 from ..records.record import Record
 from .fit import WHITE, Fit
@@ -123,6 +124,11 @@ class Stored:
     compared: tuple[float, float]  # stretch of the line that the records cover (m)
     noise: Array  # (bands,): standard deviation of what each band of the records' forces has besides (N)
     notes: tuple[str, ...]  # why it is less sure than it says
+
+    @property
+    def design(self) -> FlexibleCatenaryData:
+        """The line that its values count from. Raises ValidationError for one of another version."""
+        return FlexibleCatenaryData.model_validate_json(self.line)
 
 
 def knowledge(fit: Fit, records: str) -> Stored:

@@ -261,7 +261,7 @@ def spans_table(found: Comparison, most: int | None = None) -> Table:
     short = [f"{LABELS[key].short} {whose}" for key in STATISTICS for whose in ("rec.", "run")]
     table = Table("By span (N)", ("span", "from (m)", *short, "σ: run − record (%)"), rows)
     sizes = [abs(deviation(each.std)) for each in found.spans]
-    return table.of_largest(sizes, most or len(rows), "difference of σ")
+    return table.of_largest(sizes, most, "difference of σ")
 
 
 def deviation(pair: tuple[float, float]) -> float:

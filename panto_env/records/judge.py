@@ -299,7 +299,7 @@ def part_tables(found: Judgement, most: int | None = None) -> list[Table]:
             short = [LABELS[key].short_heading for key in SHOWN]
             table = Table(title, ("where", *short, "NQ (%)", *long, "km/h"), rows)
             sizes = [part.figures.std for part in parts]
-            tables.append(table.of_largest(sizes, most or len(parts), "σ"))
+            tables.append(table.of_largest(sizes, most, "σ"))
     return tables
 
 
