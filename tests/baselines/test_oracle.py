@@ -402,17 +402,19 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
 def test_a_line_of_each_seed_is_searched_by_itself(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
     """As built, under a pantograph of each seed, at a drifting speed: as a track of the benchmark is."""
     monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
-    file = tmp_path / "o.json"
+    track = load_benchmark(find_config("benchmark/any-line", "benchmark"))
+    given = along(track, track.lines[0]) | {"speed_kmh": 275}
+    file, config = tmp_path / "o.json", tmp_path / "o.toml"
+    config.write_text(f"line_spans = {given['spans']}")
     result = called(
         "--catenary", "family:high-speed", "--pantograph", "dsa380", "--actuator", "realistic",
         "--speed", "275", "--line-condition", "as-built", "--pantograph-scatter", "0.05",
-        "--speed-drift", "0.5", "--seed", "0", "--seed", "1", "--spans", "2-2", "--output", str(file),
+        "--speed-drift", "0.5", "--seed", "0", "--seed", "1", "--spans", "2-2",
+        "--config", str(config), "--output", str(file),
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     (cell,) = stored.read(file)["cells"]
     assert cell["catenary"] == "family:high-speed"
-    track = load_benchmark(find_config("benchmark/any-line", "benchmark"))
-    given = along(track, track.lines[0]) | {"speed_kmh": 275}
     monkeypatch.setattr(stored, "stored_cells", lambda: [cell])
     assert stored_ratio(given, SPANS) == pytest.approx(cell["ratio"])
     assert stored_ratio(given | {"speed_drift": 0.0}, SPANS) is None
