@@ -13,7 +13,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/pip install --quiet --upgrade pip
 	@$(BIN)/pip install --quiet --constraint constraints.txt torch
-	@$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,app,control,data,design,diagnosis,dev,docs,onboard,pettingzoo,render]'
+	@$(BIN)/pip install -qq --constraint constraints.txt --editable '.[agents,app,control,data,design,diagnosis,dev,docs,onboard,parquet,pettingzoo,render]'
 	@touch $@
 
 # Validation, two agents trained for a quarter of a minute each, and the benchmark of all policies.
@@ -149,7 +149,7 @@ fuzz: $(READY)
 # The lower bounds of pyproject.toml, all at once, without the extra 'agents'; what they need themselves is the
 # newest that there is. The versions tested are in constraints.txt.
 FLOORS := .venv-floors
-FLOOR_EXTRAS := control,diagnosis,pettingzoo,render
+FLOOR_EXTRAS := control,diagnosis,parquet,pettingzoo,render
 floors:
 	$(PYTHON) -m venv $(FLOORS)
 	$(FLOORS)/bin/pip install -qq --upgrade pip packaging

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +11,8 @@ import typer
 from rich import table as rich_table
 
 from panto_env.analysis.options import print_criteria, with_settings
-from panto_env.base.errors import InputError, listed
+from panto_env.base.errors import InputError
+from panto_env.base.extras import require
 from panto_env.base.files import check_output, make_folder
 from panto_env.base.table import Table
 from panto_env.cluster import RayAddress
@@ -43,12 +43,7 @@ Workers = Annotated[int | None, typer.Option(help="Processes; one per core by de
 
 def check_packages() -> None:
     """Raise InputError, naming them, if packages that a training needs are not installed."""
-    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"Training needs {listed(missing)} not installed; install panto-env with its "
-            "extra: pip install 'panto-env[agents]'."
-        )
+    require("Training", "agents", "torch", "stable_baselines3", "tensorboard")
 
 
 ROWS = ["mean", "std", "max", "min", "cost_function", "contact_loss", "max_uplift", "effort", "effort_rate"]

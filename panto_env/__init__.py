@@ -5,6 +5,7 @@ from typing import Any
 from .analysis.simulation import simulate
 from .base.checksums import __version__
 from .base.errors import InputError
+from .base.extras import require
 from .catalog import line, pantograph
 from .envs import register
 from .metrics.trajectory import Trajectory
@@ -19,6 +20,7 @@ def parallel_env(**settings: Any) -> Any:
 
     Raises InputError for a value that is not valid, and without PettingZoo.
     """
-    from .envs.parallel import PantographParallelEnv  # PettingZoo is an extra
+    require("A parallel environment", "pettingzoo", "pettingzoo")
+    from .envs.parallel import PantographParallelEnv
 
     return PantographParallelEnv(**settings)

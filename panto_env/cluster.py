@@ -18,6 +18,7 @@ from .analysis.pool import LINEAR_ALGEBRA_THREADS, Job, Progress, collect, in_pr
 from .backend.cache import source_hash
 from .base.checksums import __version__, commit, read_checked, write_checked
 from .base.errors import InputError, shown
+from .base.extras import require
 from .base.files import make_folder
 from .base.machine import cores
 
@@ -91,12 +92,9 @@ def _reason(error: Exception) -> str:
 @contextmanager
 def _connected(address: str) -> Iterator[Any]:
     """Ray, connected to a cluster within the body; at the end tasks that still run are stopped."""
-    try:
-        import ray
-    except ImportError as error:
-        raise InputError(
-            f"A cluster needs Ray, which is not installed ({error}); install panto-env with its extra 'ray'."
-        ) from error
+    require("A cluster", "ray", "ray")
+    import ray
+
     if ray.is_initialized():
         raise InputError("This process is connected to a Ray cluster already; call ray.shutdown() before.")
     variables = dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")  # for the reason see ``in_processes``

@@ -12,7 +12,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env.base.errors import InputError, suggest
+from panto_env.base.extras import require
 
 from .export import Exported
 from .fmu import run_tool
@@ -77,8 +77,7 @@ def cost(exported: Exported, processor: str = "cortex-m7", steps: int = 100, see
             f"Costs need the compiler {PREFIX}gcc with newlib; install gcc-arm-none-eabi and "
             "libnewlib-arm-none-eabi, as Debian calls them."
         )
-    if find_spec("unicorn") is None:
-        raise InputError("Costs need the package unicorn: pip install 'panto-env[onboard]'.")
+    require("A step's cost", "onboard", "unicorn")
     image, symbols, program = _program(exported, PROCESSORS[processor])
     emulator = _Emulator(image, {name: address for name, (address, _) in symbols.items()})
     start = emulator.call("begin")

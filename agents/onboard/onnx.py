@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from panto_baselines.policies.repetitive import WashoutSettings
 from panto_env.base.errors import InputError
+from panto_env.base.extras import require
 from panto_env.base.files import write_whole
 from panto_env.policies import Policy
 
@@ -37,8 +37,7 @@ def write_onnx(policy: Policy, path: str | Path) -> None:
     network and a washout of the policy itself are included. Raises InputError for a policy that is more than
     its network, where the package onnx is missing, or if the file can't be written.
     """
-    if find_spec("onnx") is None:
-        raise InputError("ONNX needs the package onnx: pip install 'panto-env[onboard]'.")
+    require("ONNX", "onboard", "onnx")
     if not isinstance(policy, TrainedPolicy):
         held = type(policy).__name__
         raise InputError(f"ONNX holds the network of one trained policy, not {held}; export it as C instead.")

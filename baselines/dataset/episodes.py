@@ -1,6 +1,6 @@
 """Episodes: a policy's actions and the environment's responses, as a Minari data set and as one table.
 
-Minari, part of the extra 'data', is imported late.
+Minari and PyArrow, of the extra 'data', are imported late.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from panto_env.base.checksums import __version__, read_arrays, write_arrays
@@ -222,8 +220,8 @@ class StepsTable:
     def __init__(self, path: Path) -> None:
         """path: of the file to write."""
         self._path = path
-        self._writer: pq.ParquetWriter | None = None
-        self._waiting: list[pa.Table] = []
+        self._writer: Any = None
+        self._waiting: list[Any] = []
 
     def __enter__(self) -> StepsTable:
         return self
@@ -235,6 +233,8 @@ class StepsTable:
 
     def add(self, plan: Plan, episode: Episode) -> None:
         """Add an episode."""
+        import pyarrow as pa
+
         count = len(episode.rewards)
         values = (
             pa.array(np.full(count, plan.number)),
@@ -255,6 +255,9 @@ class StepsTable:
     def _flush(self) -> None:
         if not self._waiting:
             return
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         table = pa.concat_tables(self._waiting)
         if self._writer is None:
             self._writer = pq.ParquetWriter(self._path, table.schema, compression="zstd")
@@ -264,6 +267,8 @@ class StepsTable:
 
 def _column(array: Any) -> Any:
     """Arrow array of (n,) numbers, or of (n, k) as lists of k."""
+    import pyarrow as pa
+
     if array.ndim == 1:
         return pa.array(array)
     return pa.FixedSizeListArray.from_arrays(pa.array(array.ravel()), array.shape[1])
@@ -271,18 +276,6 @@ def _column(array: Any) -> Any:
 
 KEY = "panto_env"
 """Key of a data set's identity in its metadata."""
-
-
-def check_minari() -> None:
-    """Raise InputError if Minari, or h5py, which it writes with, is not installed."""
-    try:
-        import h5py  # noqa: F401
-        import minari  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            f"Data sets of episodes need Minari, which is not installed ({error}); install panto-env with "
-            "its extra: pip install 'panto-env[data]'."
-        ) from error
 
 
 def write_minari(

@@ -14,6 +14,7 @@ from typing import Any
 from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import read_checked, sha256_of
 from panto_env.base.errors import InputError
+from panto_env.base.extras import require
 from panto_env.base.files import alone_in, make_folder, write_whole
 from panto_env.cluster import (
     PARTS,
@@ -33,7 +34,6 @@ from .episodes import (
     STEPS,
     Episode,
     StepsTable,
-    check_minari,
     check_places,
     make,
     read_episodes,
@@ -127,6 +127,7 @@ def make_designs(
 
     Raises InputError if the folder holds a table made with other settings.
     """
+    require("A table of designs", "data", "pyarrow")
     made_of = identity("designs", settings.model_dump(mode="json"))
     folder = output / "designs"
     with alone_in(output, "makes data in"):
@@ -239,7 +240,7 @@ def make_episodes(
     Raises InputError for invalid settings, for a policy that fails, and if the folder holds a data set of the
     same id made with other settings.
     """
-    check_minari()
+    require("A data set of episodes", "data", "minari", "h5py", "pyarrow")
     check_places(settings)
     with alone_in(output, "makes data in"):
         sets = [_Order.of(settings, policy_set, output) for policy_set in settings.sets]

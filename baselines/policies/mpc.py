@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from panto_env.base.errors import InputError, shown
+from panto_env.base.extras import require
 from panto_env.control.observation import Context
 
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
@@ -103,13 +104,9 @@ class PredictiveControl(TunableLaw):
 
 def quadratic_solver(whose: str) -> Any:
     """A solver of OSQP, an extra. Raises InputError, naming what needs it, if it is not installed."""
-    try:
-        import osqp
-    except ImportError as error:
-        raise InputError(
-            f"{whose} needs OSQP, which is not installed ({error}); install panto-env with its extra "
-            "'control'."
-        ) from error
+    require(whose, "control", "osqp")
+    import osqp
+
     return osqp.OSQP()
 
 

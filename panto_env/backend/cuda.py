@@ -21,7 +21,7 @@ from llvmlite import ir
 from numba import types
 from numba.core.extending import intrinsic
 
-from ..base.errors import InputError
+from ..base.extras import require
 from .cache import cached, kernel_hash
 from .compile import inlined
 from .packed import ADDRESS, PackedType, array_form, open_packed, words_of
@@ -338,14 +338,9 @@ def bind_on_gpu(part: Callable[..., Any], columns: Columns, results: int, beyond
     packed: the tuples before the one with number ``results``. Compiled where it is not kept on disk. Raises
     InputError where numba-cuda is missing.
     """
-    try:
-        import numba_cuda  # noqa: F401
-        from cuda.core import LaunchConfig, Stream, launch
-    except ImportError as error:
-        raise InputError(
-            "Kernels for a GPU are compiled by numba-cuda, which is missing; install it: "
-            "pip install 'panto-env[cuda]'."
-        ) from error
+    require("A GPU", "cuda", "numba_cuda")
+    from cuda.core import LaunchConfig, Stream, launch
+
     packed, answers = PackedTiles(columns, 0, results), PackedTiles(columns, results, beyond)
     index = columns.device.index or 0
     kernel = _kernel(part, packed.type, answers.type, index)

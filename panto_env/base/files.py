@@ -17,12 +17,14 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from .errors import InputError
+from .extras import require
 
 TRIAL = 4096
 """Bytes written to test whether a folder is writable: the smallest unit that a disk stores."""
 COMPRESSED = ".gz"
 JSON = (".json", ".json" + COMPRESSED)
 """Suffixes of files for plain data, of which the second is compressed."""
+PARQUET = ".parquet"
 PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of files for plots."""
 PAGES = (".html",)
@@ -109,6 +111,9 @@ def check_output(path: str | Path, suffixes: Sequence[str]) -> None:
     if suffix_of(target) not in suffixes:
         which = f"one of {', '.join(suffixes)}" if len(suffixes) > 1 else suffixes[0]
         raise InputError(f"{path} must end in {which}.")
+    if suffix_of(target) == PARQUET:
+        others = [suffix for suffix in suffixes if suffix != PARQUET]
+        require(str(path), "parquet", "pyarrow", otherwise=f"or end it in {' or '.join(others)}")
     if os.path.isdir(target):
         raise InputError(f"{path} cannot be written: it is a folder.")
     if not os.path.isdir(target.parent):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -80,6 +79,7 @@ MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384
 """Rows and columns of a sheet of Excel."""
 RISKY = ("=", "+", "-", "@", "\t", "\r")
 """First characters of a text that a spreadsheet may take for a formula when it opens a CSV file."""
+QUOTE = '"'
 CREATED = datetime(2000, 1, 1)
 """Date in every workbook, so that the same tables give the same bytes."""
 
@@ -127,7 +127,7 @@ def write_table(sheet: Sheet, path: str | Path) -> None:
     elif suffix == ".csv":
         _write_csv(sheet, path)
     else:
-        import pyarrow as pa  # slow to import
+        import pyarrow as pa  # slow to import, and an extra
         from pyarrow.parquet import write_table as write_parquet
 
         table = pa.table(dict(sheet.columns))
@@ -136,24 +136,22 @@ def write_table(sheet: Sheet, path: str | Path) -> None:
 
 
 def _write_csv(sheet: Sheet, path: str | Path) -> None:
-    import pyarrow as pa
-    from pyarrow.csv import write_csv
+    columns = list(sheet.columns.values())
+    lists = [sheet.titles, *(column for column in columns if not hasattr(column, "dtype"))]
+    plain = all(cell.isascii() for each in lists for cell in each if isinstance(cell, str))
+    encoding = "utf-8" if plain else "utf-8-sig"  # without its mark Excel garbles all but ASCII
+    with write_whole(path) as temporary, temporary.open("w", encoding=encoding, newline="\n") as file:
+        file.write(",".join(map(_in_csv, sheet.titles)) + "\n")
+        rows = zip(*(map(_in_csv, column) for column in columns), strict=True)
+        file.writelines(",".join(row) + "\n" for row in rows)
 
-    texts = list(sheet.titles)
 
-    def apart(cell: Any) -> Any:
-        """A text that no spreadsheet takes for a formula."""
-        if isinstance(cell, str):
-            texts.append(cell)
-        return f"'{cell}" if isinstance(cell, str) and cell.startswith(RISKY) else cell
-
-    cells = [each if hasattr(each, "dtype") else list(map(apart, each)) for each in sheet.columns.values()]
-    columns = [pa.array(column, from_pandas=True) for column in cells]
-    table = pa.Table.from_arrays(columns, list(map(apart, sheet.titles)))
-    plain = all(text.isascii() for text in texts)
-    with write_whole(path) as temporary, temporary.open("wb") as file:
-        file.write(b"" if plain else codecs.BOM_UTF8)  # without it Excel garbles all but ASCII
-        write_csv(table, file)
+def _in_csv(cell: Any) -> str:
+    """A cell: text in quotation marks, a number in its type's shortest form, nothing for a missing one."""
+    if isinstance(cell, str):
+        text = f"'{cell}" if cell.startswith(RISKY) else cell
+        return f'"{text.replace(QUOTE, 2 * QUOTE)}"'
+    return "" if cell is None or cell != cell else str(cell).lower().removesuffix(".0")  # true, 5, 0.1
 
 
 def write_workbook(sheets: Sequence[Sheet], path: str | Path) -> None:

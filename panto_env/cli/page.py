@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Option
 
-from ..base.errors import InputError
+from ..base.extras import require
 from ..terminal import console
 
 
@@ -23,13 +23,8 @@ def app(
 
     Only browsers of this machine reach it, and it needs no network. Ctrl+C ends it.
     """
-    try:
-        from ..app.page import serve
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"The page needs Bokeh, which is not installed ({error}); install panto-env with its extra: "
-            "pip install 'panto-env[app]'."
-        ) from error
+    require("The page", "app", "bokeh")
+    from ..app.page import serve
 
     def ready(address: str) -> None:
         console.print(f"The page is {address}; Ctrl+C ends it.", soft_wrap=True)

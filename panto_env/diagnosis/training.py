@@ -14,7 +14,7 @@ import numpy as np
 from ..analysis.pool import in_processes
 from ..analysis.simulation import simulate
 from ..base.arrays import Array, Index
-from ..base.errors import InputError
+from ..base.extras import require
 from ..base.files import write_whole
 from ..catalog import load_catenary, load_pantograph
 from ..metrics.figures import FIRST_SETTLED
@@ -217,10 +217,9 @@ def fit(shown: Array, classes: Index, seed: int = 0) -> Classifier:
 
     Rare kinds count for more than their share.
     """
-    try:
-        from sklearn.neural_network import MLPClassifier
-    except ImportError as error:
-        raise InputError("Training wants scikit-learn: pip install 'panto-env[diagnosis]'.") from error
+    require("Training", "diagnosis", "sklearn")
+    from sklearn.neural_network import MLPClassifier
+
     mean, scale = shown.mean(axis=0), shown.std(axis=0) + 1e-9
     counts = np.bincount(classes, minlength=len(KINDS) + 1)
     repeat = np.ones(len(classes), dtype=np.int64)

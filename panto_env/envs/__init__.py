@@ -4,7 +4,7 @@ from typing import Any
 
 import gymnasium
 
-from ..base.errors import InputError
+from ..base.extras import require
 from .driven import DrivenByPolicies
 from .settings import BARE, IDS
 from .single import PantographEnv
@@ -29,14 +29,9 @@ def vector_env(**settings: Any) -> Any:
     if settings.get("device") is None:
         settings.pop("device", None)
         return PantographVectorEnv(**settings)
-    try:
-        from .tensors import PantographTensorEnv  # PyTorch is an extra
-    except ModuleNotFoundError as error:
-        if error.name != "torch":
-            raise
-        raise InputError(
-            "A vector environment on a device needs PyTorch; install it: pip install 'panto-env[cuda]'."
-        ) from error
+    require("A vector environment on a device", "cuda", "torch")
+    from .tensors import PantographTensorEnv
+
     return PantographTensorEnv(**settings)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
 
 from ..base.errors import InputError
 from ..control.arguments import checked
@@ -16,13 +17,6 @@ from .episodes import checked_options
 from .lanes import REWARD
 from .settings import Whole
 from .single import PantographEnv
-
-try:
-    from pettingzoo import ParallelEnv
-except ModuleNotFoundError as error:
-    raise InputError(
-        "A parallel environment needs PettingZoo; install it with pip install 'panto-env[pettingzoo]'."
-    ) from error
 
 Observation = NDArray[np.float32]
 

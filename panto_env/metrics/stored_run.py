@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from pydantic import ConfigDict, Field, ValidationError
 
 from ..base.arrays import Array
 from ..base.checksums import with_checksum, without_checksum
 from ..base.errors import InputError
+from ..base.extras import require
 from ..base.files import write_whole
 from ..base.settings import Between, Settings, explain
 from ..plant.alignment import Alignment
@@ -89,6 +88,9 @@ def check_stored(facts: Mapping[str, Any], columns: Mapping[str, Array]) -> None
 
 def write(run: Trajectory, path: str | Path) -> None:
     """Write a run, whole or not at all; see ``Trajectory.save``."""
+    import pyarrow as pa
+    from pyarrow.parquet import write_table
+
     columns = {name: getattr(run, name) for name in SERIES}
     for number, follower in enumerate(run.followers, start=2):
         columns |= follower_columns(follower, number, len(run.time))
@@ -105,7 +107,7 @@ def write(run: Trajectory, path: str | Path) -> None:
     facts["followers"] = [{name: getattr(each, name) for name in OF_FOLLOWERS} for each in run.followers]
     table = pa.table(columns, metadata={KEY: json.dumps(with_checksum(facts, columns))})
     with write_whole(path) as temporary:
-        pq.write_table(table, temporary, write_page_checksum=True)
+        write_table(table, temporary, write_page_checksum=True)
 
 
 def read(path: str | Path) -> Trajectory:
@@ -114,8 +116,12 @@ def read(path: str | Path) -> Trajectory:
         raise InputError(f"The trajectory file {path} does not exist; check the path.")
     if Path(path).suffix.lower() in OUTPUTS[1:]:
         raise InputError(f"{path} is for other programs: a run is read from its .parquet file only.")
+    require(str(path), "parquet", "pyarrow", otherwise="a run cannot be read from another kind of file")
+    from pyarrow import ArrowException
+    from pyarrow.parquet import ParquetFile
+
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        with ParquetFile(path, page_checksum_verification=True) as file:
             table = file.read()
         columns = {name: table[name].to_numpy() for name in table.column_names}
         facts = without_checksum(json.loads(table.schema.metadata[KEY]), columns)
@@ -139,7 +145,7 @@ def read(path: str | Path) -> Trajectory:
         first = Trajectory(**series, **facts)
         own = [_follower_of(first, columns, *each) for each in enumerate(followers, start=2)]
         return dataclasses.replace(first, followers=tuple(own))
-    except (pa.ArrowException, *DAMAGED) as error:
+    except (ArrowException, *DAMAGED) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
         raise InputError(
             f"{path} is not a whole trajectory file ({reason}); write it again with "

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..base.arrays import METRES_PER_SECOND, Array
 from ..base.errors import InputError, shortly
+from ..base.extras import require
 from ..base.record_columns import JITTER, LENGTHS, TIME, Column, places_of, read_columns
 from ..base.table import Sheet, write_table
 from .axes import RUNS_BACK, Break, axes_of, cut
@@ -100,6 +101,7 @@ def _refuse_sensor(path: str | Path, heading: str) -> None:
 def _parquet(
     path: str | Path, units: Mapping[str, str] | None, headings: Mapping[str, str] | None
 ) -> dict[str, Any]:
+    require(str(path), "parquet", "pyarrow", otherwise="or give the record as .csv")
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 

@@ -1,9 +1,8 @@
-"""A picture to draw on, its colours, and the check for the packages of the extra 'render'."""
+"""A picture to draw on, and its colours."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array
-from ..base.errors import InputError, listed
+from ..base.extras import require
 from ..base.plotting import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
-
-IN_WORDS = {"cv2": "OpenCV", "pygame": "pygame", "imageio_ffmpeg": "imageio-ffmpeg"}
-
-
-def check_packages(*names: str) -> None:
-    """Raise InputError where packages that a picture or a film needs are not installed."""
-    missing = [IN_WORDS[name] for name in names if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"Pictures and films need {listed(missing)} not installed; install panto-env with its "
-            "extra: pip install 'panto-env[render]'."
-        )
-
 
 Colour = tuple[int, int, int]
 PARTS = 4
@@ -44,7 +30,7 @@ class Canvas:
 
     def __init__(self, width: int, height: int) -> None:
         """Raises InputError where OpenCV is not installed."""
-        check_packages("cv2")
+        require("A picture", "render", "cv2")
         self.pixels = np.zeros((height, width, 3), dtype=np.uint8)
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:

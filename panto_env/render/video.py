@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.extras import require
 from ..base.files import check_output, write_whole
-from .canvas import check_packages
 
 Frames = Iterable[NDArray[np.uint8]]
 FILMS = (".mp4", ".gif")
@@ -75,7 +75,7 @@ def _write_mp4(frames: Frames, path: Path, rate: float, size: tuple[int, int]) -
 
 
 def _encoder() -> str:
-    check_packages("imageio_ffmpeg")
+    require("A film", "render", "imageio_ffmpeg")
     import imageio_ffmpeg
 
     try:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.extras import require
 from ..control import Task
 from ..control.state import TaskRow
 from ..metrics.figures import LABELS
-from .canvas import check_packages
 from .moment import moment_of
 from .picture import Picture
 
@@ -51,7 +51,7 @@ class Viewer:
         self._pygame.display.flip()
 
     def _open(self, title: str) -> None:
-        check_packages("pygame")
+        require("A window", "render", "pygame")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # no greeting on standard output
         import pygame
 

@@ -352,12 +352,6 @@ class TestCommand:
         (entry,) = json.loads(result.stdout)["passes"]
         assert entry["std_change_percent"] < -35
 
-    def test_says_what_is_missing(self, panto, config, monkeypatch):
-        monkeypatch.setattr(command, "find_spec", lambda name: None)
-        result = panto("train", config)
-        assert isinstance(result.exception, InputError)
-        assert "panto-env[agents]" in str(result.exception)
-
 
 def test_lanes_are_seeded_one_by_one():
     training = settings("ppo", environment=LINE | {"speed_kmh": [250, 300]})

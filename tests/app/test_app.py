@@ -7,7 +7,6 @@ import io
 import json
 import re
 import shlex
-import sys
 from functools import partial
 
 import pytest
@@ -215,10 +214,6 @@ def test_what_the_command_cannot_do_is_one_sentence(monkeypatch):
     assert (
         done.stderr == "panto: Port 5006 cannot be had (Address already in use); give another one: --port.\n"
     )
-    monkeypatch.setitem(sys.modules, "panto_env.app.page", None)
-    done = panto("app", "--no-browser")
-    assert done.returncode == 2
-    assert done.stderr.endswith("install panto-env with its extra: pip install 'panto-env[app]'.\n")
 
 
 def test_the_extra_weighs_what_the_document_says():

@@ -391,12 +391,6 @@ class TestDesigns:
             few_designs(**changes)
 
 
-def test_without_minari_its_extra_is_named(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "minari", None)
-    with pytest.raises(InputError, match=r"need Minari, which is not installed .*'panto-env\[data\]'"):
-        make_episodes.make_episodes(settings(), tmp_path, workers=1)
-
-
 @pytest.mark.slow
 def test_kept_parts_count_as_done_and_damaged_ones_are_made_again(tmp_path):
     told, path = [], tmp_path / "0.json"

@@ -156,11 +156,3 @@ class TestTrainings:
         assert [training.seed for training in plan(configs, None, None, Path("runs")).values()] == [5, 5]
         with pytest.raises(InputError, match="Two of the trainings would go into runs/one-ppo-seed3"):
             plan(configs, [3, 3], None, Path("runs"))
-
-
-def test_without_ray_its_extra_is_named(monkeypatch):
-    from panto_env.cluster import spread
-
-    monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(InputError, match=r"A cluster needs Ray.*install panto-env with its extra 'ray'"):
-        spread([sys.getrecursionlimit], ray="local")

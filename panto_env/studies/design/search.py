@@ -23,6 +23,7 @@ from ...analysis.pool import in_threads
 from ...analysis.simulation import simulate
 from ...analysis.sweep import SPEED, entries_of, prepare
 from ...base.errors import AccuracyWarning, InputError, UnusualWarning
+from ...base.extras import require
 from ...base.files import make_folder, read_toml
 from ...base.settings import Positive, Settings, parse
 from ...control.settings import RunSettings, run_settings
@@ -221,11 +222,10 @@ def search(
     off. progress: called with the numbers of tried and of all designs, and the best so far in words. Raises
     InputError without Optuna, an extra, and where the folder has a search of something else.
     """
-    try:
-        import optuna
-        from optuna.storages.journal import JournalFileBackend
-    except ImportError as error:
-        raise InputError("A search needs Optuna; install panto-env with its extra 'design'.") from error
+    require("A search", "design", "optuna", "cmaes")
+    import optuna
+    from optuna.storages.journal import JournalFileBackend
+
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     make_folder(folder)
     log = JournalFileBackend(str(Path(folder) / TRIED))
