@@ -86,6 +86,8 @@ def test_every_extra_of_users_is_tried_and_its_packages_are_in_it():
         for module in modules:
             wanted = names.get(module, module.replace("_", "-"))
             assert any(each.startswith(wanted) for each in extras[extra]), (extra, module)
+    rows = re.findall(r"^\| `(\w+)` \|", (ROOT / "docs/install.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert rows == sorted(MISSING)
     assert not any(each.startswith("pyarrow") for each in project["dependencies"])
 
 

@@ -6,6 +6,8 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+import yaml
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -20,6 +22,23 @@ def test_rooms_are_those_of_the_import_contract():
         r"^\| `(panto_\w+(?:\.\w+)?)` \|", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE
     )
     assert rooms == layers()
+
+
+def test_forms_for_a_mistake_can_be_shown_and_ask_for_the_version():
+    """GitHub drops a form without a word where a part has no label, or two have one id."""
+    forms = {path.stem: yaml.safe_load(path.read_text()) for path in (ROOT / ".github").rglob("*.yml")}
+    assert forms.pop("config") == {"blank_issues_enabled": True}
+    assert set(forms) == {"bug", "wrong-figures"}
+    for form in forms.values():
+        assert form["name"]
+        assert form["description"]
+        parts = form["body"]
+        assert all(part["attributes"]["label"] and part["type"] in ("input", "textarea") for part in parts)
+        assert len({part["id"] for part in parts}) == len(parts)
+        required = {part["id"] for part in parts if part.get("validations", {}).get("required")}
+        assert {"command", "version"} <= required
+        (version,) = (part for part in parts if part["id"] == "version")
+        assert "`panto --version`" in version["attributes"]["description"]
 
 
 def test_every_room_is_in_the_contract():

@@ -227,7 +227,7 @@ def test_notebooks_start_alike_wherever_they_are_opened():
     }
     (first,) = firsts
     assert 'find_spec("panto_env") is None' in first
-    assert "[agents,render] @ {at}" in first
+    assert "[agents,parquet,render] @ {at}" in first
 
 
 @pytest.mark.slow
