@@ -151,7 +151,8 @@ def _in_csv(cell: Any) -> str:
     if isinstance(cell, str):
         text = f"'{cell}" if cell.startswith(RISKY) else cell
         return f'"{text.replace(QUOTE, 2 * QUOTE)}"'
-    return "" if cell is None or cell != cell else str(cell).lower().removesuffix(".0")  # true, 5, 0.1
+    number = str(cell).lower().removesuffix(".0")  # true, 5, 0.1
+    return "" if number in ("nan", "none") else number
 
 
 def write_workbook(sheets: Sequence[Sheet], path: str | Path) -> None:
