@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -203,7 +203,12 @@ class Plan(Settings):
     radius: Radius | None = Field(
         None, description="of the track, positive to the right (m); none where it is straight"
     )
-    cant: Cant = Field(0.0, description="of the track (m)")
+    cant: Cant = Field(
+        0.0, description="of the track, which leans to the inside of its curve, or to the right (m)"
+    )
+    cant_base: Annotated[float, Between(0.5, 2, "m")] = Field(
+        1.5, description="distance of the rails over which cant is measured (m)"
+    )
     wind: tuple[Annotated[float, Between(-30, 30, "N/m")], Annotated[float, Between(-30, 30, "N/m")]] = Field(
         (0.0, 0.0),
         description="force of a steady wind on contact wire and messenger, to the right (N/m); a condition's "
@@ -211,6 +216,9 @@ class Plan(Settings):
     )
     contact_height: Annotated[float, Between(3, 8, "m")] = Field(
         5.3, description="of the contact wire over the rails (m), for cant and sway"
+    )
+    head_width: Literal[1.6, 1.95] = Field(
+        1.6, description="width of the collector heads for which the line is built (m): 1.6 or 1.95"
     )
 
     @field_validator("radius")

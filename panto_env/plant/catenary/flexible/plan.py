@@ -33,7 +33,6 @@ from .schema import FlexibleCatenaryData
 from .shape import GRAVITY, solve_band
 from .static import solve
 
-GAUGE = 1.5  # distance of the rails' middles, over which cant is measured (m)
 STEEPEST_ARM = 30.0  # slope up to which an arm is taken as a pendulum (degrees)
 ALIKE = 0.01  # relative difference up to which arms of spans that are all alike are so too
 REPEATS = 14  # spans in which the arms of a line whose spans are all alike are computed
@@ -138,6 +137,19 @@ def plan_view(layout: Layout, wind: tuple[float, float] | None = None) -> PlanVi
     lateral = solve_band(band, right).reshape(-1, 2).T.copy()
     lateral[:, held] = stagger
     return PlanView(supports, stagger, curvature, cant, places, lateral, load, tensions)
+
+
+def contact_wire_at(layout: Layout, x: Array, wind: tuple[float, float] = (0.0, 0.0)) -> Array:
+    """Lateral position (m) of the contact wire in use at places x (m), (n,), in a wind (N/m).
+
+    wind: beside that of the line's plan. Raises InputError as ``plan_view`` does.
+    """
+    plan, found = layout.line.plan or Plan(), np.zeros(len(x))
+    loads = plan.wind[0] + wind[0], plan.wind[1] + wind[1]
+    for part in layout.tension_lengths:
+        used = (x >= part.in_use[0]) & (x <= part.in_use[1])
+        found[used] = plan_view(part.layout, loads).at(x[used] - part.begin)
+    return found
 
 
 def _period(line: FlexibleCatenaryData) -> float:
