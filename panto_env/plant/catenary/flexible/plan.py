@@ -275,6 +275,13 @@ def _arms_of(line: FlexibleCatenaryData, spans: int) -> SteadyArms:
     return SteadyArms(*(np.array([getattr(arm, name) for arm in found]) for name in SteadyArms._fields))
 
 
+def in_still_air(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """A line without the wind of its plan."""
+    if line.plan is None or not any(line.plan.wind):
+        return line
+    return line.model_copy(update={"plan": line.plan.model_copy(update={"wind": (0.0, 0.0)})})
+
+
 def in_wind(line: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition]) -> FlexibleCatenaryData:
     """A line as the wind across the track pulls its steady arms: the same object where none depends on it.
 

@@ -223,10 +223,10 @@ class FlexibleCatenaryData(CatenaryData):
         A dropper, stiff and without mass, joins two strings of impedances Z = sqrt(T m): Z_m / (Z_c + Z_m).
         A spring k with a mass m sends back ``|K| / sqrt(K^2 + (2 omega Z_c)^2)``, K = k - omega^2 m.
         """
-        from .plan import steady_arms  # needs the static shape, which needs this file
+        from .plan import in_still_air, steady_arms  # need the static shape, which needs this file
 
         contact, messenger = self.contact_wire.impedance, self.messenger_wire.impedance
         omega = 2 * math.pi * frequency
-        arms = steady_arms(self.layout(1).tension_lengths[0].layout)
+        arms = steady_arms(in_still_air(self).layout(1).tension_lengths[0].layout)
         arm = float(arms.stiffness[0] - omega**2 * arms.mass[0])
         return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)
