@@ -1,4 +1,4 @@
-"""A line seen from above, support by support and span by span: where its wires are, how its arms are pulled."""
+"""A line seen from above, by supports and spans: where its wires are, and how its arms are pulled."""
 
 from __future__ import annotations
 
@@ -86,7 +86,8 @@ class LinePlan:
     @property
     def sway(self) -> float:
         """Of the pantograph, to either side (m)."""
-        return float(np.interp((self.line.plan or Plan()).contact_height, *zip(*SWAY, strict=True)))
+        heights, sways = zip(*SWAY, strict=True)
+        return float(np.interp((self.line.plan or Plan()).contact_height, heights, sways))
 
     def criteria(self) -> list[Criterion]:
         """Radial forces, lateral positions and slopes, with their limits."""
@@ -121,42 +122,50 @@ class LinePlan:
                 ),
             )  # fmt: skip
             highest = max(abs(each.rise) for each in self.supports)
-            found.append(Criterion("rise_in_wind", "rise or fall of a support in the wind", "mm", 1e3 * highest))
+            found.append(
+                Criterion("rise_in_wind", "rise or fall of a support in the wind", "mm", 1e3 * highest)
+            )
         if slopes:
             found.append(Criterion("arm_slope", "maximum slope of a steady arm", "°", max(slopes)))
         return found
 
     def tables(self, name: Callable[[int], str] = str) -> list[Table]:
         """Two tables to print, of supports and of spans; name: of a support's number, counted from 0."""
-        contact, messenger = self.loads
-        windy = f"in a wind of {contact:.3g} N/m on the contact wire and {messenger:.3g} on the messenger"
+        windy, (contact, messenger) = any(self.loads), self.loads
+        air = f"in a wind of {contact:.3g} N/m on the contact wire and {messenger:.3g} on the messenger"
         alike = "" if self.line.sequence else "; all others repeat these"
-        title = f"Seen from above, {windy if any(self.loads) else 'in still air'}; positive to the right{alike}"
+        title = f"Seen from above, {air if windy else 'in still air'}; positive to the right{alike}"
         headings = (
             "support", "stagger (m)", "messenger (m)", "set out (m)", "radial force (N)", "pull (N)",
-            "messenger (N)", "slope (°)", "stiffness (N/m)", "rise (mm)",
+            "messenger (N)", "slope (°)", "stiffness (N/m)",
         )  # fmt: skip
         rows = [
             (
                 name(each.number - 1), f"{each.stagger:+.3f}", f"{each.messenger_stagger:+.3f}",
                 f"{each.setting_out:+.3f}", _or_dash(each.force, "+.0f"), _or_dash(each.pull, ".0f"),
                 _or_dash(each.messenger_force, "+.0f"), _or_dash(each.slope, ".1f"),
-                _or_dash(each.stiffness, ".0f"), _or_dash(1e3 * each.rise, "+.1f"),
+                _or_dash(each.stiffness, ".0f"), *([f"{1e3 * each.rise:+.1f}"] if windy else []),
             )
             for each in self.supports
         ]  # fmt: skip
-        of_spans = (
-            "span", "radius (m)", "furthest, still (m)", "at (m)", "furthest, in wind (m)", "at (m)", "blow-off (m)"
-        )  # fmt: skip
+        of_spans = ("span", "radius (m)", "furthest (m)", "at (m)")
         spans = [
             (
                 str(each.number), "straight" if math.isinf(each.radius) else f"{each.radius:g}",
-                f"{each.still:+.3f}", f"{each.still_place:.1f}", f"{each.windy:+.3f}",
-                f"{each.windy_place:.1f}", f"{each.blow_off:+.3f}",
+                f"{each.still:+.3f}", f"{each.still_place:.1f}",
+                *(
+                    [f"{each.windy:+.3f}", f"{each.windy_place:.1f}", f"{each.blow_off:+.3f}"]
+                    if windy
+                    else []
+                ),
             )
             for each in self.spans
         ]  # fmt: skip
-        return [Table(title, headings, rows, 0), Table("The contact wire's lateral position", of_spans, spans, 0)]
+        blown = ("in wind (m)", "at (m)", "blow-off (m)") if windy else ()
+        return [
+            Table(title, (*headings, *(["rise (mm)"] if windy else [])), rows, 0),
+            Table("The contact wire's lateral position", (*of_spans, *blown), spans, 0),
+        ]
 
     def as_dict(self) -> dict[str, Any]:
         """Supports and spans as plain data."""
@@ -209,7 +218,9 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
     x = np.concatenate(places)
     if not line.sequence:  # counted from 1, as if the line began there
         begin = supports[0].position
-        supports = [each._replace(number=each.number - first, position=each.position - begin) for each in supports]
+        supports = [
+            each._replace(number=each.number - first, position=each.position - begin) for each in supports
+        ]
         spans, x = [each._replace(number=each.number - first) for each in spans], x - begin
     return LinePlan(line, loads, supports, spans, x, np.hstack(still), np.hstack(windy))
 
@@ -238,7 +249,7 @@ def _supports(
     still, windy = views
     line = now.line
     arms = pulled_arms(now)
-    rise = np.zeros(len(still.supports))
+    rise: Array = np.zeros(len(still.supports))
     if line.arms_in_wind:
         rested = DefectiveLine(now, LineCondition())
         rise = rested.rise(rested.solve()).height(still.supports)

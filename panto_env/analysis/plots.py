@@ -207,7 +207,8 @@ POINTS = 60
 def plot_line(found: LineCheck, above: LinePlan | None = None) -> Figure:
     """Both wires with supports and droppers, the contact wire alone, and the elasticity, along the line.
 
-    above: the line seen from above, drawn below these. Heights are exaggerated. Of a line whose spans are all alike, three are drawn.
+    above: the line seen from above, drawn below these. Heights are exaggerated. Of a line whose spans are
+    all alike, three are drawn.
     """
     line, shape = found.line, hang(found.line)
     layout = line.layout(SHOWN)

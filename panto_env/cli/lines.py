@@ -106,7 +106,12 @@ def line(
             other, alignment = as_run_tables(chosen, run) if run else [], chosen.alignment()
             named = alignment.span_name
             seen = above.tables(lambda number: alignment.support_name(number, number + 1)) if above else []
-            for each in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *seen, *other):
+            for each in (
+                *span_tables(found.spans, named),
+                dropper_table(found.droppers, named),
+                *seen,
+                *other,
+            ):
                 print_table(each)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:

@@ -17,7 +17,7 @@ STRIP = 0.05  # width of the strips into which a head is divided (m)
 
 @dataclass(frozen=True)
 class StripUse:
-    """Shares of strips of a collector head, from left to right; the wire's way from right to left counts too."""
+    """Shares of strips of a collector head, from left to right."""
 
     edges: Array  # (strips + 1,): from the head's middle, to the right (m)
     way: Array  # (strips,): share of the way along the track (-)
@@ -25,7 +25,7 @@ class StripUse:
 
     @property
     def evenness(self) -> float:
-        """Mean wear of the strips from the outermost left to the outermost right one, over the largest: 1 is even."""
+        """Mean wear of the strips over which the wire ran, over the largest: 1 where all wear alike."""
         used = np.flatnonzero(self.wear > 0)
         return float(self.wear[used[0] : used[-1] + 1].mean() / self.wear.max())
 

@@ -121,7 +121,8 @@ class LineCondition(Settings):
     side_wind: Annotated[float, Between(-40, 40, "m/s")] = Field(
         0.0,
         description="mean wind across the track, to the right (m/s), on the wires of a flexible line, which "
-        "its drag damps; where steady arms have a length, it raises and lowers supports; vertical gusts, half as strong as turbulence says of those along the wind, are drawn at random from "
+        "its drag damps; where steady arms have a length, it raises and lowers supports; "
+        "vertical gusts, half as strong as turbulence says of those along the wind, are drawn at random from "
         "Panofsky's spectrum",
     )
 

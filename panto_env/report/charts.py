@@ -148,7 +148,9 @@ def strips(axes: Axes, names: Mapping[Findings, str]) -> None:
     for k, (one, name) in enumerate(names.items()):
         assert one.strip_use is not None
         axes.stairs(100 * one.strip_use.wear, 1e3 * one.strip_use.edges, color=series_colour(k), label=name)
-    axes.set(xlabel="from the middle of the head, to the right (mm)", ylabel="share of wear (%)", ylim=(0, None))
+    axes.set(
+        xlabel="from the middle of the head, to the right (mm)", ylabel="share of wear (%)", ylim=(0, None)
+    )
     legend_above(axes, 4)
 
 

@@ -229,4 +229,6 @@ class Findings:
     def plan_tables(self) -> list[Table]:
         """Supports and spans seen from above; none without stagger."""
         alignment = self.run.alignment
-        return self.plan.tables(lambda number: alignment.support_name(number, number + 1)) if self.plan else []
+        return (
+            self.plan.tables(lambda number: alignment.support_name(number, number + 1)) if self.plan else []
+        )

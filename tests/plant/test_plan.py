@@ -60,7 +60,10 @@ def test_the_plan_is_the_reference_s_within_a_millimetre_and_a_newton(name):
     if furthest is None:
         assert abs(out) == pytest.approx(0.3, abs=1e-3)
     else:
-        assert (place - 420, out) == (pytest.approx(furthest[0], abs=0.05), pytest.approx(furthest[1], abs=1e-3))
+        assert (place - 420, out) == (
+            pytest.approx(furthest[0], abs=0.05),
+            pytest.approx(furthest[1], abs=1e-3),
+        )
     for wire in range(2):
         assert view.at(np.array([450.0]), wire)[0] == pytest.approx(middle[wire], abs=1e-3)
     assert view.forces[0, 7:9] == pytest.approx(radial, abs=1)
@@ -93,7 +96,9 @@ def test_any_plan_balances_and_its_wires_are_strings(seed):
     begin = tensions * np.diff(view.lateral)[:, :1] / lengths[0] + view.load[:, :1] * lengths[0] / 2
     end = -tensions * np.diff(view.lateral)[:, -1:] / lengths[-1] + view.load[:, -1:] * lengths[-1] / 2
     held = np.nansum(view.forces) - begin.sum() - end.sum()  # with those of both anchors
-    assert held + (view.load * lengths).sum() == pytest.approx(0, abs=1e-6 * np.abs(view.load * lengths).sum() + 1e-3)
+    assert held + (view.load * lengths).sum() == pytest.approx(
+        0, abs=1e-6 * np.abs(view.load * lengths).sum() + 1e-3
+    )
     x, h = np.array([view.places[5] + 0.4 * lengths[5]]), 0.05
     for wire in range(2):
         second = (view.at(x + h, wire) - 2 * view.at(x, wire) + view.at(x - h, wire)) / h**2
@@ -205,19 +210,26 @@ def test_wind_of_a_condition_and_of_the_plan_are_the_same():
 def test_a_plan_without_lengths_of_arms_changes_no_run():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        plain, planned = (run(line, 250, line_condition="as-built") for line in (line_with(), line_with(ZIGZAG)))
+        plain, planned = (
+            run(line, 250, line_condition="as-built") for line in (line_with(), line_with(ZIGZAG))
+        )
     assert plain == planned
 
 
 def test_unlike_arms_need_a_sequence():
     plan = {"stagger": (0.3, -0.1)}
-    with pytest.raises(InputError, match="pulled with .* and a line whose spans are all alike has equal ones"):
+    with pytest.raises(
+        InputError, match="pulled with .* and a line whose spans are all alike has equal ones"
+    ):
         simulate(line_with({"stagger": (0.3, -0.3, -0.3)}, steady_arm=ARM), "dsa380", 250)
     line = line_with({"stagger": (0.3, -0.3, -0.2)}, steady_arm=ARM, sequence=[{}] * 12, spans=12)
     found = steady_arms(line.layout())
-    assert line.sequence and len(set(np.round(found.stiffness, 3))) > 2
+    assert line.sequence
+    assert len(set(np.round(found.stiffness, 3))) > 2
     assert simulate(line, "dsa380", 200, distance=480.0).summary((6, 7)).std > 0
-    assert steady_arms(line_with(plan, steady_arm=ARM).layout(5)).stiffness.std() < 1e-6  # 0.4 m from side to side
+    assert (
+        steady_arms(line_with(plan, steady_arm=ARM).layout(5)).stiffness.std() < 1e-6
+    )  # 0.4 m from side to side
 
 
 @pytest.mark.parametrize(
@@ -259,7 +271,8 @@ def test_a_run_tells_where_on_the_strips_the_wire_was():
     assert found is not None
     assert found.width == pytest.approx(0.6)
     assert 0.8 < found.evenness <= 1
-    assert found.way.sum() == pytest.approx(1) and found.wear.sum() == pytest.approx(1)
+    assert found.way.sum() == pytest.approx(1)
+    assert found.wear.sum() == pytest.approx(1)
     assert strip_use(simulate(distance=900.0)) is None
     assert run_of.designed.line.plan.stagger == (0.3, -0.3)
 

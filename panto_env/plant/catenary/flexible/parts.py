@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -186,6 +186,7 @@ class Span(Settings):
 Stagger: TypeAlias = Annotated[float, Between(-1, 1, "m")]
 Radius: TypeAlias = Annotated[float, Between(-1e5, 1e5, "m")]
 Cant: TypeAlias = Annotated[float, Between(-0.3, 0.3, "m")]
+HEADS = (1.6, 1.95)  # widths of collector heads (m)
 TIGHTEST = 100.0  # radius of a curve (m); half of it is left to trams
 
 
@@ -217,7 +218,7 @@ class Plan(Settings):
     contact_height: Annotated[float, Between(3, 8, "m")] = Field(
         5.3, description="of the contact wire over the rails (m), for cant and sway"
     )
-    head_width: Literal[1.6, 1.95] = Field(
+    head_width: float = Field(
         1.6, description="width of the collector heads for which the line is built (m): 1.6 or 1.95"
     )
 
@@ -225,6 +226,15 @@ class Plan(Settings):
     @classmethod
     def _no_turn_on_the_spot(cls, value: float | None) -> float | None:
         return check_radius(value)
+
+    @field_validator("head_width")
+    @classmethod
+    def _of_a_known_head(cls, value: float) -> float:
+        if value not in HEADS:
+            raise ValueError(
+                f"head_width must be {' or '.join(f'{width:g}' for width in HEADS)} m, not {value:g}"
+            )
+        return value
 
     def from_support(self, number: int) -> Plan:
         """The same plan, counted from another support."""

@@ -33,7 +33,7 @@ from .schema import FlexibleCatenaryData
 from .shape import GRAVITY, solve_band
 from .static import solve
 
-STEEPEST_ARM = 30.0  # slope up to which an arm is taken as a pendulum (degrees)
+STEEPEST_ARM = 45.0  # slope up to which an arm is taken as a pendulum (degrees)
 ALIKE = 0.01  # relative difference up to which arms of spans that are all alike are so too
 REPEATS = 14  # spans in which the arms of a line whose spans are all alike are computed
 
@@ -116,7 +116,9 @@ def plan_view(layout: Layout, wind: tuple[float, float] | None = None) -> PlanVi
     lengths, tensions = np.diff(places), (line.contact_wire.tension, line.messenger_wire.tension)
     span = np.searchsorted(supports, (places[1:] + places[:-1]) / 2) - 1
     load = np.outer(tensions, curvature[span]) + np.array(wind)[:, None]
-    heights = shape.messenger.height(np.mod(x, _period(line))) - shape.contact.height(np.mod(x, _period(line)))
+    heights = shape.messenger.height(np.mod(x, _period(line))) - shape.contact.height(
+        np.mod(x, _period(line))
+    )
     band, right = np.zeros((3, 2 * len(places))), np.zeros(2 * len(places))
     for wire, tension in enumerate(tensions):
         spring, pushed = tension / lengths, load[wire] * lengths / 2
@@ -282,7 +284,9 @@ def in_still_air(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
     return line.model_copy(update={"plan": line.plan.model_copy(update={"wind": (0.0, 0.0)})})
 
 
-def in_wind(line: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition]) -> FlexibleCatenaryData:
+def in_wind(
+    line: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition]
+) -> FlexibleCatenaryData:
     """A line as the wind across the track pulls its steady arms: the same object where none depends on it.
 
     Its spans, so many, are one by one then: the wind pulls arms to the left and to the right unlike. Raises

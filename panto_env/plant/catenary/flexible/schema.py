@@ -92,7 +92,9 @@ class FlexibleCatenaryData(CatenaryData):
         (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
     published: Published | None = Field(None, description="elasticity as others give it, for `panto line`")
-    plan: Plan | None = Field(None, description="the line seen from above, on which lengths of steady arms act")
+    plan: Plan | None = Field(
+        None, description="the line seen from above, on which lengths of steady arms act"
+    )
     masts: tuple[Mast, ...] = Field(
         (), max_length=MOST_SPANS + 1, description="what a survey says of the mast at each support, in order"
     )
