@@ -1,4 +1,4 @@
-"""A line seen from above, as ``panto line`` prints it: tight curves, storms, pressed arms, wires off the head."""
+"""A line seen from above, as ``panto line`` prints it: curves, storms, pressed arms, wires off the head."""
 
 import json
 import math

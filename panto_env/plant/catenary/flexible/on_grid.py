@@ -75,11 +75,12 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
     else:
         masts = 1.0 * per_stride * np.arange(1, len(each) + 1)
     arms = steady_arms(part.layout)
+    moving = arms.in_motion(line.plan is not None and line.plan.sideways_waves)
     levels = [
         level
-        for stiffness, span in zip(arms.stiffness[1:].tolist(), each, strict=True)
+        for stiffness, damping, span in zip(*(values[1:].tolist() for values in moving), each, strict=True)
         for level in (
-            spring_levels(stiffness, 0.0, step),
+            spring_levels(stiffness, damping, step),
             spring_levels(span.support.stiffness, span.support.damping, step),
         )
     ]

@@ -215,6 +215,11 @@ class Plan(Settings):
         description="force of a steady wind on contact wire and messenger, to the right (N/m); a condition's "
         "side_wind comes on top",
     )
+    sideways_waves: bool = Field(
+        False,
+        description="whether a steady arm's swing, which moves the contact wire sideways, runs off as waves, as "
+        "it does above some 250 km/h; else the wire resists as a string held by the next arms",
+    )
     contact_height: Annotated[float, Between(3, 8, "m")] = Field(
         5.3, description="of the contact wire over the rails (m), for cant and sway"
     )
@@ -231,9 +236,8 @@ class Plan(Settings):
     @classmethod
     def _of_a_known_head(cls, value: float) -> float:
         if value not in HEADS:
-            raise ValueError(
-                f"head_width must be {' or '.join(f'{width:g}' for width in HEADS)} m, not {value:g}"
-            )
+            known = " or ".join(f"{width:g}" for width in HEADS)
+            raise ValueError(f"head_width must be {known} m, not {value:g}")
         return value
 
     def from_support(self, number: int) -> Plan:

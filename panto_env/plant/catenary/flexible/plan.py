@@ -50,6 +50,10 @@ class PulledArm(NamedTuple):
     stiffness: float  # vertical, on the contact wire (N/m)
     mass: float  # that moves with the contact wire (kg)
     lift: float  # of the contact wire, by what a wind adds to its pull (N)
+    # Share of the stiffness by which the contact wire resists sideways (N/m), and what it is instead where it
+    # lets waves run off: a damper ``2 sqrt(T m) tan^2`` (N s/m), the impedance of both sides
+    sideways: float = 0.0
+    radiation: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -229,20 +233,29 @@ def pulled_arms(layout: Layout) -> list[PulledArm]:
                 f"carries {carried:.0f} N, so it would slope by {math.degrees(angle):.0f}°, more than "
                 f"{STEEPEST_ARM:g}°; give more stagger there, or the arm a stiffness instead of its length."
             )
-        slope, tension = math.tan(angle), line.contact_wire.tension
-        sideways = tension / before.span_length + tension / behind.span_length
-        stiffness = pull / (arm.length * math.cos(angle)) * (1 + slope**2) + sideways * slope**2
-        mass = arm.mass / 3 + arm.clamp_mass
-        found.append(PulledArm(pull, slope, stiffness, mass, slope * (pull - abs(force))))
+        slope, wire = math.tan(angle), line.contact_wire
+        sideways = wire.tension * (1 / before.span_length + 1 / behind.span_length) * slope**2
+        stiffness = pull / (arm.length * math.cos(angle)) * (1 + slope**2) + sideways
+        mass, lift = arm.mass / 3 + arm.clamp_mass, slope * (pull - abs(force))
+        radiation = 2 * wire.impedance * slope**2
+        found.append(PulledArm(pull, slope, stiffness, mass, lift, sideways, radiation))
     return found
 
 
 class SteadyArms(NamedTuple):
     """Steady arms at the first support of each span of a line of one tension length."""
 
-    stiffness: Array  # vertical, on the contact wire (N/m)
+    stiffness: Array  # vertical, on the contact wire, at rest (N/m)
     mass: Array  # that moves with the contact wire (kg)
     lift: Array  # upward force on the contact wire in a wind, as ``PulledArm`` has it (N)
+    sideways: Array  # as ``PulledArm`` has it (N/m)
+    radiation: Array  # likewise (N s/m)
+
+    def in_motion(self, waves: bool) -> tuple[Array, Array]:
+        """Stiffness (N/m) and damping (N s/m) in motion; waves: as ``Plan.sideways_waves``."""
+        if waves:
+            return self.stiffness - self.sideways, self.radiation
+        return self.stiffness, np.zeros_like(self.stiffness)
 
 
 def steady_arms(layout: Layout) -> SteadyArms:
@@ -260,7 +273,7 @@ def _arms_of(line: FlexibleCatenaryData, spans: int) -> SteadyArms:
     stiffness = np.array([span.steady_arm.stiffness or 0.0 for span in layout.spans])
     mass = np.array([span.steady_arm.mass for span in layout.spans])
     if not line.arms_by_plan:
-        return SteadyArms(stiffness, mass, np.zeros_like(mass))
+        return SteadyArms(stiffness, mass, *np.zeros((3, spans)))
     if line.sequence:
         found = pulled_arms(layout)
         found = [found[0], *found]
