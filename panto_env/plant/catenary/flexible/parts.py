@@ -217,8 +217,8 @@ class Plan(Settings):
     )
     sideways_waves: bool = Field(
         False,
-        description="whether a steady arm's swing, which moves the contact wire sideways, runs off as waves, as "
-        "it does above some 250 km/h; else the wire resists as a string held by the next arms",
+        description="whether a steady arm's swing, which moves the contact wire sideways, runs off as waves, "
+        "as it does above some 250 km/h; else the wire resists as a string held by the next arms",
     )
     contact_height: Annotated[float, Between(3, 8, "m")] = Field(
         5.3, description="of the contact wire over the rails (m), for cant and sway"
