@@ -153,6 +153,15 @@ def test_a_steady_arm_is_the_reference_s_pendulum(plan, degrees, stiffness):
     assert every.stiffness == pytest.approx(np.full(5, arm.stiffness), rel=1e-6)
 
 
+def test_an_arm_that_holds_no_wire_carries_itself_alone():
+    arm = ARM | {"holds_wire": False, "clamp_mass": 0.5}
+    alike = pulled_arms(line_with(ZIGZAG, steady_arm=arm).layout(14))[6]
+    assert alike.slope == pytest.approx(9.81 * (1.5 / 2 + 0.5) / 400, rel=1e-3)
+    assert alike.mass == pytest.approx(0.5 + 0.5)
+    unlike = pulled_arms(line_with(ZIGZAG, steady_arm=arm, sequence=[{}] * 14, spans=14).layout())[6]
+    assert unlike == pytest.approx(alike, rel=1e-3)
+
+
 def run(line, speed, **settings):
     """Figures of the reference's window on 14 spans."""
     run = simulate(line, "dsa380", speed, spans=14, window=0, distance=720.0, **settings)

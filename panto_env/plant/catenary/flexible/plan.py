@@ -216,7 +216,10 @@ def pulled_arms(layout: Layout) -> list[PulledArm]:
     still, now = plan_view(layout, (0.0, 0.0)).forces[0, 1:-1], plan_view(layout).forces[0, 1:-1]
     weight = np.zeros(count + 1)  # of the wire, that each arm carries (N)
     holding = [span.steady_arm.holds_wire for span in layout.spans]
-    weight[[*holding, holding[-1]]] = np.tile(solve(line).arm_force, 1 if line.sequence else count + 1)
+    if line.sequence:
+        weight[[*holding, holding[-1]]] = solve(line).arm_force
+    else:
+        weight[:] = solve(line).arm_force
     found = list[PulledArm]()
     for k, (before, behind) in enumerate(zip(layout.spans[:-1], layout.spans[1:], strict=True)):
         arm, force = behind.steady_arm, float(still[k])
