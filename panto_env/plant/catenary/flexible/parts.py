@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
@@ -116,10 +116,17 @@ class SteadyArm(Settings):
     )
     clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire, of an arm with a length (kg)")
     holds_wire: bool = Field(
-        default_factory=lambda given: given.get("length") is not None,
-        description="whether it carries the wire's weight, so that the wire is at height 0; by default one "
-        "with a length does",
+        False,
+        description="whether it carries the wire's weight, so that the wire is at height 0; one with a length "
+        "does by default",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _carries_the_wire(cls, values: Any) -> Any:
+        if isinstance(values, Mapping) and values.get("length") is not None:
+            return {"holds_wire": True} | dict(values)
+        return values
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
