@@ -36,6 +36,7 @@ from ..plant.alignment import Spans
 from ..plant.catenary.flexible.shape import profiles
 from ..plant.catenary.flexible.static import hang
 from .line_check import LineCheck
+from .line_plan import LinePlan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,10 +204,11 @@ POINTS = 60
 """Points per span."""
 
 
-def plot_line(found: LineCheck) -> Figure:
+def plot_line(found: LineCheck, above: LinePlan | None = None) -> Figure:
     """Both wires with supports and droppers, the contact wire alone, and the elasticity, along the line.
 
-    Heights are exaggerated. Of a line whose spans are all alike, three are drawn.
+    above: the line seen from above, drawn below these. Heights are exaggerated. Of a line whose spans are
+    all alike, three are drawn.
     """
     line, shape = found.line, hang(found.line)
     layout = line.layout(SHOWN)
@@ -215,8 +217,9 @@ def plot_line(found: LineCheck) -> Figure:
     parts = profiles(layout, shape)
     x = np.unique(np.concatenate([*between, droppers]))  # wires have kinks at their droppers
     width = min(max(9.0, supports[-1] / 80.0), 40.0)
-    figure, every = stacked((width, 8.2), 3, height_ratios=(3, 2, 2))
-    wires, contact, elasticity = every
+    figure, every = stacked((width, 8.2 if above is None else 10.6), 3 if above is None else 4,
+                            height_ratios=(3, 2, 2, 2)[: 3 if above is None else 4])  # fmt: skip
+    wires, contact, elasticity = every[:3]
     for axis in every:
         mark_supports(axis, supports.tolist())
     tops, lowest = np.add(layout.contact_heights, layout.encumbrances), min(layout.contact_heights)
@@ -256,4 +259,21 @@ def plot_line(found: LineCheck) -> Figure:
     elasticity.plot(places, yields, color=VERMILION)
     elasticity.set(xlabel=POSITION, ylabel=f"elasticity\nat {found.force:g} N (mm/N)", xlim=(0, supports[-1]))
     elasticity.set_ylim(bottom=0)
+    if above is not None:
+        elasticity.set_xlabel("")
+        _draw_plan(every[3], above)
     return figure
+
+
+def _draw_plan(axis: Axes, above: LinePlan) -> None:
+    """Both wires from above, to the right upward, with the limits of the contact wire's position."""
+    limit = next(each.highest for each in above.criteria() if each.key == "lateral_position")
+    windy = any(above.loads)
+    for k, (name, colour) in enumerate((("contact wire", BLUE), ("messenger wire", GREEN))):
+        axis.plot(above.places, above.still[k], color=colour, linestyle=":" if windy else "-", label=name)
+        if windy:
+            axis.plot(above.places, above.windy[k], color=colour, label=f"{name}, in the wind")
+    for side in (-1, 1):
+        axis.axhline(side * (limit or 0.0), color=VERMILION, linewidth=0.8, linestyle="--")
+    axis.set(xlabel=POSITION, ylabel="to the right (m)")
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize="x-small")

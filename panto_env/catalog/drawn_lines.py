@@ -15,9 +15,11 @@ from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.settings import Between, Settings
 from ..plant.catenary import check_line
+from ..plant.catenary.flexible.plan import steady_arms
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.spans import evenly, parabola
 from ..plant.catenary.flexible.static import hang
@@ -41,6 +43,35 @@ Range: TypeAlias = Annotated[tuple[N, N], BeforeValidator(_two), AfterValidator(
 """A range to draw from evenly: two numbers, or one that all lines have."""
 Share = Annotated[float, Between(0, 1)]
 Length = Annotated[float, Between(0, LONGEST_SPAN, "m")]
+
+
+class PlanRanges(Settings):
+    """Stagger, and steady arms by their length, in the place of those with a stiffness."""
+
+    stagger: Range[Annotated[float, Between(0.05, 0.6, "m")]] = Field(
+        description="of the contact wire, to the right and to the left in turn, in a curve to its outside (m)"
+    )
+    arm_length: Range[Annotated[float, Between(0.3, 5, "m")]] = Field(description="of steady arms (m)")
+    arm_mass: Range[Annotated[float, Between(0, 50, "kg")]] = Field(description="of steady arms (kg)")
+
+    def draw(self, random: np.random.Generator, curvature: Array) -> dict[str, Any]:
+        """Values of a line with these curvatures of its spans, without their side (1/m), (spans,).
+
+        Curves of one curvature bend to one side, which is drawn.
+        """
+        stagger, length, mass = (
+            random.uniform(*ends) for ends in (self.stagger, self.arm_length, self.arm_mass)
+        )
+        changes = np.flatnonzero(np.diff(curvature, prepend=np.nan) != 0)
+        sides = np.repeat(random.choice([-1, 1], len(changes)), np.diff(np.append(changes, len(curvature))))
+        at = np.append(curvature * sides, (curvature * sides)[-1:])  # at supports, by the spans behind them
+        in_turn = np.where(np.arange(len(at)) % 2, -1, 1)
+        masts = [
+            {"stagger": round(stagger * float(np.sign(-bend) if bend else turn), 3)}
+            | ({"radius": round(float(1 / bend), 1)} if bend else {})
+            for bend, turn in zip(at, in_turn, strict=True)
+        ]
+        return {"steady_arm": {"mass": mass, "length": length}, "masts": masts}
 
 
 class WireRanges(Settings):
@@ -214,6 +245,8 @@ class DrawnLines(Settings):
         try:
             line = FlexibleCatenaryData.model_validate(values)
             check_line(line)
+            for part in line.layout(1).tension_lengths if line.arms_by_plan else ():
+                steady_arms(part.layout)
         except ValueError:  # InputError too
             return None
         if hang(line).dropper_length.min() < shortest:

@@ -18,6 +18,7 @@ from .drawn_lines import (
     DampingRanges,
     DrawnLines,
     DropperRanges,
+    PlanRanges,
     PreSagRange,
     Range,
     Share,
@@ -100,6 +101,9 @@ class LineFamily(DrawnLines):
     support: SupportRanges
     steady_arm: SteadyArmRanges
     damping: DampingRanges
+    plan: PlanRanges | None = Field(
+        None, description="stagger on straight track and arms with a length, instead of those of steady_arm"
+    )
     plausible: Bands
 
     @property
@@ -144,7 +148,7 @@ class LineFamily(DrawnLines):
         arm_mass, arm_stiffness = (
             random.uniform(*ends) for ends in (self.steady_arm.mass, self.steady_arm.stiffness)
         )
-        return {
+        values: dict[str, Any] = {
             "name": self.full_name,
             "description": f"Drawn from a family. {self.description}",
             "system": self.system,
@@ -164,3 +168,8 @@ class LineFamily(DrawnLines):
                 "beta": random.uniform(*self.damping.beta),
             },
         }
+        if self.plan is not None:
+            drawn = self.plan.draw(random, np.zeros(2))
+            in_turn = tuple(mast["stagger"] for mast in drawn["masts"][:2])
+            values |= {"steady_arm": drawn["steady_arm"], "plan": {"stagger": in_turn}}
+        return values

@@ -123,6 +123,7 @@ def _nested(key: str, value: Any) -> dict[str, Any]:
 IN_TURN = (
     ({"spacing", "first", "pre_sag"}, {"positions", "sag"}),
     ({"stiffness"}, {"axial_stiffness"}),
+    ({"stiffness"}, {"length", "clamp_mass"}),  # of a steady arm
     ({"sequence"}, {"spans"}),
 )
 """Keys that exclude each other: where one is given, those of the other kind are no longer what they were."""

@@ -39,11 +39,14 @@ COLUMNS = {
     "type": Column(("type", "spantype"), {}, "text", required=False, text=True),
     "mast": Column(("mast", "name", "mastname", "mastnumber", "mastno"), {}, "text", False, text=True),
     "stagger": Column(("stagger", "zigzag"), HEIGHTS, "m", required=False, blank=True, usual="m"),
+    "messenger_stagger": Column(("messengerstagger",), HEIGHTS, "m", required=False, blank=True, usual="m"),
     "radius": Column(("radius", "r"), {"m": 1.0, "km": 1e3}, "m", required=False, blank=True, usual="m"),
     "cant": Column(("cant", "superelevation"), HEIGHTS, "m", required=False, blank=True, usual="m"),
 }
 """Columns of a table of masts, in the order of travel: a row per mast, with the span that begins there."""
-SURVEYED = {"mast": "name", "position": "chainage"} | {key: key for key in ("stagger", "radius", "cant")}
+SURVEYED = {"mast": "name", "position": "chainage"} | {
+    key: key for key in ("stagger", "messenger_stagger", "radius", "cant")
+}
 """Columns that ``Mast`` keeps, and its names for them."""
 DIGITS = 6
 """Decimals of lengths and heights (m), so that a difference of two heights is as round as they are."""
@@ -60,7 +63,7 @@ def line_from_masts(
 
     base: name of the catalogue, or a TOML file, which may have span_types that the masts name. units,
     headings: as in ``read_columns``. Positions may fall, along a line that was surveyed against the travel.
-    Names of masts, chainages that do not begin at 0, stagger, radius and cant stand in ``masts``; other
+    Names of masts, chainages that do not begin at 0, staggers, radius and cant stand in ``masts``; other
     columns are ignored with an UnusualWarning. Raises InputError, naming the mast and its line of the table,
     for a table that gives no line.
     """

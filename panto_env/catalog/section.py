@@ -19,7 +19,7 @@ from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHORTEST_SPAN, SpanLength
-from .drawn_lines import Bands, DrawnLines, Length, Range, Share, Speeds, in_words
+from .drawn_lines import Bands, DrawnLines, Length, PlanRanges, Range, Share, Speeds, in_words
 from .family import ROUNDING, LineFamily, gradient_limits, gradients
 
 Radius: TypeAlias = Annotated[float, Between(50, 100_000, "m")]
@@ -61,12 +61,13 @@ class Curves(Settings):
         radii, spans = zip(*self.longest, strict=True)
         return float(np.interp(1 / radius, [0.0, *(1 / each for each in radii)], [self.straight, *spans]))
 
-    def draw(self, random: np.random.Generator, longest: float, count: int) -> Array:
-        """The longest possible length of each of a number of spans (m), (count,).
+    def draw(self, random: np.random.Generator, longest: float, count: int) -> tuple[Array, Array]:
+        """The longest possible length of each of a number of spans (m), and its curvature (1/m), (count,).
 
         longest: the line's own span (m).
         """
         found: list[float] = []
+        bends: list[float] = []
         while len(found) < count:
             left = random.uniform(*self.stretch)
             curved, curvature = (
@@ -75,7 +76,8 @@ class Curves(Settings):
             )
             most = min(longest, self.longest_span(1 / curvature if curved else math.inf))
             found += [most] * max(1, round(left / most))
-        return np.array(found[:count])
+            bends += [curvature if curved else 0.0] * (len(found) - len(bends))
+        return np.array(found[:count]), np.array(bends[:count])
 
 
 class Obstacles(Settings):
@@ -295,6 +297,10 @@ class LineSection(DrawnLines):
     bridges: Bridges
     overlaps: Overlaps | None = Field(None, description="none by default: wires reach from end to end")
     droppers: DropperRule
+    plan: PlanRanges | None = Field(
+        None,
+        description="stagger and steady arms; by default arms are the base line's, and lines have no plan",
+    )
     kinds: Kinds | None = Field(None, description="by default the whole line is of one kind")
     plausible: Bands
 
@@ -367,7 +373,8 @@ class LineSection(DrawnLines):
     def _table(self, random: np.random.Generator, base: FlexibleCatenaryData) -> dict[str, Any] | None:
         """Values of a line with the wires of ``base``; None where there is no room for its ramps."""
         count = int(random.integers(self.spans[0], self.spans[1], endpoint=True))
-        longest = self.curves.draw(random, base.span_length, count) * self.obstacles.draw(random, count)
+        longest, curvature = self.curves.draw(random, base.span_length, count)
+        longest = longest * self.obstacles.draw(random, count)
         kind = np.zeros(count, dtype=np.intp)
         if self.kinds is not None:
             kind, shares = self.kinds.draw(random, count)
@@ -398,12 +405,15 @@ class LineSection(DrawnLines):
         spans = [{"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)]
         if self.kinds is not None:
             spans = [span | {"droppers": droppers[of]} for span, of in zip(spans, kind.tolist(), strict=True)]
+        overlaps = self._overlaps(random, lengths, heights, bridges)
+        if self.plan is not None:
+            table |= self.plan.draw(random, curvature)
         return table | {
             "name": self.full_name,
             "description": f"Drawn from a section. {self.description}",
             "sources": {key: text for key, text in base.sources.items() if key not in REPLACED},
             "droppers": droppers[0],
-            "overlaps": self._overlaps(random, lengths, heights, bridges),
+            "overlaps": overlaps,
             "sequence": spans,
             "end_support": at[-1],
         }

@@ -10,6 +10,7 @@ import typer
 from typer import Argument, Option
 
 from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
+from ..analysis.line_plan import line_plan
 from ..analysis.options import print_criteria
 from ..analysis.plots import plot_line, save
 from ..base.errors import InputError
@@ -60,9 +61,10 @@ def line(
     plot: Plot = None,
     json: Json = False,
 ) -> None:
-    """Show a line at rest: spans, droppers, gradients and elasticity; make one from a table of masts.
+    """Show a line at rest: spans, droppers, gradients, elasticity and plan; make one from a table of masts.
 
-    Exits with 1 if a limit of EN 50119 is broken.
+    A line with stagger is seen from above too: radial forces, and where a wind (--line-condition
+    new:side_wind=25) blows the contact wire. Exits with 1 if a limit is broken.
     """
     if output is not None and masts is None:
         raise InputError("Give --masts with --output: a line without them is in its TOML file already.")
@@ -80,14 +82,15 @@ def line(
     found = check(chosen, force)
     own = parse(LineCondition, line_condition, "line_condition", LINE_CONDITIONS)
     condition = together(chosen.as_found or NEW, own)
+    above = line_plan(chosen, condition)
     run = None if condition == NEW else as_run(chosen, condition, force)
-    criteria = found.criteria(speed)
+    criteria = found.criteria(speed) + (above.criteria() if above else [])
     broken = [each for each in criteria if each.kept is False]
     with written_last() as later:
         if output is not None and text is not None:
             later(write_text, output, text)
         if plot is not None:
-            later(save, plot_line(found), plot)
+            later(save, plot_line(found, above), plot)
         if json:
             print_json(
                 {
@@ -95,12 +98,20 @@ def line(
                     "spans": [each._asdict() for each in found.spans],
                     "droppers": [each._asdict() for each in found.droppers],
                     "criteria": [each.as_dict() for each in criteria],
+                    "plan": above and above.as_dict(),
                     "as_run": run and run.rows | {"droppers": [each._asdict() for each in run.droppers]},
                 }
             )
         else:
-            other, named = as_run_tables(chosen, run) if run else [], chosen.alignment().span_name
-            for each in (*span_tables(found.spans, named), dropper_table(found.droppers, named), *other):
+            other, alignment = as_run_tables(chosen, run) if run else [], chosen.alignment()
+            named = alignment.span_name
+            seen = above.tables(lambda number: alignment.support_name(number, number + 1)) if above else []
+            for each in (
+                *span_tables(found.spans, named),
+                dropper_table(found.droppers, named),
+                *seen,
+                *other,
+            ):
                 print_table(each)
             print_criteria(criteria, f"Line {chosen.name} at rest")
             if chosen.sequence:
@@ -109,7 +120,7 @@ def line(
                 )
             else:
                 print_table(elasticity_table([found]))
-            if run and not other:
+            if run and not other and not (above and any(above.loads)):
                 console.print("This condition changes no tension along the line: it is run as designed.")
             for limit in broken:
                 alert(f"{limit.name} is not kept.")

@@ -118,9 +118,10 @@ class LineCondition(Settings):
         "in °C depends on it",
     )
 
-    side_wind: Annotated[float, Between(0, 40, "m/s")] = Field(
+    side_wind: Annotated[float, Between(-40, 40, "m/s")] = Field(
         0.0,
-        description="mean wind across the track (m/s) on the wires of a flexible line, which its drag damps; "
+        description="mean wind across the track, to the right (m/s), on the wires of a flexible line, which "
+        "its drag damps; where steady arms have a length, it raises and lowers supports; "
         "vertical gusts, half as strong as turbulence says of those along the wind, are drawn at random from "
         "Panofsky's spectrum",
     )
@@ -148,7 +149,7 @@ class LineCondition(Settings):
     @property
     def across(self) -> Wind:
         """The wind across the track."""
-        return Wind(self.side_wind, self.turbulence)
+        return Wind(abs(self.side_wind), self.turbulence)
 
     @property
     def in_still_air(self) -> LineCondition:

@@ -143,6 +143,18 @@ def uplifts(axes: Axes, names: Mapping[Findings, str]) -> None:
 
 
 @as_svg(2.6)
+def strips(axes: Axes, names: Mapping[Findings, str]) -> None:
+    """Wear of the strips of the head."""
+    for k, (one, name) in enumerate(names.items()):
+        assert one.strip_use is not None
+        axes.stairs(100 * one.strip_use.wear, 1e3 * one.strip_use.edges, color=series_colour(k), label=name)
+    axes.set(
+        xlabel="from the middle of the head, to the right (mm)", ylabel="share of wear (%)", ylim=(0, None)
+    )
+    legend_above(axes, 4)
+
+
+@as_svg(2.6)
 def stiffness(axes: Axes, one: Findings) -> None:
     """Elasticity along a span."""
     assert one.elasticity is not None

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..analysis.line_plan import LinePlan, line_plan
 from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.table import Table
@@ -18,6 +19,7 @@ from ..metrics.by_span import MovingDropper, SpanFigures, StretchFigures, by_spa
 from ..metrics.compliance import Criterion
 from ..metrics.figures import Figures, SpanChoice, losses_of_contact
 from ..metrics.low_pass import low_pass
+from ..metrics.strip import StripUse, strip_use
 from ..metrics.trajectory import Trajectory
 from ..plant.alignment import Spans
 from ..plant.catenary.flexible import FlexibleCatenaryData
@@ -86,8 +88,21 @@ class Findings:
 
     @cached_property
     def criteria(self) -> list[Criterion]:
-        """Requirements, and values without limits."""
-        return [] if self.covered is None else self.run.compliance(self.covered)
+        """Requirements, and values without limits; of the line itself those of its plan."""
+        own = [] if self.covered is None else self.run.compliance(self.covered)
+        return own + (self.plan.criteria() if own and self.plan else [])
+
+    @cached_property
+    def plan(self) -> LinePlan | None:
+        """The line seen from above, in the run's wind; None without stagger."""
+        if not isinstance(self.line, FlexibleCatenaryData):
+            return None
+        return line_plan(self.line, self.run.identity.line_condition)
+
+    @cached_property
+    def strip_use(self) -> StripUse | None:
+        """Where the contact wire ran on the collector strips in the evaluated spans; None without stagger."""
+        return strip_use(self.run, self._chosen)
 
     @cached_property
     def line(self) -> Any:
@@ -209,3 +224,11 @@ class Findings:
     def as_run_tables(self) -> list[Table]:
         """The line as designed beside the line as run; none where they do not differ."""
         return [] if self.as_run is None else as_run_tables(self.line, self.as_run)
+
+    @cached_property
+    def plan_tables(self) -> list[Table]:
+        """Supports and spans seen from above; none without stagger."""
+        alignment = self.run.alignment
+        return (
+            self.plan.tables(lambda number: alignment.support_name(number, number + 1)) if self.plan else []
+        )

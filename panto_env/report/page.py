@@ -46,7 +46,7 @@ def page_template(package: str, **filters: Callable[..., Any]) -> Template:
 LEFT_OUT = (
     "section insulators, crossings and neutral sections",
     "two contact wires whose droppers alternate: they are one equivalent wire",
-    "curves, stagger and the lateral plane",
+    "sideways waves: stagger, curves and wind act through steady arms whose length is given, at rest",
     "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
     "rigid rails and third rails",
     "roll and pitch of the collector head and its two strips: it is one point",
@@ -89,6 +89,7 @@ def page(found: Sequence[Findings]) -> str:
     judged = {one: name for one, name in names.items() if one.figures is not None}
     felt = {one: charts.of_run(one, name) for one, name in names.items() if one.leads}
     lines = _different(found, "line")
+    strips = {one: name for one, name in names.items() if one.strip_use is not None}
     by_key = [{each.key: each for each in one.criteria} for one in found]
     criteria = [[each.get(key) for each in by_key] for key in dict.fromkeys(chain(*by_key))]
     side_by_side = [(next(filter(None, own)), own) for own in criteria]  # None: a run does not have it
@@ -111,6 +112,8 @@ def page(found: Sequence[Findings]) -> str:
         together={one: charts.force_together(one) for one in found if one.number == 1},
         folded=charts.force_folded(judged) if judged else "",
         spectrum=charts.spectrum(judged) if judged else "",
+        strips=strips,
+        strip_chart=charts.strips(strips) if strips else "",
         uplifts=charts.uplifts(felt) if any(one.uplifts for one in felt) else "",
         words={"accuracy": ACCURACY, "filter": FILTER, "left_out": LEFT_OUT},
     )

@@ -61,10 +61,12 @@ def test_an_unknown_name_is_refused_with_what_is_known(name):
     assert str(told.value).startswith("Unknown parameter '")
     assert "' of three-mass: " in str(told.value)
     assert str(told.value).endswith("frame_friction (lists count from 1).")
+    assert "masses.1," in str(told.value).partition("known are ")[2]
+    assert "masses.2" not in str(told.value).partition("known are ")[2]
     with pytest.raises(InputError) as told:
         check_name("catenary.nothing", load_catenary("en50318-2002"))
     known = str(told.value).partition("known are ")[2]
-    assert "catenary.droppers.positions.1," in known
+    assert "catenary.droppers.spacing," in known
     assert "positions.2" not in known
     with pytest.raises(InputError) as told:
         check_name("sensors.nothing", run_settings({}).sensors)

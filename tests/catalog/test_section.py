@@ -154,10 +154,14 @@ def test_spans_get_shorter_in_curves():
     straight = curves.model_copy(update={"chance": 0.0})
     tight = curves.model_copy(update={"chance": 1.0, "radius": (500.0, 500.0)})
     random = np.random.default_rng(0)
-    assert set(straight.draw(random, 60.0, 30)) == {60.0}  # the line's own
-    assert set(straight.draw(random, 80.0, 30)) == {65.0}
-    assert set(tight.draw(random, 60.0, 30)) == {40.0}
-    mixed = curves.draw(random, 60.0, 4000)
+    assert set(straight.draw(random, 60.0, 30)[0]) == {60.0}  # the line's own
+    assert set(straight.draw(random, 80.0, 30)[0]) == {65.0}
+    lengths, curvature = tight.draw(random, 60.0, 30)
+    assert set(lengths) == {40.0}
+    assert curvature == pytest.approx(np.full(30, 1 / 500))
+    mixed, curvature = curves.draw(random, 60.0, 4000)
+    assert 0.4 < np.mean(curvature > 0) < 0.6
+    assert (mixed[curvature == 0] == 60.0).all()
     stretches = np.split(mixed, np.flatnonzero(np.diff(mixed)) + 1)
     assert 0.2 < np.mean(mixed < 60.0) < 0.5  # half of the stretches, of which the widest curves have 60 m
     assert 200.0 < np.median([each.sum() for each in stretches if each[0] < 60.0]) < 600.0

@@ -20,6 +20,7 @@ from ...line_condition import NEW, LineCondition
 from .defects import DefectiveLine, shape_left, with_tension_left
 from .fixed_wires import SPANS, tensions_of_fixed
 from .parts import Conductor, Span, places_of
+from .plan import in_still_air
 from .schema import FlexibleCatenaryData
 from .static import RestingDropper, dropper_table, droppers_at_rest, solve
 
@@ -43,7 +44,9 @@ def elasticity(
     force: at the place (N). The larger it is, the more droppers go slack. Where spans differ, places are
     along the line, in all spans but the first and the last, at whose ends anchors hold the wires; in an
     overlap the uplift is that of the wire in use alone. condition, tensions: as ``DefectiveLine`` takes them.
+    Steady arms are as in still air.
     """
+    line = in_still_air(line)
     if not line.sequence:
         layout = line.layout(SPANS_OF_ELASTICITY)
         places = _places(layout.spans[0], 0.0, line.span_length)
@@ -123,7 +126,7 @@ def as_run(line: FlexibleCatenaryData, condition: LineCondition, force: float) -
 
     Raises InputError where the line cannot be in this condition.
     """
-    along = condition.along_line
+    line, along = in_still_air(line), condition.along_line
     factors = tensions_of_fixed(line, along)
     places, lifts = elasticity(line, force, along, factors)
     found = droppers_at_rest(line)

@@ -27,6 +27,7 @@ from ..schema import Wire
 from .arrays import CONTACT, MESSENGER
 from .layout import Layout
 from .parts import Span, index_at
+from .plan import steady_arms
 from .schema import FlexibleCatenaryData
 from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, joined, places_in_band, solve_band
 from .static import StaticShape, solve
@@ -98,16 +99,13 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
 @remembered
 def _arms(designed: FlexibleCatenaryData) -> _Arms:
     layout = designed.layout(1)
-    arms = [span.steady_arm for span in layout.spans]
+    holding = [span.steady_arm.holds_wire for span in layout.spans]
+    stiffness = steady_arms(layout).stiffness
     if designed.sequence:
-        arms.append(arms[-1])
-    x = np.array(layout.supports[: len(arms)])
-    return _Arms(
-        x,
-        np.array([arm.stiffness for arm in arms]),
-        solve(designed).contact.height(x),
-        np.array([arm.holds_wire for arm in arms]),
-    )
+        holding.append(holding[-1])
+        stiffness = np.append(stiffness, stiffness[-1])
+    x = np.array(layout.supports[: len(holding)])
+    return _Arms(x, stiffness, solve(designed).contact.height(x), np.array(holding))
 
 
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
@@ -179,7 +177,8 @@ class DefectiveLine:
         self._unknowns: Any = per_node * number[:-1, None] + 2 * CONTACT + [0, 1, per_node, per_node + 1]
         self._size = per_node * len(number)
         self._in_band = places_in_band(self._unknowns, self._size)
-        self._arm_stiffness = np.array([span.steady_arm.stiffness for span in each[1:]])
+        arms = steady_arms(layout)
+        self._arm_stiffness, self._arm_lift = arms.stiffness[1:], arms.lift[1:]
         self._support_stiffness = np.array([span.support.stiffness for span in each[1:]])
         self._raised, self._lifted = self._support_stiffness * height, self._masts + 2
         self._lightening = own.lightening(self._places + self._lengths / 2)
@@ -246,6 +245,7 @@ class DefectiveLine:
             np.add.at(self._load, self._unknowns, self._beams.end_loads(self._bulge))
         for spot in self._own.spots:
             self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
+        self._load[self._masts] += self._arm_lift
         self._error = self._miscut
         if left is not self._data:
             fit = misfit(self._data, left)

@@ -270,11 +270,14 @@ class Layout:
         end: dict[str, Any] = {}
         if line.end_support is not None and last == len(self.spans):
             end = line.end_support.model_dump(include={"stitch_wire"}, exclude_none=True)
-        changes = {
+        changes: dict[str, Any] = {
             "name": f"{line.name}, tension length {number}",
             "sequence": tables,
             "end_support": end | {"encumbrance": self.encumbrances[last], "contact_height": heights[-1]},
+            "masts": line.masts[first : last + 1],
         }
+        if line.plan is not None:
+            changes["plan"] = line.plan.from_support(first)
         kept = line.model_dump(exclude={"sources", "spans", "span_types", "overlaps"}, exclude_none=True)
         return valid(type(line), kept | changes, f"An overlap of line '{line.name}'").layout()
 

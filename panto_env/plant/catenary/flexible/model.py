@@ -21,6 +21,7 @@ from .defects import DefectiveLine, located_defects, shape_left, with_tension_le
 from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
 from .layout import Layout, TensionLength
+from .plan import in_wind
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
@@ -163,8 +164,8 @@ class FlexibleCatenary:
                 f"Line '{data.name}' is a sequence of {data.spans} spans, so it has no other number of them: "
                 "leave out spans, or give a shorter distance."
             )
-        self.data, condition = data, of_wires(runs.conditions)
-        designed = data
+        condition = of_wires(runs.conditions)
+        self.data = data = designed = in_wind(data, spans, runs.conditions)
         self._fixed = contact, messenger = tensions_of_fixed(designed, condition)
         data = with_tension_left(designed, condition, self._fixed)
         shape = hang(designed)
@@ -200,7 +201,7 @@ class FlexibleCatenary:
         self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
         self._defective: dict[LineCondition, DefectiveParts] = {}
         self._lines_differ = False
-        if any(condition.defective for condition in runs.conditions):
+        if any(condition.defective for condition in runs.conditions) or designed.arms_in_wind:
             self._make_defective(designed, spans, runs.conditions, lanes)
         if data is not designed:
             both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)

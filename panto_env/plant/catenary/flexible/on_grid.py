@@ -13,6 +13,7 @@ from ...functions import stencil
 from .arrays import CONTACT, LOWER, MESSENGER, PAD, UPPER
 from .grid import implicit_share, missing_yield, point_gain, spring_levels
 from .layout import Layout, Stitches, TensionLength
+from .plan import steady_arms
 from .static import StaticShape
 from .wire_defects import WireDefects
 
@@ -73,18 +74,20 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
         masts = part.begin / dx + np.array(part.layout.supports[1:-1]) / dx
     else:
         masts = 1.0 * per_stride * np.arange(1, len(each) + 1)
+    arms = steady_arms(part.layout)
+    moving = arms.in_motion(line.plan is not None and line.plan.sideways_waves)
     levels = [
         level
-        for span in each
+        for stiffness, damping, span in zip(*(values[1:].tolist() for values in moving), each, strict=True)
         for level in (
-            spring_levels(span.steady_arm.stiffness, 0.0, step),
+            spring_levels(stiffness, damping, step),
             spring_levels(span.support.stiffness, span.support.damping, step),
         )
     ]
     spots = defects.springs_of_nodes(x, dx)
     hard = np.flatnonzero(spots)
     held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
-    arms = np.array([(span.steady_arm.mass, 0.0) for span in each]).reshape(-1)
+    masses = np.array([(mass, 0.0) for mass in arms.mass[1:].tolist()]).reshape(-1)
     begin, end = part.in_use
     used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
     return Springs(
@@ -93,7 +96,7 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
         wire=part.wire + np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
         place=np.append(np.repeat(masts, 2), hard - PAD),
         levels=np.array([*levels, *held]).reshape(-1, 3),
-        mass=np.append(arms, np.zeros(len(hard))),
+        mass=np.append(masses, np.zeros(len(hard))),
     )
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ....base.arrays import Array, Index
 from ....base.settings import Between, Settings, comma_hint
@@ -98,15 +98,45 @@ class Support(Settings):
 
 
 class SteadyArm(Settings):
-    """What holds the contact wire sideways at a mast; it balances its own weight."""
+    """What holds the contact wire sideways at a mast; it balances its own weight.
+
+    Either its vertical stiffness is given, or its length, from which and the wire's stagger it follows
+    (``plan.steady_arms``).
+    """
 
     mass: Annotated[float, Between(0, 50, "kg")] = Field(
-        description="mass that moves with the contact wire (kg)"
+        description="mass that moves with the contact wire; of the whole arm where its length is given, of "
+        "which a third moves (kg)"
     )
-    stiffness: Annotated[float, Between(0, 1e6, "N/m")] = Field(description="vertical stiffness (N/m)")
+    stiffness: Annotated[float, Between(0, 1e6, "N/m")] | None = Field(
+        None, description="vertical stiffness (N/m)"
+    )
+    length: Annotated[float, Between(0.3, 5, "m")] | None = Field(
+        None, description="from its hinge to the contact wire, instead of a stiffness (m)"
+    )
+    clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire, of an arm with a length (kg)")
     holds_wire: bool = Field(
-        False, description="whether it carries the wire's weight, so that the wire is at height 0"
+        False,
+        description="whether it carries the wire's weight, so that the wire is at height 0; one with a length "
+        "does by default",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _carries_the_wire(cls, values: Any) -> Any:
+        if isinstance(values, Mapping) and values.get("length") is not None:
+            return {"holds_wire": True} | dict(values)
+        return values
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> Self:
+        if (self.stiffness is None) == (self.length is None):
+            raise ValueError(
+                "give a steady arm either its stiffness or its length, from which its stiffness follows"
+            )
+        if self.length is None and self.clamp_mass:
+            raise ValueError("the clamp_mass of a steady arm goes with its length; else add it to its mass")
+        return self
 
 
 class StitchWire(Settings):
@@ -160,18 +190,98 @@ class Span(Settings):
         return self
 
 
+Stagger: TypeAlias = Annotated[float, Between(-1, 1, "m")]
+Radius: TypeAlias = Annotated[float, Between(-1e5, 1e5, "m")]
+Cant: TypeAlias = Annotated[float, Between(-0.3, 0.3, "m")]
+HEADS = (1.6, 1.95)  # widths of collector heads (m)
+TIGHTEST = 100.0  # radius of a curve (m); half of it is left to trams
+
+
+class Plan(Settings):
+    """A line seen from above: where no mast says otherwise."""
+
+    stagger: tuple[Stagger, ...] = Field(
+        (),
+        description="of the contact wire at the supports, in turn and over again, from the middle of the "
+        "pantograph's head, to the right (m)",
+    )
+    messenger_stagger: tuple[Stagger, ...] = Field(
+        (), description="of the messenger, likewise (m); by default it is above the contact wire"
+    )
+    radius: Radius | None = Field(
+        None, description="of the track, positive to the right (m); none where it is straight"
+    )
+    cant: Cant = Field(
+        0.0, description="of the track, which leans to the inside of its curve, or to the right (m)"
+    )
+    cant_base: Annotated[float, Between(0.5, 2, "m")] = Field(
+        1.5, description="distance of the rails over which cant is measured (m)"
+    )
+    wind: tuple[Annotated[float, Between(-30, 30, "N/m")], Annotated[float, Between(-30, 30, "N/m")]] = Field(
+        (0.0, 0.0),
+        description="force of a steady wind on contact wire and messenger, to the right (N/m); a condition's "
+        "side_wind comes on top",
+    )
+    sideways_waves: bool = Field(
+        False,
+        description="whether a steady arm's swing, which moves the contact wire sideways, runs off as waves, "
+        "as it does above some 250 km/h; else the wire resists as a string held by the next arms",
+    )
+    contact_height: Annotated[float, Between(3, 8, "m")] = Field(
+        5.3, description="of the contact wire over the rails (m), for cant and sway"
+    )
+    head_width: float = Field(
+        1.6, description="width of the collector heads for which the line is built (m): 1.6 or 1.95"
+    )
+
+    @field_validator("radius")
+    @classmethod
+    def _no_turn_on_the_spot(cls, value: float | None) -> float | None:
+        return check_radius(value)
+
+    @field_validator("head_width")
+    @classmethod
+    def _of_a_known_head(cls, value: float) -> float:
+        if value not in HEADS:
+            known = " or ".join(f"{width:g}" for width in HEADS)
+            raise ValueError(f"head_width must be {known} m, not {value:g}")
+        return value
+
+    def from_support(self, number: int) -> Plan:
+        """The same plan, counted from another support."""
+        turned = {
+            name: (*given[number % len(given) :], *given[: number % len(given)])
+            for name in ("stagger", "messenger_stagger")
+            if (given := getattr(self, name))
+        }
+        return self.model_copy(update=turned)
+
+
+def check_radius(radius: float | None) -> float | None:
+    """A radius of the track (m). Raises ValueError for a tighter curve than ``TIGHTEST``."""
+    if radius is not None and abs(radius) < TIGHTEST:
+        raise ValueError(f"radius must be {TIGHTEST:g} m or more to either side, not {radius:g} m")
+    return radius
+
+
 class Mast(Settings):
-    """What a survey says of the mast at a support; no force depends on it."""
+    """What a survey says of the mast at a support, and of the track in the span that begins there."""
 
     name: str = Field("", max_length=40, description="name or number on the mast")
     chainage: Annotated[float, Between(-1e7, 1e7, "m")] | None = Field(None, description="surveyed (m)")
-    stagger: Annotated[float, Between(-1, 1, "m")] | None = Field(
-        None, description="of the contact wire from the middle of the track, to the right (m)"
+    stagger: Stagger | None = Field(
+        None, description="of the contact wire, from the middle of the pantograph's head, to the right (m)"
     )
-    radius: Annotated[float, Between(-1e5, 1e5, "m")] | None = Field(
+    messenger_stagger: Stagger | None = Field(None, description="of the messenger, likewise (m)")
+    radius: Radius | None = Field(
         None, description="of the track, positive to the right (m); none where it is straight"
     )
-    cant: Annotated[float, Between(-0.3, 0.3, "m")] | None = Field(None, description="of the track (m)")
+    cant: Cant | None = Field(None, description="of the track (m)")
+
+    @field_validator("radius")
+    @classmethod
+    def _no_turn_on_the_spot(cls, value: float | None) -> float | None:
+        return check_radius(value)
 
 
 class EndSupport(Settings):

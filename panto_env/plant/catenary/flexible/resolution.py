@@ -29,6 +29,7 @@ from ..schema import CLEAR, MOST_SPANS, Wire
 from .defects import with_tension_left
 from .fixed_wires import tensions_of_fixed
 from .grid import carrying_grid, finest_stable, nodes_per_span, stable
+from .plan import pulled_arms
 from .schema import FlexibleCatenaryData
 
 STEPS = (
@@ -388,6 +389,29 @@ def clear_spans(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, last
     return max(CLEAR, needed - last)
 
 
+STEEP_ARM, SIDEWAYS = 8.0, 250.0  # slope of a steady arm (degrees) and speed (km/h) beyond which both matter
+SIDEWAYS_ERROR = 6
+"""By how much sigma is too large at most (%), against an independent model in three dimensions, where the
+contact wire moves sideways: 5.8 % at 300 km/h where arms slope by 15 degrees, 2.6 % at 10."""
+
+
+def warn_of_sideways_waves(data: FlexibleCatenaryData, runs: Runs) -> None:
+    """Warn where steady arms slope so much that fast trains would send waves sideways along the wire."""
+    waves = data.plan is not None and data.plan.sideways_waves
+    if waves or not data.arms_by_plan or to_kmh(runs.speeds[1]) <= SIDEWAYS:
+        return
+    slopes = [arm.slope for part in data.layout().tension_lengths for arm in pulled_arms(part.layout)]
+    steepest = math.degrees(math.atan(np.nanmax(slopes)))
+    if steepest > STEEP_ARM:
+        warnings.warn(
+            f"Steady arms of line '{data.name}' slope by up to {steepest:.0f}°, and the contact wire's "
+            f"sideways waves, which they cause above {SIDEWAYS:g} km/h, are left out: the standard deviation "
+            f"may be too large by up to about {SIDEWAYS_ERROR} %; give plan.sideways_waves = true.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+
+
 def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
     """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires."""
     wires, window = _loaded(data, runs).wires, numerics.window
@@ -403,6 +427,7 @@ def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) ->
             AccuracyWarning,
             stacklevel=3,
         )
+    warn_of_sideways_waves(data, runs)
     limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
     if window is None and data.layout().stitched and runs.speeds[0] < limit:
         warnings.warn(

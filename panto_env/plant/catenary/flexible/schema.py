@@ -23,6 +23,7 @@ from .parts import (
     EndSupport,
     Mast,
     Overlap,
+    Plan,
     Published,
     Span,
     SteadyArm,
@@ -91,6 +92,9 @@ class FlexibleCatenaryData(CatenaryData):
         (), description="where one pair of wires ends and the next begins, in the order of travel"
     )
     published: Published | None = Field(None, description="elasticity as others give it, for `panto line`")
+    plan: Plan | None = Field(
+        None, description="the line seen from above, on which lengths of steady arms act"
+    )
     masts: tuple[Mast, ...] = Field(
         (), max_length=MOST_SPANS + 1, description="what a survey says of the mast at each support, in order"
     )
@@ -137,6 +141,7 @@ class FlexibleCatenaryData(CatenaryData):
         first = found.spans[0]
         alike = all(span == first for span in found.spans) and len(set(found.encumbrances)) == 1
         alike &= stitch_at_end(line, first) == first.stitch_wire
+        alike &= not line.arms_by_plan  # masts may have unlike stagger
         if not alike or any(found.contact_heights) or line.overlaps:
             return line
         names = (name for name in Span.model_fields if name != "contact_height")
@@ -180,6 +185,16 @@ class FlexibleCatenaryData(CatenaryData):
         return heights if any(heights) else ()
 
     @property
+    def arms_by_plan(self) -> bool:
+        """Whether any steady arm has a length, so that its stiffness depends on stagger and curves."""
+        return any(span.steady_arm.length is not None for span in set(self.layout(1).spans))
+
+    @property
+    def arms_in_wind(self) -> bool:
+        """Whether a wind on the line's plan pulls its steady arms, and so raises or lowers its supports."""
+        return self.plan is not None and any(self.plan.wind) and self.arms_by_plan
+
+    @property
     def ends(self) -> bool:
         """Whether no wire goes on after the line's own spans: where a sequence ends, none does."""
         return bool(self.sequence)
@@ -210,7 +225,10 @@ class FlexibleCatenaryData(CatenaryData):
         A dropper, stiff and without mass, joins two strings of impedances Z = sqrt(T m): Z_m / (Z_c + Z_m).
         A spring k with a mass m sends back ``|K| / sqrt(K^2 + (2 omega Z_c)^2)``, K = k - omega^2 m.
         """
+        from .plan import in_still_air, steady_arms  # need the static shape, which needs this file
+
         contact, messenger = self.contact_wire.impedance, self.messenger_wire.impedance
         omega = 2 * math.pi * frequency
-        arm = self.steady_arm.stiffness - omega**2 * self.steady_arm.mass
+        arms = steady_arms(in_still_air(self).layout(1).tension_lengths[0].layout)
+        arm = float(arms.stiffness[0] - omega**2 * arms.mass[0])
         return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)

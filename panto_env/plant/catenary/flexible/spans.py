@@ -142,6 +142,9 @@ def _changed(own: Table, changes: Any, where: str) -> Span:
     for key in ("support", "steady_arm", "stitch_wire"):
         if isinstance(changes.get(key), Mapping):
             table[key] = {**own.get(key, {}), **changes[key]}
+            if key == "steady_arm" and changes[key].keys() & {"stiffness", "length"}:
+                kept = {"stiffness": None, "length": None, "clamp_mass": 0.0}
+                table[key] |= kept | changes[key]
     try:
         table["droppers"] = droppers_of(own, changes.get("droppers", {}), table["span_length"])
         return valid(Span, table, "")
