@@ -310,23 +310,22 @@ def compliance(
     arcing: float,
     line: LineFacts,
     speed: float,
-    mean_span: float,
     tension: Array,
     tension_near: Array,
     static: float | None = None,
 ) -> list[Criterion]:
     """All criteria of a run, then additional values without limits.
 
-    arcing: NQ (%). speed: of the train (m/s). mean_span: mean length of a span (m). tension, tension_near:
-    all samples of the droppers of the evaluated spans, and those while the train is in their span (N), empty
-    where not recorded. static: as ``of_static`` takes it.
+    arcing: NQ (%). speed: of the train (m/s). tension, tension_near: all samples of the droppers of the
+    evaluated spans, and those while the train is in their span (N), empty where not recorded. static: as
+    ``of_static`` takes it.
     """
     return [
         *criteria(figures, arcing, speed, line.system, line.system_source),
         *of_static(static, line.system),
         replace(_force("min", figures.min, 0.0, None, "EN 50119, recalled"), strict=True),
         *_uplift(figures, line),
-        *_waves(line, speed, speed / mean_span),
+        *_waves(line, speed),
         *_droppers(tension, tension_near),
     ]
 
@@ -347,7 +346,7 @@ def uplift_factor(stopped: bool) -> float:
     return 1.5 if stopped else 2.0
 
 
-def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
+def _waves(line: LineFacts, speed: float) -> list[Criterion]:
     if math.isinf(line.wave_speed):
         return []
     ratio = speed / line.wave_speed
@@ -357,7 +356,7 @@ def _waves(line: LineFacts, speed: float, frequency: float) -> list[Criterion]:
         Criterion("doppler", "Doppler factor (c − v)/(c + v)", "", (1 - ratio) / (1 + ratio)),
     ]
     if not math.isnan(line.dropper_reflection):
-        support = f"wave reflection at a support, at {frequency:.2g} Hz (one per span)"
+        support = "wave reflection at a support, at one wave per span"
         values += [
             Criterion("dropper reflection", "wave reflection at a dropper", "", line.dropper_reflection),
             Criterion("support reflection", support, "", line.support_reflection),

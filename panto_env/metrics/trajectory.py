@@ -177,7 +177,6 @@ class Trajectory:
             arcing(self.contact_force[inside], self.time_step),
             self.line,
             float(self.speeds[inside].mean()) if self.identity.drifts else self.speed,
-            self.alignment.mean_length,
             tension,
             tension[near_train(self, spans)] if tension.size else tension,
             self.static_force,

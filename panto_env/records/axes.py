@@ -134,8 +134,8 @@ def axes_of(run: str, values: Mapping[str, Array]) -> Axes:
     time, position, speed = (values.get(name) for name in ("time", "position", "speed"))
     if position is None and (time is None or speed is None):
         raise InputError(
-            "The record has no positions; add a column position (m), or columns time (s) and speed (km/h), "
-            "of which they are the integral."
+            "The record has no positions; add a column position (m) or give --column position=HEADING, or "
+            "add columns time (s) and speed (km/h), of which they are the integral."
         )
     if time is None:
         if speed is None:

@@ -198,9 +198,8 @@ def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) 
     if line is not None:
         wave = line.contact_wire.wave_speed if isinstance(line, FlexibleCatenaryData) else math.inf
         facts = LineFacts.of(line, wave, speed)
-    mean_span = line.alignment().mean_length if line is not None else 1.0
     figures, none = replace(part.figures, max_uplift=uplift), np.zeros(0)
-    found = compliance(figures, part.arcing, facts, speed, mean_span, none, none)
+    found = compliance(figures, part.arcing, facts, speed, none, none)
     # Its note for a run names an option that a record cannot have.
     words = f"this and other limits are those for {facts.system}, the power supply ({facts.system_source})"
     notes = {"mean": words} | ({"arcing": f"not judged, as {blind}"} if blind else {})

@@ -76,7 +76,8 @@ def read_table(
     )
     if not found:
         raise InputError(
-            f"{path} has no column of a record; name them time (s), position (m), force (N) and so on."
+            f"{path} has no column of a record; name them time (s), position (m), force (N) and so on, or "
+            "say which is which: --column force=HEADING."
         )
     if len(next(iter(found.values()))) == 0:
         raise InputError(f"{path} has no samples; give a record with a row for each sample.")
@@ -181,7 +182,7 @@ def _measured(values: Mapping[str, Array]) -> Array:
     if not strips:
         raise InputError(
             "The record has no contact force; name the column force (N), or those of the strips force_1 (N), "
-            "force_2 (N) and so on."
+            "force_2 (N) and so on, or give --column force=HEADING."
         )
     return np.asarray(np.sum(strips, axis=0))
 

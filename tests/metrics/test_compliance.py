@@ -160,7 +160,7 @@ def test_maximum_force_and_arcing_depend_on_the_power_supply(system):
 
 def of_line(line=LineFacts(), **given):  # noqa: B008
     none = np.zeros((0, 0))
-    return by_key(compliance(figures(mean=100.0, **given), 0.0, line, 70.0, 60.0, none, none))
+    return by_key(compliance(figures(mean=100.0, **given), 0.0, line, 70.0, none, none))
 
 
 def test_minimum_force_must_be_positive():
@@ -250,7 +250,7 @@ def test_what_waves_meet_is_told_of_lines_that_have_it(reference_run):
     found = by_key(reference_run.compliance())
     expected = load_catenary("en50318-2002").reflections(300 / 3.6 / 60.0)
     assert (found["dropper reflection"].value, found["support reflection"].value) == expected
-    assert "at 1.4 Hz (one per span)" in found["support reflection"].name
+    assert not re.search(r"\d", found["support reflection"].name)  # a report names it once, for all speeds
     bare = replace(reference_run, line=replace(reference_run.line, dropper_reflection=math.nan))
     assert set(found) - set(by_key(bare.compliance())) == {"dropper reflection", "support reflection"}
 

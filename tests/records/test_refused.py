@@ -101,7 +101,10 @@ REFUSED = {
     "no position": (drop("position (m)"), "no positions; add a column position"),
     "no axes": (drop("time (s)", "position (m)"), "no positions"),
     "no time": (drop("time (s)"), "no time; add a column time"),
-    "nothing": (drop("time (s)", "position (m)", "force (N)"), "no samples|no column of a record"),
+    "nothing": (
+        drop("time (s)", "position (m)", "force (N)"),
+        "no samples|no column of a record; .*--column",
+    ),
     "falling": (
         scale("position (m)", -1),
         "falls from -1000 to -1499.9 m, as the train runs against the chainage; write the position as that "
