@@ -15,7 +15,7 @@ from panto_env.catalog.loader import file_of, text_of
 from panto_env.catalog.section import Bridge, Kinds, Masts, lowered
 from panto_env.plant.catenary.flexible.static import hang
 
-NAMES = ("main-line", "fast-line")
+NAMES = ("main-line", "fast-line", "curved-line")
 FIXED = {
     "re250-curves": ("re250", 250.0),
     "beijing-tianjin-viaduct": ("beijing-tianjin", 300.0),

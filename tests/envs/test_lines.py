@@ -150,7 +150,16 @@ def test_the_benchmark_s_reward_counts_from_the_drawn_line_s_own_passive_run():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settings", [FAMILY, SECTION, LIST], ids=["family", "section", "list"])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        FAMILY,
+        SECTION,
+        LIST,
+        SECTION | {"catenary": "section:curved-line", "line_condition": "new:side_wind=15", "window": 0},
+    ],
+    ids=["family", "section", "list", "plan in wind"],
+)
 def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     ran = check_lanes_are_singles("Pantograph-v0", settings, steps=70)
     assert ran.ends > 3
