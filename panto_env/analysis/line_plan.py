@@ -191,7 +191,8 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
     own = wind_loads(line, condition.side_wind, condition.ice)
     loads = plan.wind[0] + own[0], plan.wind[1] + own[1]
     first, count = _shown(line)
-    layout = line.layout(None if line.sequence else first + max(count, DRAWN) + REPEATS // 2)
+    far = 0 if line.sequence or not first else max(0, DRAWN - count) + REPEATS // 2
+    layout = line.layout(None if line.sequence else first + count + far)
     blown = in_wind(line, len(layout.spans), [condition])
     supports, spans = list[SupportPlan](), list[SpanPlan]()
     places, still, windy = list[Array](), list[Array](), list[Array]()
@@ -209,7 +210,7 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
             if k < len(part.layout.spans):
                 spans.append(_span(views, k, part.first_span))
         low, high = (
-            (begin, end) if line.sequence else views[0].supports[[first, first + max(count, DRAWN)]].tolist()
+            (begin, end) if not first else views[0].supports[[first, first + max(count, DRAWN)]].tolist()
         )
         x = np.linspace(low, high, PLACES * math.ceil((high - low) / line.stride) + 1)
         places.append(x)
@@ -226,13 +227,13 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
 
 
 def _shown(line: FlexibleCatenaryData) -> tuple[int, int]:
-    """First support that is shown, from 0, and number of spans: those that differ, far from both ends."""
+    """First support that is shown, from 0, and number of spans: all, or those that differ in the midst."""
     if line.sequence:
         return 0, len(line.sequence)
     plan = line.plan or Plan()
     period = math.lcm(*(max(1, len(each)) for each in (plan.stagger, plan.messenger_stagger)))
     if not plan.stagger:
-        return 0, line.spans
+        return 0, len(line.masts) - 1
     return period * math.ceil(REPEATS / 2 / period), period
 
 

@@ -122,6 +122,8 @@ def line(
                 print_table(elasticity_table([found]))
             if run and not other and not (above and any(above.loads)):
                 console.print("This condition changes no tension along the line: it is run as designed.")
+            if above is None and any(mast.stagger is not None for mast in chosen.masts):
+                console.print("The line is not seen from above: not every mast has a stagger.")
             for limit in broken:
                 alert(f"{limit.name} is not kept.")
     if broken:

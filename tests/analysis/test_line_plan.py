@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +131,28 @@ def test_the_drawing_shows_the_plan(wind, tmp_path):
     expected = plan_view(line.layout(20), found.loads).at(np.asarray(x) + 60.0 * 8)
     assert (x[0], x[-1]) == (0, pytest.approx(180))
     assert y == pytest.approx(expected, abs=2e-4)
+
+
+SURVEYS = {
+    "all": ["0.3", "-0.3"] * 6 + ["0.3"],
+    "one is missing": ["0.3", "-0.3"] * 3 + [""] + ["-0.3", "0.3"] * 3,
+}
+
+
+@pytest.mark.parametrize("base", ["re250", "arms"])
+@pytest.mark.parametrize("name", SURVEYS)
+def test_a_survey_of_equal_spans_is_seen_from_above_where_it_has_all_staggers(base, name, tmp_path):
+    masts = tmp_path / "masts.csv"
+    rows = [f"M{k},{60 * k},{stagger}" for k, stagger in enumerate(SURVEYS[name])]
+    masts.write_text("\n".join(["mast,position (m),stagger (m)", *rows]) + "\n")
+    line = base if base == "re250" else written(tmp_path, "contact_height = 5.5")
+    result = panto("line", line, "--masts", masts, "--plot", tmp_path / "line.png", cwd=tmp_path)
+    if name == "all":
+        assert result.returncode == 0, result.stderr
+        assert "The contact wire's lateral position" in result.stdout
+        assert re.search("12 │ +straight", result.stdout)
+    elif base == "re250":  # nothing depends on it
+        assert result.returncode == 0, result.stderr
+        assert "not seen from above: not every mast has a stagger" in result.stdout
+    else:
+        assert "Support 7 (M6) of line 'masts' has no stagger" in result.stderr.replace("\n", " ")

@@ -117,8 +117,8 @@ class SteadyArm(Settings):
     clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire, of an arm with a length (kg)")
     holds_wire: bool = Field(
         False,
-        description="whether it carries the wire's weight, so that the wire is at height 0; one with a length "
-        "does by default",
+        description="whether it carries the wire's weight, so that the wire is at height 0; one with a "
+        "length does by default",
     )
 
     @model_validator(mode="before")

@@ -202,8 +202,10 @@ def _or_in_turn(given: float | None, in_turn: Sequence[float], number: int) -> f
 
 
 def has_plan(line: FlexibleCatenaryData) -> bool:
-    """Whether a line has stagger."""
-    return bool(line.plan and line.plan.stagger) or any(mast.stagger is not None for mast in line.masts)
+    """Whether a line has stagger at all its supports, or at all that were surveyed."""
+    return bool(line.plan and line.plan.stagger) or (
+        bool(line.masts) and all(mast.stagger is not None for mast in line.masts)
+    )
 
 
 def pulled_arms(layout: Layout) -> list[PulledArm]:
