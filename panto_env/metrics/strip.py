@@ -51,13 +51,13 @@ def swept(lateral: Array, force: Array, strip: float = STRIP) -> StripUse:
 
 
 def strip_use(run: Trajectory, spans: SpanChoice = None) -> StripUse | None:
-    """Use of the strips of a run's pantograph; None on a line without stagger.
+    """Use of the strips of a run's pantograph; None on a line without stagger, or beyond a survey.
 
     spans: as ``Trajectory.summary`` takes them. In the steady wind of the run's condition. Raises InputError
     as that does, and as ``plan_view`` does.
     """
     line = run.designed.line
-    if not isinstance(line, FlexibleCatenaryData) or not has_plan(line):
+    if not isinstance(line, FlexibleCatenaryData) or not has_plan(line, run.alignment.spans):
         return None
     inside, condition = run.inside(spans), run.identity.line_condition
     layout = line.layout(run.alignment.spans)

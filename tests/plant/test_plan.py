@@ -335,3 +335,12 @@ def test_overlapping_wires_have_the_plan_of_the_line():
     x = np.linspace(0, 840, 500)
     assert np.abs(contact_wire_at(line.layout(), x)).max() == pytest.approx(0.3, abs=1e-3)
     assert simulate(line, "dsa380", 200, distance=700.0).summary((8, 9)).std > 0
+
+
+def test_a_run_beyond_a_survey_has_no_wear_of_strips():
+    masts = [{"stagger": 0.3 * (-1) ** k} for k in range(13)]
+    line = line_with(masts=masts, spans=12)
+    within = strip_use(simulate(line, "dsa380", 250, spans=12, distance=600.0), (6, 8))
+    assert within is not None
+    assert within.width == pytest.approx(0.6)
+    assert strip_use(simulate(line, "dsa380", 250, spans=20, distance=900.0)) is None

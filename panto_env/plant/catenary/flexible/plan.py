@@ -201,11 +201,12 @@ def _or_in_turn(given: float | None, in_turn: Sequence[float], number: int) -> f
     return given if given is not None or not in_turn else in_turn[number % len(in_turn)]
 
 
-def has_plan(line: FlexibleCatenaryData) -> bool:
-    """Whether a line has stagger at all its supports, or at all that were surveyed."""
-    return bool(line.plan and line.plan.stagger) or (
-        bool(line.masts) and all(mast.stagger is not None for mast in line.masts)
-    )
+def has_plan(line: FlexibleCatenaryData, spans: int = 0) -> bool:
+    """Whether a line has stagger at all supports of so many spans, by its plan or by a survey of them all."""
+    if line.plan is not None and line.plan.stagger:
+        return True
+    given = [mast.stagger is not None for mast in line.masts]
+    return len(given) > spans and all(given)
 
 
 def pulled_arms(layout: Layout) -> list[PulledArm]:
