@@ -90,13 +90,14 @@ def spans_before(
 
     line: one that goes on as it is, before and behind its spans.
     force_of: of a train that begins at rest at the first support of the simulated line, as designed, at the
-    places of a piece (N). Only pieces that begin in the line's first span can hold such a start: these are
-    asked which of both they are more like. All others have settled.
+    places of a piece (N). A train may have begun so in the span in which the first of the pieces begin: these
+    are asked which of both they are more like. All others have settled.
     """
     span = line.span_length
-    settled = math.floor(min(float(piece.position[0]) for piece in pieces) / span) - LEAD
-    near = [piece for piece in pieces if piece.position[0] < span]
-    alike = {0: 0.0, settled: 0.0}
+    begun = math.floor(min(float(piece.position[0]) for piece in pieces) / span)
+    first, settled = max(begun, 0), begun - LEAD
+    near = [piece for piece in pieces if piece.position[0] < (first + 1) * span]
+    alike = {first: 0.0, settled: 0.0}
     for piece in near:
         for before in alike:
             begin = max(float(piece.position[0]) - before * span, 0.0)
@@ -105,7 +106,7 @@ def spans_before(
             except InputError:
                 continue  # such a piece cannot be compared, and whoever asks says why
             alike[before] += rough_shift(own, force_of(piece, own), 0.5 * span)[1]
-    return 0 if alike[0] > alike[settled] else settled
+    return first if alike[first] > alike[settled] else settled
 
 
 def rough_shift(own: Measured, force: Array, reach: float) -> tuple[float, float]:
