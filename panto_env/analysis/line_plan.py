@@ -20,9 +20,9 @@ from ..plant.catenary.flexible.plan import (
     PlanView,
     has_plan,
     in_wind,
+    loads_in,
     plan_view,
     pulled_arms,
-    wind_loads,
 )
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.line_condition import LineCondition
@@ -188,8 +188,7 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
     if not has_plan(line):
         return None
     plan = line.plan or Plan()
-    own = wind_loads(line, condition.side_wind, condition.ice)
-    loads = plan.wind[0] + own[0], plan.wind[1] + own[1]
+    loads = loads_in(line, condition)
     first, count = _shown(line)
     far = 0 if line.sequence or not first else max(0, DRAWN - count) + REPEATS // 2
     layout = line.layout(None if line.sequence else first + count + far)
@@ -206,9 +205,8 @@ def line_plan(line: FlexibleCatenaryData, condition: LineCondition) -> LinePlan 
             if begin <= x <= end and first <= part.first_span + k <= first + count
         ]
         supports += _supports(part.layout, now.layout, views, inside, part.first_span, part.begin, plan)
-        for k in inside[:-1] if part.end == end else inside:
-            if k < len(part.layout.spans):
-                spans.append(_span(views, k, part.first_span))
+        begun = inside[:-1] if part.end == end else inside  # no span begins at the line's last support
+        spans += [_span(views, k, part.first_span) for k in begun]
         low, high = (
             (begin, end) if not first else views[0].supports[[first, first + max(count, DRAWN)]].tolist()
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Array
-from ..plant.catenary.flexible.plan import contact_wire_at, has_plan, wind_loads
+from ..plant.catenary.flexible.plan import contact_wire_at, has_plan, loads_in
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from .figures import SpanChoice
 from .trajectory import Trajectory
@@ -62,5 +62,5 @@ def strip_use(run: Trajectory, spans: SpanChoice = None) -> StripUse | None:
     inside, condition = run.inside(spans), run.identity.line_condition
     layout = line.layout(run.alignment.spans)
     position = run.position[inside]
-    lateral = contact_wire_at(layout, position, wind_loads(line, condition.side_wind, condition.ice))
+    lateral = contact_wire_at(layout, position, loads_in(line, condition))
     return swept(lateral, run.contact_force[inside] * np.gradient(position))

@@ -30,7 +30,7 @@ from .blown import AIR_DENSITY, DRAG, diameter
 from .layout import Layout
 from .parts import Mast, Plan
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, solve_band
+from .shape import GRAVITY, HELD, solve_band
 from .static import solve
 
 STEEPEST_ARM = 45.0  # slope up to which an arm is taken as a pendulum (degrees)
@@ -120,9 +120,7 @@ def plan_view(layout: Layout, wind: tuple[float, float] | None = None) -> PlanVi
     lengths, tensions = np.diff(places), (line.contact_wire.tension, line.messenger_wire.tension)
     span = np.searchsorted(supports, (places[1:] + places[:-1]) / 2) - 1
     load = np.outer(tensions, curvature[span]) + np.array(wind)[:, None]
-    heights = shape.messenger.height(np.mod(x, _period(line))) - shape.contact.height(
-        np.mod(x, _period(line))
-    )
+    heights = shape.messenger.height(x) - shape.contact.height(x)
     band, right = np.zeros((3, 2 * len(places))), np.zeros(2 * len(places))
     for wire, tension in enumerate(tensions):
         spring, pushed = tension / lengths, load[wire] * lengths / 2
@@ -137,30 +135,23 @@ def plan_view(layout: Layout, wind: tuple[float, float] | None = None) -> PlanVi
     band[1, 2 * hung] -= pendulum
     for wire in range(2):
         fixed = 2 * held + wire
-        stiff = 1e9 * max(tensions)
-        band[0, fixed] += stiff
-        right[fixed] += stiff * stagger[wire]
+        band[0, fixed] += HELD
+        right[fixed] += HELD * stagger[wire]
     lateral = solve_band(band, right).reshape(-1, 2).T.copy()
     lateral[:, held] = stagger
     return PlanView(supports, stagger, curvature, cant, places, lateral, load, tensions)
 
 
-def contact_wire_at(layout: Layout, x: Array, wind: tuple[float, float] = (0.0, 0.0)) -> Array:
+def contact_wire_at(layout: Layout, x: Array, wind: tuple[float, float] | None = None) -> Array:
     """Lateral position (m) of the contact wire in use at places x (m), (n,), in a wind (N/m).
 
-    wind: beside that of the line's plan. Raises InputError as ``plan_view`` does.
+    wind and InputError: as in ``plan_view``.
     """
-    plan, found = layout.line.plan or Plan(), np.zeros(len(x))
-    loads = plan.wind[0] + wind[0], plan.wind[1] + wind[1]
+    found = np.zeros(len(x))
     for part in layout.tension_lengths:
         used = (x >= part.in_use[0]) & (x <= part.in_use[1])
-        found[used] = plan_view(part.layout, loads).at(x[used] - part.begin)
+        found[used] = plan_view(part.layout, wind).at(x[used] - part.begin)
     return found
-
-
-def _period(line: FlexibleCatenaryData) -> float:
-    """Beyond this the heights of a static shape repeat (m)."""
-    return math.inf if line.sequence else line.span_length
 
 
 def wind_loads(line: FlexibleCatenaryData, speed: float, ice: float = 0.0) -> tuple[float, float]:
@@ -175,6 +166,12 @@ def wind_loads(line: FlexibleCatenaryData, speed: float, ice: float = 0.0) -> tu
         for wire, strand in zip(wires, (False, True), strict=True)
     )
     return contact, messenger
+
+
+def loads_in(line: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
+    """Force of the wind of a line's plan and of a condition on contact wire and messenger (N/m)."""
+    plan, own = line.plan or Plan(), wind_loads(line, condition.side_wind, condition.ice)
+    return plan.wind[0] + own[0], plan.wind[1] + own[1]
 
 
 def _set_out(layout: Layout) -> tuple[Array, Array, Array]:
@@ -313,17 +310,15 @@ def in_wind(
     """
     if not line.arms_by_plan:
         return line
-    winds = {(each.side_wind, each.ice) for each in conditions}
-    if len({wind for wind, _ in winds}) > 1:
+    if len({each.side_wind for each in conditions}) > 1:
         raise InputError(
             f"The steady arms of line '{line.name}' have lengths, so all conditions that are drawn from must "
             "have the same side_wind; make a separate run for each."
         )
-    plan, loads = line.plan or Plan(), np.array(wind_loads(line, *winds.pop()))
-    blown = tuple((plan.wind + loads).tolist())
+    blown = loads_in(line, conditions[0])
     if not any(blown):
         return line
-    changed = {"plan": plan.model_copy(update={"wind": blown})}
+    changed = {"plan": (line.plan or Plan()).model_copy(update={"wind": blown})}
     if line.sequence:
         return line.model_copy(update=changed)
     table = line.model_dump(exclude={"sources", "plan"}, exclude_none=True)

@@ -187,7 +187,7 @@ class FlexibleCatenaryData(CatenaryData):
     @property
     def arms_by_plan(self) -> bool:
         """Whether any steady arm has a length, so that its stiffness depends on stagger and curves."""
-        return any(span.steady_arm.length is not None for span in set(self.layout(1).spans))
+        return any(span.steady_arm.length is not None for span in self.layout(1).spans)
 
     @property
     def arms_in_wind(self) -> bool:
