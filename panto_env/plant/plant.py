@@ -26,7 +26,7 @@ from .pantograph.schema import (
 )
 from .pantograph.step import Part
 from .speed import ahead, gain
-from .state import SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
+from .state import LATERAL_EVERY, SAMPLE_ROWS, Place, Row, Run, Samples, per_collector
 from .step import advance
 from .train import Train
 from .wind import GUST_ROWS, check_wind, draw_wind, winds_at
@@ -90,8 +90,13 @@ class Plant:
         waves = max(condition.waves for condition in runs.conditions)
         tables = [own.pantograph.force_over_height for own in train.collectors]
         knots = sorted({0.0, *(height for table in tables for height, _ in table)})
+        lateral = np.zeros(0)
+        if any(own.pantograph.rolls for own in train.collectors):
+            places = np.arange(0.0, self.alignment.length + LATERAL_EVERY, LATERAL_EVERY)
+            lateral = catenary.lateral(places, self.spans, runs.conditions)
+        rolling = 2 if lateral.size else 0
         self.run = Run(
-            table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes))),
+            table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes) + rolling)),
             distance=per_collector((own.distance for own in train.collectors), float, count),
             driven=per_collector((own.driven for own in train.collectors), int, count),
             aerodynamic=per_collector(
@@ -105,6 +110,7 @@ class Plant:
             alignment=self.alignment.arrays,
             levels=np.array(catenary.contact_heights),
             over_height=np.array([knots, *(own.pantograph.force_over(knots) for own in train.collectors)]),
+            lateral=lateral,
             lowest_force=-np.inf if bilateral else 0.0,
         )
         copy_whole(*self.arrays)
@@ -227,6 +233,9 @@ class Plant:
         by_wind = run.aerodynamic[collector] * wind * (2 * now + wind)
         begin = run.levels[:1].sum()  # height there; 0 on a level line
         by_height = np.array([each.lift_over(begin) for each in pantographs or [own.pantograph]])
+        aside = float(run.lateral[:1].sum())  # 0 where no head rolls
+        rolled = aside**2 / own.pantograph.roll_stiffness if own.pantograph.rolls else 0.0
+        compliance += rolled
         state = rest_state(pantographs or own.pantograph, lifts + by_wind + by_height, heights, compliance)
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
@@ -237,9 +246,11 @@ class Plant:
         table[:, Row.WIND] = by_wind
         table[:, Row.CONTACT_FORCE] = forces
         table[:, Row.STATE : Row.STATE + state.shape[1]] = state
+        if aside and own.pantograph.rolls:
+            table[:, -2] = -forces * aside / own.pantograph.roll_stiffness
         table[:, Row.HEAD_HEIGHT] = state[:, 0]
         table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
-        table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * strip
+        table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * (strip + rolled)
         return table
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:

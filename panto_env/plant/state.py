@@ -102,6 +102,7 @@ class Row(IntEnum):
 
 
 ROW, PLACE = constants(Row), constants(Place)
+LATERAL_EVERY = 0.5  # distance of the points of ``Run.lateral`` (m)
 SAMPLE_ROWS = int(Row.HEAD_FORCE) + 1  # rows of a sample: the first ones
 
 
@@ -122,7 +123,8 @@ def per_collector(numbers: Iterable[Any], kind: type, collectors: int) -> Any:
 class Run(NamedTuple):
     """State of all lanes: position of each train, motion of its pantographs, contact forces."""
 
-    table: Array  # (collectors, lanes, STATE + 4n): the rows above
+    # (collectors, lanes, STATE + 4n): the rows above; where a head rolls, its angle (rad) and rate come last
+    table: Array
     distance: PerCollector  # of each collector behind the first (m)
     driven: PerCollector  # 1 for each collector with an actuator, 0 without
     aerodynamic: PerCollector  # uplift of each collector per squared distance covered in a step (N/m^2)
@@ -132,6 +134,7 @@ class Run(NamedTuple):
     alignment: AlignmentArrays
     levels: Array  # (supports,): the contact wire's own height at each (m); none where it is level
     over_height: Array  # (1 + collectors, heights): m, and what each static force is more there (N)
+    lateral: Array  # (points,): of the contact wire from a head's middle (m); none where no head rolls
     lowest_force: float  # 0, or -inf for a contact that may pull (N)
 
 

@@ -15,8 +15,15 @@ from .catenary.protocol import (
     rise_at_contact,
 )
 from .functions import cosine_of_turns
-from .pantograph.step import PART, add_contact_force, contact_force, move_freely, shared_forces
-from .state import PLACE, ROW, SAMPLE_ROWS, own_row
+from .pantograph.step import (
+    PART,
+    add_contact_force,
+    contact_force,
+    move_freely,
+    roll_freely,
+    shared_forces,
+)
+from .state import LATERAL_EVERY, PLACE, ROW, SAMPLE_ROWS, own_row
 from .train import lift, lift_by_height, lift_by_wind, mean_stride, place_on_line
 
 
@@ -27,6 +34,14 @@ def irregularity(run, x, lane):
     for k in range(0, waves.size, 3):
         height += waves[k] * cosine_of_turns(waves[k + 1] * x + waves[k + 2])
     return height
+
+
+@inlined
+def lateral_at(run, x):
+    """Lateral position of the contact wire at x (m), from the head's middle, to the right (m)."""
+    place = min(max(x / LATERAL_EVERY, 0.0), run.lateral.size - 1.001)
+    k = int(place)
+    return run.lateral[k] + (place - k) * (run.lateral[k + 1] - run.lateral[k])
 
 
 @inlined
@@ -74,15 +89,23 @@ def meet(line, wire, pantographs, run, contact, lane):
     """
     own = run.table[contact, lane]
     parts = pantographs.table[contact, own_row(pantographs.table[contact], lane)]
-    free_head = own[ROW.STATE + pantographs.sizes[contact]]
-    contact_input, share = parts[PART.CONTACT_INPUT], parts[PART.IMPLICIT_SHARE]
+    free_middle = own[ROW.STATE + pantographs.sizes[contact]]
+    share = parts[PART.IMPLICIT_SHARE]
     x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
+    # Where it is touched; a head that rolls yields more there than in its middle.
+    head, free_head, contact_input = own[ROW.STATE], free_middle, parts[PART.CONTACT_INPUT]
+    aside, angle, rate = 0.0, 0.0, 0.0
+    if run.lateral.size > 0:
+        aside = lateral_at(run, x)
+        angle, rate = roll_freely(parts, own)
+        head += aside * own[own.size - 2]
+        free_head += aside * angle
+        contact_input += aside * aside * parts[PART.ROLL_INPUT]
     rise = 0.0
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, contact, own, lane)
     free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, contact, x)
     before, irregular = own[ROW.WIRE_BEFORE], own[ROW.IRREGULARITY]
-    head = own[ROW.STATE]
     middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.WIRE_MIDDLE]
     middle_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
     force = contact_force(
@@ -99,6 +122,7 @@ def meet(line, wire, pantographs, run, contact, lane):
     if has_second_wire(line):
         law = contact_law(
             parts,
+            contact_input,
             spring,
             0.5 * (head + free_head) - (middle + irregular),
             free_head - head - (free_wire - before) - rise,
@@ -106,31 +130,36 @@ def meet(line, wire, pantographs, run, contact, lane):
             wire_yield,
         )
         yielding = middle_yield + spring
-        force = meet_second_wire(line, wire, parts, run, contact, lane, free_head, law, middle, yielding)
+        its_head = (head, free_head, contact_input)
+        force = meet_second_wire(line, wire, parts, run, contact, lane, its_head, law, middle, yielding)
         total = force + own[ROW.SECOND_FORCE]
     own[ROW.CONTACT_FORCE] = total
     own[ROW.FIRST_FORCE] = force
-    own[ROW.HEAD_HEIGHT] = 0.5 * (head + free_head + contact_input * total)
+    own[ROW.HEAD_HEIGHT] = 0.5 * (own[ROW.STATE] + free_middle + parts[PART.CONTACT_INPUT] * total)
+    if run.lateral.size > 0:
+        own[own.size - 2] = angle + parts[PART.ROLL_INPUT] * aside * total
+        own[own.size - 1] = rate + parts[PART.ROLL_INPUT + 1] * aside * total
 
 
 @inlined
-def contact_law(parts, spring, gap, change, middle_yield, wire_yield):
+def contact_law(parts, contact_input, spring, gap, change, middle_yield, wire_yield):
     """Numerator and denominator of ``contact_force`` with one of two wires (m, m/N).
 
-    spring: compliance in series with the contact's.
+    contact_input: of the head where it is touched (m/N). spring: compliance in series with the contact's.
     """
-    compliance, contact_input = max(parts[PART.STRIP_COMPLIANCE] + spring, 0.0), parts[PART.CONTACT_INPUT]
+    compliance = max(parts[PART.STRIP_COMPLIANCE] + spring, 0.0)
     damped = compliance * parts[PART.STRIP_DAMPING]
     resisting = compliance + middle_yield - 0.5 * contact_input
     return gap + damped * change, resisting + damped * (wire_yield - contact_input)
 
 
 @called
-def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, middle, middle_yield):
+def meet_second_wire(line, wire, parts, run, contact, lane, its_head, first, middle, middle_yield):
     """Share the contact force between two wires, and return that on the first (N).
 
-    first: law of the first wire. middle: its height at mid-step without this force (m); middle_yield: how
-    much it rises there per newton (m/N).
+    its_head: height of the head where it is touched at the step's start, and at its end without contact force
+    (m), and what a newton changes (m/N). first: law of the first wire. middle: its height at mid-step without
+    this force (m); middle_yield: how much it rises there per newton (m/N).
     """
     own, point = run.table[contact, lane], len(run.distance) + contact
     x, share = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5), parts[PART.IMPLICIT_SHARE]
@@ -138,11 +167,13 @@ def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, mi
     if parts[PART.STRIP_DAMPING] > 0.0:
         rise = rise_along(line, wire, run, contact, point, own, lane)
     free_wire, wire_yield, early_yield, spring = look_at_contact(line, wire, lane, point, x)
-    before, irregular, head = own[ROW.SECOND_BEFORE], own[ROW.IRREGULARITY], own[ROW.STATE]
+    before, irregular = own[ROW.SECOND_BEFORE], own[ROW.IRREGULARITY]
+    head, free_head, contact_input = its_head
     its_middle = share * 0.5 * (before + free_wire) + (1.0 - share) * own[ROW.SECOND_MIDDLE]
     its_yield = share * 0.5 * wire_yield + (1.0 - share) * early_yield
     second = contact_law(
         parts,
+        contact_input,
         spring,
         0.5 * (head + free_head) - (its_middle + irregular),
         free_head - head - (free_wire - before) - rise,
@@ -150,7 +181,7 @@ def meet_second_wire(line, wire, parts, run, contact, lane, free_head, first, mi
         wire_yield,
     )
     damped = parts[PART.STRIP_COMPLIANCE] * parts[PART.STRIP_DAMPING]
-    force, other = shared_forces(first, second, -(0.5 + damped) * parts[PART.CONTACT_INPUT])
+    force, other = shared_forces(first, second, -(0.5 + damped) * contact_input)
     height, its_height = middle + middle_yield * force, its_middle + (its_yield + spring) * other
     # Of two wires that are touched, the one that carries more counts; of two that are not, the lower one.
     lower = its_height < height if force + other == 0.0 else other > force

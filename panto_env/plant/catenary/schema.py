@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Array
 from ...base.errors import InputError, shown
 from ...base.settings import Between, Settings
 from ..alignment import Alignment
+from ..line_condition import LineCondition
 from ..state import FREE_UPLIFT
 
 PowerSystem: TypeAlias = Literal["AC", "AC 25 kV", "AC 15 kV", "DC 3 kV", "DC 1.5 kV", "DC 750 V", "DC 600 V"]
@@ -78,6 +82,13 @@ class CatenaryData(Settings):
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)
+
+    def lateral(self, places: Array, spans: int, conditions: Sequence[LineCondition]) -> Array:
+        """Lateral position of the contact wire at places along so many spans (m), (n,); (0,) where unknown.
+
+        From the middle of the pantograph's head, to the right, in the wind of the first condition.
+        """
+        return np.zeros(0)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Reflection coefficients of a dropper and of a support at a frequency (Hz); nan for none."""

@@ -70,6 +70,14 @@ class PantographData(Settings):
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
     )
     contact_damping: Damper = Field(0.0, description="damper parallel to the contact spring (N s/m)")
+    roll_inertia: Annotated[float, Between(0.01, 50, "kg m^2")] | None = Field(
+        None,
+        description="moment of inertia of a head that rolls about its middle, where the line has stagger; by "
+        "default it does not roll (kg m^2)",
+    )
+    spring_distance: Annotated[float, Between(0.1, 2, "m")] | None = Field(
+        None, description="of the two springs, each half of the first one, on which a rolling head stands (m)"
+    )
     frame_friction: Annotated[float, Between(0, 100, "N")] = Field(
         0.0, description="dry friction on the lowest mass, in either direction (N)"
     )
@@ -98,6 +106,10 @@ class PantographData(Settings):
                 raise ValueError(
                     f"force_over_height must be static_force, {self.static_force:g} N, at height 0"
                 )
+        if (self.roll_inertia is None) != (self.spring_distance is None):
+            raise ValueError("roll_inertia and spring_distance go together: give both, or neither")
+        if self.roll_inertia is not None and len(self.masses) < 2:
+            raise ValueError("a head that rolls stands on springs, so it needs a second mass below it")
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
         return self
@@ -112,6 +124,16 @@ class PantographData(Settings):
     def share_at_head(self) -> float:
         """Share of a force on the lowest mass that springs leave to a head held where none is strained."""
         return 1 / (1 + self.stiffnesses[-1] * sum(1 / each for each in self.stiffnesses[:-1]))
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the head rolls."""
+        return self.roll_inertia is not None
+
+    @property
+    def roll_stiffness(self) -> float:
+        """Moment by angle of a rolling head (N m/rad)."""
+        return self.stiffnesses[0] * ((self.spring_distance or 0.0) / 2) ** 2
 
     @property
     def local_spring(self) -> float:
@@ -183,7 +205,24 @@ def parts(
     share = max(catenary.contact_share, 1.0 - bearable / gain if gain else 0.0)
     damping = pantograph.contact_damping / time_step
     scalars = [compliance, damping, share, pantograph.frame_friction, pantograph.local_spring]
-    return np.concatenate([scalars, inputs.T.ravel(), transition.ravel()])
+    return np.concatenate([scalars, roll(pantograph, time_step), inputs.T.ravel(), transition.ravel()])
+
+
+def roll(pantograph: PantographData, time_step: float) -> Array:
+    """Motion of a rolling head over a step: rows of ``Part`` from ``ROLL_FREE``, all 0 for one that does not.
+
+    I theta'' + c b^2 theta' + k b^2 theta = -F y, with half the springs' distance b, and the force F at y to
+    the right of the middle; its frame does not roll.
+    """
+    if pantograph.roll_inertia is None or pantograph.spring_distance is None:
+        return np.zeros(6)
+    inertia, arm = pantograph.roll_inertia, (pantograph.spring_distance / 2) ** 2
+    augmented = np.zeros((3, 3))
+    augmented[0, 1] = time_step
+    augmented[1] = -pantograph.roll_stiffness, -pantograph.dampings[0] * arm, -1.0
+    augmented[1] *= time_step / inertia
+    whole = exponential(augmented)
+    return np.concatenate([whole[:2, :2].ravel(), whole[:2, 2]])
 
 
 def pantographs(sizes: list[int], lanes: int) -> Pantographs:

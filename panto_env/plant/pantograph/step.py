@@ -59,7 +59,9 @@ class Part(IntEnum):
     IMPLICIT_SHARE = 2  # of the wire's height in the contact law, 0 explicit, 1 implicit
     FRAME_FRICTION = 3  # maximum dry friction of the frame (N)
     LOCAL_SPRING = 4  # to the ground, about the contact wire's local height (N/m)
-    CONTACT_INPUT = 5  # n rows
+    ROLL_FREE = 5  # angle and rate of a rolling head after a step from both before it: 4 rows
+    ROLL_INPUT = 9  # both after a step, by 1 N on the head 1 m to its right; 0 for a head that does not roll
+    CONTACT_INPUT = 11  # n rows
 
 
 PART = constants(Part)
@@ -135,6 +137,14 @@ def move_freely(pantographs, collector, own, lane):
         free_state[r + 1] = other
     if parts[PART.FRAME_FRICTION] > 0.0:
         rub(frame_input, parts[PART.FRAME_FRICTION], free_state, size)
+
+
+@inlined
+def roll_freely(parts, own):
+    """Angle (rad) and rate (rad/s) of a rolling head after a step without contact force."""
+    angle, rate = own[own.size - 2], own[own.size - 1]
+    free = PART.ROLL_FREE
+    return parts[free] * angle + parts[free + 1] * rate, parts[free + 2] * angle + parts[free + 3] * rate
 
 
 @inlined

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from ....base.arrays import Array
 from ....base.errors import InputError
 from ....base.settings import Between, Settings
 from ...alignment import Alignment
@@ -218,6 +220,16 @@ class FlexibleCatenaryData(CatenaryData):
     def wires(self) -> tuple[Conductor, Conductor]:
         """Contact wire and messenger."""
         return self.contact_wire, self.messenger_wire
+
+    def lateral(self, places: Array, spans: int, conditions: Sequence[LineCondition]) -> Array:
+        """As ``CatenaryData.lateral``."""
+        from .plan import contact_wire_at, has_plan, loads_in  # need the static shape, which needs this file
+
+        if not has_plan(self, spans):
+            return super().lateral(places, spans, conditions)
+        layout = self.layout(spans)
+        wind = loads_in(self, conditions[0])
+        return contact_wire_at(layout, np.minimum(places, layout.supports[-1]), wind)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.
