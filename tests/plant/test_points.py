@@ -6,10 +6,19 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.catalog import line, load_catenary
 from panto_env.catalog.values import values_of
+from panto_env.plant.catenary.flexible import points
+from panto_env.plant.catenary.flexible.arrays import CONTACT, PAD
+from panto_env.plant.catenary.flexible.build import constants
+from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh
+from panto_env.plant.catenary.flexible.static import solve
+from panto_env.plant.catenary.flexible.wire_defects import locate
+from panto_env.plant.catenary.flexible.wires import along
 from panto_env.plant.line_condition import LineCondition
+from panto_env.plant.numerics import Runs
 
-from .test_flexible import under_a_train
+from . import test_flexible
+from .test_flexible import energy, swing, undamped, under_a_train
 from .test_wire_defects import defective
 
 NAME = "en50318-2002"
@@ -66,6 +75,27 @@ def test_points_of_an_overlap_are_on_the_wire_in_use():
     defects = {"hard_spots": [(9, 30.0, 6.0, 0.0)], "surface_bumps": [(9, 30.0, 1.0, -0.001)]}
     other = simulate(catenary=line(table, like="re250"), line_condition=defects, **run)
     np.testing.assert_array_equal(one.contact_force, other.contact_force)
+
+
+def test_mass_and_spring_of_a_point_take_part_in_the_line_s_energy(monkeypatch):
+    """Kept over 10 s of free motion with what is theirs, by velocity and height of the node they hang on."""
+    data = undamped(with_points(SPOT))
+    runs = points.with_points(data, Runs(), 10)
+    own = locate(data.layout(10), runs.conditions[0])
+
+    def with_own(line, spans, numerics):
+        return constants(line, solve(line), spans, numerics, resolution(line, numerics, Runs()), own)
+
+    def with_point(line, wire, data, step):
+        old, move = (along(each[0])[CONTACT] for each in (wire.displacement, wire.increment))
+        node = PAD + round((2 * 60.0 + 27.0) / line.spacing)
+        moving = 8.0 * (move[node] / step) ** 2 + 3000.0 * (old[node] + move[node] / 2) ** 2
+        return energy(line, wire, data, step) + moving / 2
+
+    monkeypatch.setattr(test_flexible, "constants_of", with_own)
+    kept, missing = (swing(data, 10, 150.0, 1e-3, False, each)[0] for each in (with_point, energy))
+    assert kept < 1e-6
+    assert missing > 1e-2
 
 
 @pytest.mark.parametrize("mass", [0.0, 8.0])
