@@ -41,7 +41,7 @@ FAULTY = HIGH_SPEED | {"faults": ["readings-silent"], "distance": 1500.0}
 FROZEN = HIGH_SPEED | {"faults": ["force-frozen"], "distance": 1500.0}
 BRAKING = HIGH_SPEED | {"speed_profile": "place:0=280,600=280,1100=230,1400=230", "distance": 1700.0}
 TABLED = [[100.0, 12.0], [240.0, 60.0], [350.0, 80.0]]  # of the uplift, by speed
-PRESSED = BRAKING | {"pantograph": pantograph({"uplift_over_speed": TABLED}, like="dsa380")}
+PRESSED = HIGH_SPEED | {"pantograph": pantograph({"uplift_over_speed": TABLED}, like="dsa380")}
 OF_A_PASS = ("distance", "speed_kmh", "speed_profile", "line_condition", "faults")
 CASES = {
     "any-pantograph": ("agent-any-pantograph", HIGH_SPEED),
