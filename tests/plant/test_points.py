@@ -1,5 +1,8 @@
 """Points of a line: the same as hard spots and bumps of a condition, and as finite elements have them."""
 
+import re
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -18,6 +21,7 @@ from panto_env.plant.line_condition import LineCondition
 from panto_env.plant.numerics import Runs
 
 from . import test_flexible
+from ..documents import ROOT
 from .test_flexible import energy, swing, undamped, under_a_train
 from .test_wire_defects import defective
 
@@ -159,3 +163,12 @@ def test_damping_by_its_ratio():
 def test_damping_given_twice_or_by_half_is_refused(message, given):
     with pytest.raises(InputError, match=message):
         line({"damping": given}, like="re250")
+
+
+def test_the_file_that_the_page_shows_is_a_line():
+    page = (ROOT / "docs" / "own-line.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"### Points and tunnels\n\n```toml\n(.*?)```", page, re.DOTALL)
+    own = line(tomllib.loads(text), like="re250")
+    assert [point.name for point in own.points] == ["section insulator", "mid-point anchor"]
+    assert own.tunnels[0].factor == 1.4
+    assert own.has_points
