@@ -20,8 +20,8 @@ from panto_env.plant.catenary.flexible.wires import along
 from panto_env.plant.line_condition import LineCondition
 from panto_env.plant.numerics import Runs
 
-from . import test_flexible
 from ..documents import ROOT
+from . import test_flexible
 from .test_flexible import energy, swing, undamped, under_a_train
 from .test_wire_defects import defective
 
