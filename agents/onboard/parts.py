@@ -87,7 +87,9 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
     front, actions = len(layout.front), context.actions
     places, spans = len(layout.memory), layout.memory_spans if layout.memory else 0
     steps = episode.memory.kept.shape[1] if places else 1
-    aerodynamic = context.pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
+    pantograph, speed = context.pantograph, context.speed
+    aerodynamic = pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
+    uplift = np.array(pantograph.uplift_table or ((0.0, 0.0),))
     force = next(each for each in layout.entries if each.name in FORCES)
     sources = [_source(each, front, actions) for each in layout.entries]
     constants: Table = {
@@ -110,8 +112,11 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "memory_places": places,
         "memory_steps": steps,
         "steps_ahead": np.array(layout.memory) / context.control_interval,
-        "static_force": context.nominal_force - aerodynamic * context.speed**2,
+        "static_force": context.nominal_force - aerodynamic * speed**2 - pantograph.tabled_uplift(speed),
         "aerodynamic": aerodynamic,
+        "uplift_points": len(pantograph.uplift_table),
+        "uplift_speed": uplift[:, 0] / METRES_PER_SECOND,
+        "uplift": uplift[:, 1].copy(),
         "force_limit": context.force_limit,
         "washout_share": float(episode.washout_share),
         "force_entry": layout.entries.index(force),

@@ -166,8 +166,15 @@ def entry(c: Constants, s: State, k: int) -> Number:
 
 
 def nominal_force(c: Constants, s: State) -> Number:
-    """Static force and aerodynamic uplift in still air at the speed read (N)."""
-    return c.static_force + c.aerodynamic * s.input[SPEED] * s.input[SPEED]
+    """Static force and aerodynamic uplift in still air at the speed read (N); beyond a table its last one."""
+    force = c.static_force + c.aerodynamic * s.input[SPEED] * s.input[SPEED]
+    if c.uplift_points > 0:
+        force = force + c.uplift[0]
+        for k in range(c.uplift_points - 1):
+            wide = c.uplift_speed[k + 1] - c.uplift_speed[k]
+            into = min(max(s.input[SPEED] - c.uplift_speed[k], 0.0), wide)
+            force = force + into * (c.uplift[k + 1] - c.uplift[k]) / wide
+    return force
 
 
 def shown_force(c: Constants, s: State) -> Number:

@@ -100,7 +100,8 @@ def passive_at_mean(
     given = {"catenary": _LINE, "pantograph": _PANTOGRAPH} | settings | {"mean_force": mean_force}
     checked = _on_its_line(given, np.random.default_rng(seed))
     met: deque[Trajectory] = deque(maxlen=1)
-    if all(each == each.in_still_air for each in checked.line_condition):  # it is trimmed in still air
+    still = all(each == each.in_still_air for each in checked.line_condition)
+    if still and not checked.line.tunnels:  # it is trimmed in still air in the open
         trim_of_pass(checked, seed, trimmed_over, partial(passive_mean, keep=met.append))
     if met:
         return met[0]

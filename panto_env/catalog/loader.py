@@ -101,7 +101,7 @@ def _changed(
     """Table of a new entry and the path that names it."""
     nested: dict[str, Any] = {}
     for key, value in table.items():
-        nested = _merged(nested, _nested(str(key), value))
+        nested = _merged(nested, _nested(str(key), value), in_turn=())
     like, base = nested.pop("like", like), dict[str, Any]()
     if isinstance(like, Settings):
         base = like.model_dump(mode="json", exclude_none=True, exclude_unset=True, exclude={"sources"})
@@ -125,14 +125,19 @@ IN_TURN = (
     ({"stiffness"}, {"axial_stiffness"}),
     ({"stiffness"}, {"length", "clamp_mass"}),  # of a steady arm
     ({"sequence"}, {"spans"}),
+    ({"uplift_over_speed"}, {"aerodynamic_coefficient", "aerodynamic_linear"}),
+    ({"ratio", "frequencies"}, {"alpha", "beta"}),
 )
 """Keys that exclude each other: where one is given, those of the other kind are no longer what they were."""
 
 
-def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with the values of another one in the place of its own, table by table."""
+def _merged(base: Mapping[str, Any], changes: Mapping[str, Any], in_turn: Any = IN_TURN) -> dict[str, Any]:
+    """A table with the values of another one in the place of its own, table by table.
+
+    in_turn: keys that exclude each other, as ``IN_TURN``; none within one table, which may not have both.
+    """
     found = dict(base)
-    for some, others in IN_TURN:
+    for some, others in in_turn:
         for given, dropped in ((some, others), (others, some)):
             if given & changes.keys() and not dropped & changes.keys():
                 found = {key: value for key, value in found.items() if key not in dropped}
@@ -141,7 +146,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
             found[key] = _with_elements(key, found[key], value)
             continue
         tables = isinstance(value, Mapping) and isinstance(found.get(key), Mapping) and "value" not in value
-        found[key] = _merged(found[key], value) if tables else value
+        found[key] = _merged(found[key], value, in_turn) if tables else value
     return found
 
 

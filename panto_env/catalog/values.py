@@ -74,7 +74,7 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
                 yield f"{prefix}{key}.{name}", item, field.description or "", own
         elif isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{key}.", own)
-        elif key in ("span_types", "sequence", "overlaps"):
+        elif key in ("span_types", "sequence", "overlaps", "points", "tunnels"):
             items = value.items() if isinstance(value, Mapping) else enumerate(value, start=1)
             meanings = chain([field.description or ""], repeat(""))
             for (name, item), meaning in zip(items, meanings, strict=False):
@@ -167,7 +167,7 @@ def _numbers(entry: Any) -> Iterator[_Number]:
             yield _Number(key, key + of_span, unit, given)
         elif key == "droppers.sag":  # those near a support may be as small as can be
             yield _Number(key, f"the largest of {key}{of_span}", unit, max(given, key=abs))
-        elif isinstance(given, tuple) and key != "force_over_height":  # of pairs
+        elif isinstance(given, tuple) and key not in ("force_over_height", "uplift_over_speed"):  # of pairs
             for number, value in enumerate(given, start=1):
                 ground = " to the ground" if key in CHAINS and number == len(given) else ""
                 yield _Number(key + ground, f"number {number} of {key}{of_span}", unit, value)

@@ -141,7 +141,7 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
     """Lift of the pantograph (N): as given, or nominal."""
     if lift is not None:
         return lift
-    if speed is None and pantograph.aerodynamic_coefficient > 0:
+    if speed is None and pantograph.lifted_by_air:
         raise InputError(
             f"Pantograph '{pantograph.name}' has an aerodynamic uplift; give the speed of the train, "
             "--speed, or the whole lift, --lift."

@@ -227,15 +227,18 @@ def trim_of_pass(
     """Trim of one pass on its own line: without a policy its means over the spans are the required ones.
 
     spans: by default those after the start, or the whole run where it is too short to have any: which spans
-    are evaluated later does not change the run. It is trimmed in still air, as a pantograph is set: wind is
-    not trimmed away. None where no mean is required, or the speed is yet to be drawn. Raises InputError if it
-    cannot be met.
+    are evaluated later does not change the run. It is trimmed in still air in the open, as a pantograph is
+    set: wind and tunnels are not trimmed away. None where no mean is required, or the speed is yet to be
+    drawn. Raises InputError if it cannot be met.
     """
     still = tuple(condition.in_still_air for condition in settings.line_condition)
     settings = settings.model_copy(update={"line_condition": still})
     low, high = settings.speeds
     if low != high or not trimmed(settings, low):
         return None
+    if settings.line.tunnels:
+        in_the_open = settings.line.model_copy(update={"tunnels": ()})
+        settings = settings.model_copy(update={"catenary": in_the_open})
     inputs = {
         # As any: all values of a line, not only those that every kind has.
         "settings": settings.model_dump(mode="json", exclude=NO_MATTER_TO_MEAN, serialize_as_any=True),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array, to_kmh
+from ..base.arrays import Array
 from ..base.errors import AccuracyWarning, InputError, beside
 from ..base.record_columns import LENGTHS, TIME, Column, read_series, write_series
 from ..metrics.trajectory import Trajectory
@@ -63,12 +63,18 @@ def on_frame(run: Trajectory) -> Array:
 
 
 def warn_of_wind(run: Trajectory) -> None:
-    """Warn where a run was in wind, whose lift an estimator does not know."""
-    wind = run.identity.wind
+    """Warn where a run was in wind or in tunnels, whose lift an estimator does not know."""
+    wind, known = run.identity.wind, run.designed.known_pantograph
+    if run.designed.tunnels and known is not None and known.lifted_by_air:
+        warnings.warn(
+            "A run is on a line with tunnels, of which no sensor knows: what they change of the lift is "
+            "missing in the force that is estimated from the motion there.",
+            AccuracyWarning,
+            stacklevel=1,
+        )
     if not wind:
         return
-    coefficient = run.designed.aerodynamic_coefficient or 0.0
-    more = coefficient * (to_kmh(run.speed + wind) ** 2 - run.speed_kmh**2)
+    more = known.uplift_change(run.speed + wind, run.speed) if known else 0.0
     warnings.warn(
         f"A run was in wind of {wind:g} m/s, which no sensor sees: its lift, {more:+.0f} N in the mean, "
         "is missing in the force that is estimated from the motion.",

@@ -284,6 +284,11 @@ def _spans(
         return force
 
     before = spans_before(pieces, line, as_designed)
+    if before and (line.points or line.tunnels):
+        raise InputError(
+            f"Line '{line.name}' has points or tunnels, and its equal spans would be computed from span "
+            f"{before + 1} on alone; give the spans as a sequence, which is computed as a whole."
+        )
     distance = high - before * line.span_length
     spans = _spans_of(line, distance)
     if spans > MOST_SPANS:

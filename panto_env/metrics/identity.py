@@ -78,9 +78,17 @@ class Design:
         return tuple(map(PantographData.model_validate, self.tables.get("pantographs", ())))
 
     @property
-    def aerodynamic_coefficient(self) -> float | None:
-        """Aerodynamic uplift over the squared speed (N/(km/h)^2); None where not known."""
-        return self.tables.get("pantograph", {}).get("aerodynamic_coefficient")  # type: ignore[no-any-return]
+    def known_pantograph(self) -> PantographData | None:
+        """The pantograph whose record this is; None where it is missing or not valid."""
+        try:
+            return self.pantograph
+        except (KeyError, ValueError):
+            return None
+
+    @property
+    def tunnels(self) -> bool:
+        """Whether the line has tunnels."""
+        return bool(self.tables.get("catenary", {}).get("tunnels"))
 
     @property
     def line_ends(self) -> bool:

@@ -62,7 +62,6 @@ class Facts(Settings):
     line_condition: tuple[dict[str, Any], ...] | None = None
     catenary: dict[str, Any]  # as designed, as what follows
     pantograph: dict[str, Any]
-    aerodynamic_coefficient: Annotated[float, Between(-1, 1)] = 0.0
 
 
 def check_stored(facts: Mapping[str, Any], columns: Mapping[str, Array]) -> None:

@@ -193,10 +193,12 @@ class Trajectory:
     @property
     def static_force(self) -> float | None:
         """Static force as it was set (N); nan where one force is for all speeds, None where not known."""
-        coefficient = self.designed.aerodynamic_coefficient
-        if coefficient == 0 and self.speed_kmh > SLOW:
+        known = self.designed.known_pantograph
+        if known is None:
+            return None
+        if not known.lifted_by_air and self.speed_kmh > SLOW:
             return math.nan
-        return None if coefficient is None else self.nominal_force - coefficient * self.speed_kmh**2
+        return float(self.nominal_force - known.aerodynamic_uplift(self.speed))
 
     def mechanical_power(self, spans: SpanChoice = None) -> float:
         """Mechanical power (W) of the actuators, mean of its magnitude over the spans.
@@ -231,9 +233,9 @@ class Trajectory:
     @property
     def lift(self) -> Array:
         """Static force and aerodynamic uplift in each step, (n,) (N), in still air: wind adds to it."""
-        coefficient = self.designed.aerodynamic_coefficient or 0.0
-        more = to_kmh(self.speeds) ** 2 - self.speed_kmh**2 if self.identity.drifts else 0.0
-        return np.asarray(np.full(len(self.time), self.nominal_force) + coefficient * more)
+        known = self.designed.known_pantograph
+        more = known.uplift_change(self.speeds, self.speed) if known and self.identity.drifts else 0.0
+        return np.asarray(np.full(len(self.time), self.nominal_force) + more)
 
     @property
     def lift_by_height(self) -> Array | float:

@@ -27,9 +27,14 @@ Offset = Annotated[float, Between(0, 200, "m")]
 Mass = Annotated[float, Between(0, 100, "kg")]
 Stiffness = Annotated[float, Between(0, 1e5, "N/m")]
 Length = Annotated[float, Between(2, 2000, "m")]
+BumpLength = Annotated[float, Between(0.2, 100, "m")]
 Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a third (recalled)
 # A little may also have been gained: by friction of the pulleys, or weights too heavy.
 Lost = Annotated[float, Between(-0.1, 0.5)]
+
+
+ON_WIRE = ("hard_spots", "worn_stretches", "surface_bumps")
+"""Lists of what is on the contact wire itself: each a span, a distance from its first support, and more."""
 
 
 class LineCondition(Settings):
@@ -79,6 +84,11 @@ class LineCondition(Settings):
         description="stretches of worn contact wire, lighter and with a higher running surface: (span, "
         "distance from its first support (m), length (m), share of the section that is gone)",
     )
+    surface_bumps: tuple[tuple[Number, Offset, BumpLength, Error], ...] = Field(
+        (),
+        description="where the contact wire's running surface is higher or lower, as at a splice: (span, "
+        "distance of the middle from its first support (m), length, half of it ramps (m), height (m))",
+    )
     lost_contact_tension: Lost = Field(
         0.0,
         description="share of the contact wire's tension that is lost, along the whole line; gained, where "
@@ -126,7 +136,7 @@ class LineCondition(Settings):
         "Panofsky's spectrum",
     )
 
-    @field_validator("broken_droppers", "miscut_droppers", "raised_supports", "hard_spots", "worn_stretches")
+    @field_validator("broken_droppers", "miscut_droppers", "raised_supports", *ON_WIRE)
     @classmethod
     def _each_once(cls, value: tuple[Any, ...], info: Any) -> tuple[Any, ...]:
         places = [row[:1] if info.field_name == "raised_supports" else row[:2] for row in value]
@@ -176,7 +186,8 @@ class LineCondition(Settings):
     def shortest_wave(self) -> float:
         """Shortest wavelength of the wire's height (m), infinite where it is even."""
         irregularity = min(length for length, _ in IRREGULARITY) if self.irregularity > 0 else math.inf
-        return min(irregularity, self.wear_wavelength if self.wear_depth > 0 else math.inf)
+        bump = min((length for _, _, length, _ in self.surface_bumps), default=math.inf)
+        return min(irregularity, bump, self.wear_wavelength if self.wear_depth > 0 else math.inf)
 
     @property
     def defective(self) -> bool:
@@ -202,6 +213,7 @@ class LineCondition(Settings):
         return (
             self.hard_spots,
             self.worn_stretches,
+            self.surface_bumps,
             self.lost_contact_tension,
             self.lost_messenger_tension,
             self.ice,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..backend import aligned_zeros, bind, copy_whole, pack
-from ..base.arrays import Array, Index, Lanes, sparse_zeros
+from ..base.arrays import Array, Index, Lanes, sparse_zeros, to_kmh
 from ..base.errors import InputError, beside
 from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
 from .catenary.flexible.scattered_build import slots_of_links
@@ -63,7 +63,7 @@ class Plant:
         self.runs = runs
         winds = [condition.weather for condition in runs.conditions if condition.wind]
         for own in train.collectors:
-            check_wind(winds, runs.speeds[0], own.pantograph)
+            check_wind(winds, runs.speeds, own.pantograph)
             own.pantograph.check_heights(catenary.name, catenary.contact_heights)
         self.model: CatenaryModel = CATENARIES[catenary.kind].model(
             catenary,
@@ -95,15 +95,30 @@ class Plant:
             places = np.arange(0.0, self.alignment.length + LATERAL_EVERY, LATERAL_EVERY)
             lateral = catenary.lateral(places, self.spans, runs.conditions)
         rolling = 2 if lateral.size else 0
+        by_speed = [own.pantograph.uplift_table for own in train.collectors]
+        speeds = np.array(sorted({0.0, *(speed for table in by_speed for speed, _ in table)})) / to_kmh(1.0)
         self.run = Run(
             table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes) + rolling)),
             distance=per_collector((own.distance for own in train.collectors), float, count),
             driven=per_collector((own.driven for own in train.collectors), int, count),
             aerodynamic=per_collector(
-                (own.pantograph.aerodynamic_uplift(1 / self.time_step) for own in train.collectors),
+                (
+                    own.pantograph.aerodynamic_coefficient * to_kmh(1 / self.time_step) ** 2
+                    for own in train.collectors
+                ),
                 float,
                 count,
             ),
+            over_stride=np.array(
+                [
+                    speeds * self.time_step,
+                    *(
+                        np.zeros(len(speeds)) + own.pantograph.tabled_uplift(speeds)
+                        for own in train.collectors
+                    ),
+                ]
+            ),
+            tunnels=catenary.tunnel_rows,
             waves=aligned_zeros((lanes, 3 * waves)),
             drift=aligned_zeros((lanes, drifting)),
             wind=aligned_zeros((lanes, GUST_ROWS if winds else 0)),
@@ -231,6 +246,15 @@ class Plant:
         lifts = nominal_forces + run.aerodynamic[collector] * (now**2 - strides**2)
         wind = winds_at(run.wind[lanes], -own.distance, 0.0) if run.wind.shape[1] else 0.0
         by_wind = run.aerodynamic[collector] * wind * (2 * now + wind)
+        if run.over_stride.shape[1] > 1:
+            mean, present, in_wind = (
+                own.pantograph.tabled_uplift(each / self.time_step) for each in (strides, now, now + wind)
+            )
+            lifts, by_wind = lifts + (present - mean), by_wind + (in_wind - present)
+        if run.tunnels.shape[1]:
+            blowing, more = (np.interp(-own.distance, run.tunnels[0], row) for row in run.tunnels[1:])
+            still = own.pantograph.aerodynamic_uplift(now / self.time_step)
+            by_wind = by_wind * blowing + still * more
         begin = run.levels[:1].sum()  # height there; 0 on a level line
         by_height = np.array([each.lift_over(begin) for each in pantographs or [own.pantograph]])
         aside = float(run.lateral[:1].sum())  # 0 where no head rolls

@@ -89,11 +89,11 @@ class Row(IntEnum):
     IRREGULARITY = 13  # of the contact wire's height, at mid-step (m)
     WIRE_BEFORE = 14  # height of the wire where it is touched, at the step's start (m)
     WIRE_MIDDLE = 15  # its height at mid-step, without the forces of this step (m)
-    LIFT = 16  # static force and aerodynamic uplift in still air on the lowest mass (N), at this step's speed
+    LIFT = 16  # static force and uplift in still, open air on the lowest mass (N), at this step's speed
     SECOND_BEFORE = 17  # as WIRE_BEFORE and WIRE_MIDDLE, of the second wire where there is one (m)
     SECOND_MIDDLE = 18
     SECOND_FORCE = 19  # contact force on the second wire, part of CONTACT_FORCE (N)
-    WIND = 20  # what wind adds to LIFT (N), which no sensor sees
+    WIND = 20  # what wind and tunnels add to LIFT (N), which no sensor sees
     FIRST_FORCE = 21  # contact force on the first wire, the rest of CONTACT_FORCE (N)
     BY_HEIGHT = 22  # what the contact wire's local height adds to LIFT (N), which a train knows
     # An even number, for processors compute states in pairs.
@@ -128,6 +128,8 @@ class Run(NamedTuple):
     distance: PerCollector  # of each collector behind the first (m)
     driven: PerCollector  # 1 for each collector with an actuator, 0 without
     aerodynamic: PerCollector  # uplift of each collector per squared distance covered in a step (N/m^2)
+    over_stride: Array  # (1 + collectors, speeds): m per step, and further uplift there (N); one speed: none
+    tunnels: Array  # (3, places): m, share of the wind that blows there, and what is added to a factor of 1
     waves: Array  # (lanes, 3 waves): each as amplitude (m), turns per metre (1/m) and phase in turns
     drift: Array  # (lanes, drifting): of the speed; no rows where it is constant
     wind: Array  # (lanes, GUST_ROWS): mean and gusts; no rows where none blows

@@ -50,7 +50,7 @@ def approach(line, wire, pantographs, actuators, run, contact, lane):
     own = run.table[contact, lane]
     if run.drift.shape[1] > 0:
         own[ROW.LIFT] = lift(run, contact, lane, own[ROW.STEP] + 0.5)
-    if run.wind.shape[1] > 0:
+    if run.wind.shape[1] > 0 or run.tunnels.shape[1] > 0:
         own[ROW.WIND] = lift_by_wind(run, contact, lane, own[ROW.STEP] + 0.5)
     x = place_on_line(run, contact, lane, own[ROW.STEP] + 0.5)
     if run.levels.size > 0:

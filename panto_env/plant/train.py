@@ -120,27 +120,55 @@ def lift(run, collector, lane, steps):
     """Static force and still air's uplift on a lane's collector (N), at its speed after a number of steps."""
     own = run.table[collector, lane]
     mean, now = own[ROW.STRIDE], stride(run, collector, lane, steps)
-    return own[ROW.NOMINAL_FORCE] + run.aerodynamic[collector] * (now * now - mean * mean)
+    force = own[ROW.NOMINAL_FORCE] + run.aerodynamic[collector] * (now * now - mean * mean)
+    if run.over_stride.shape[1] > 1:
+        force += tabled_uplift(run, collector, now) - tabled_uplift(run, collector, mean)
+    return force
+
+
+@inlined
+def tabled_uplift(run, collector, stride):
+    """That part of a collector's uplift (N) that is given as a table over the air's way in a step (m)."""
+    return added_linear(0.0, run.over_stride[0], run.over_stride[1 + collector], stride)
 
 
 @inlined
 def lift_by_wind(run, collector, lane, steps):
-    """Uplift (N) of a lane's collector that wind adds to that of still air; a tail wind takes some away."""
+    """Uplift (N) of a lane's collector that wind and tunnels add to that of still air in the open.
+
+    A tail wind takes some away. No wind blows in a tunnel.
+    """
     x, now = position(run, collector, lane, steps), stride(run, collector, lane, steps)
-    wind = wind_at(run.wind[lane], x, steps)
-    return run.aerodynamic[collector] * (wind * (now + now + wind))
+    more = 0.0
+    if run.wind.shape[1] > 0:
+        wind = wind_at(run.wind[lane], x, steps)
+        more = run.aerodynamic[collector] * (wind * (now + now + wind))
+        if run.over_stride.shape[1] > 1:
+            more += tabled_uplift(run, collector, now + wind) - tabled_uplift(run, collector, now)
+    if run.tunnels.shape[1] > 0:
+        still = run.aerodynamic[collector] * (now * now)
+        if run.over_stride.shape[1] > 1:
+            still += tabled_uplift(run, collector, now)
+        more *= added_linear(0.0, run.tunnels[0], run.tunnels[1], x)
+        more += still * added_linear(0.0, run.tunnels[0], run.tunnels[2], x)
+    return more
 
 
 @inlined
 def lift_by_height(run, collector, spring, x):
     """Lift (N) that the line's height at x (m) adds, by a table and a spring to the ground about it (N/m)."""
     height = between_supports(run.alignment, run.levels, x)
-    heights, forces = run.over_height[0], run.over_height[1 + collector]
-    force = spring * height + forces[0]
-    for k in range(heights.size - 1):
-        wide = heights[k + 1] - heights[k]
-        force += min(max(height - heights[k], 0.0), wide) * (forces[k + 1] - forces[k]) / wide
-    return force
+    return added_linear(spring * height, run.over_height[0], run.over_height[1 + collector], height)
+
+
+@inlined
+def added_linear(start, places, values, x):
+    """A number, and to it the value at x of a function that is linear between places and even beyond."""
+    total = start + values[0]
+    for k in range(places.size - 1):
+        wide = places[k + 1] - places[k]
+        total += min(max(x - places[k], 0.0), wide) * (values[k + 1] - values[k]) / wide
+    return total
 
 
 @inlined

@@ -48,6 +48,11 @@ class Wind(NamedTuple):
         """Whether it is gusty, and so another one for every seed."""
         return self.mean != 0 and self.turbulence > 0
 
+    @property
+    def strongest(self) -> float:
+        """Head wind that no gust exceeds: the mean, and all cosines together (m/s)."""
+        return self.mean + self.turbulence * abs(self.mean) * float(np.sum(np.sqrt(2 * np.array(_shares()))))
+
 
 def resolved(shortest: float = SHORTEST_GUST, longest: float = LONGEST_GUST) -> float:
     """Share of the variance of Davenport's spectrum in a band of wavelengths (m).
@@ -59,14 +64,23 @@ def resolved(shortest: float = SHORTEST_GUST, longest: float = LONGEST_GUST) -> 
     return float(longer - shorter)
 
 
+def _limits() -> Array:
+    """Wavelengths between which the bands of the gusts lie, (BANDS + 1,) (m)."""
+    return np.geomspace(LONGEST_GUST, SHORTEST_GUST, BANDS + 1)
+
+
+def _shares() -> list[float]:
+    """Share of each band in the variance of the spectrum."""
+    return [resolved(short, long) for long, short in pairwise(_limits())]
+
+
 def draw_wind(wind: Wind, time_step: float, random: np.random.Generator | None = None) -> Array:
     """A lane's wind, (GUST_ROWS,), with gusts where there is a generator to draw them from; time_step: s."""
     rows = np.zeros(GUST_ROWS)
     rows[0] = wind.mean * time_step
     if random is None or not wind.gusts:
         return rows
-    limits = np.geomspace(LONGEST_GUST, SHORTEST_GUST, BANDS + 1)
-    shares = [resolved(short, long) for long, short in pairwise(limits)]
+    limits, shares = _limits(), _shares()
     within, phase = random.uniform(0, 1, (2, BANDS))
     lengths = limits[:-1] * (limits[1:] / limits[:-1]) ** within
     amplitudes = wind.turbulence * abs(wind.mean) * np.sqrt(2 * np.array(shares))
@@ -82,13 +96,17 @@ def winds_at(rows: Array, x: float | Array, steps: float | Array) -> Array:
     return np.asarray(mean[..., 0] + np.sum(waves[..., 0] * np.cos(2 * np.pi * turns), axis=-1))
 
 
-def check_wind(winds: Sequence[Wind], slowest: float, pantograph: PantographData) -> None:
-    """Raise InputError where a wind does not act on the pantograph, or overtakes a train at the lowest speed
-    (m/s).
+def check_wind(winds: Sequence[Wind], speeds: tuple[float, float], pantograph: PantographData) -> None:
+    """Raise InputError where a wind does not act on the pantograph or overtakes the slowest train, and where
+    the pantograph's uplift is not known at the speed of the air.
+
+    speeds: lowest and highest of the trains (m/s).
     """
+    slowest, fastest = speeds
+    pantograph.aerodynamic_uplift(max([fastest, *(fastest + wind.strongest for wind in winds)]))
     if not winds:
         return
-    if not pantograph.aerodynamic_coefficient:
+    if not pantograph.lifted_by_air:
         raise InputError(
             f"Wind acts by a pantograph's aerodynamic_coefficient, and that of '{pantograph.name}' is 0; "
             "leave out wind, or take another pantograph, such as 'dsa380' or one with a coefficient of yours."
@@ -97,7 +115,7 @@ def check_wind(winds: Sequence[Wind], slowest: float, pantograph: PantographData
     if lowest <= -slowest:
         raise InputError(
             f"A tail wind of {-lowest:g} m/s overtakes a train at {to_kmh(slowest):.4g} km/h, and the "
-            "aerodynamic_coefficient is that of air from ahead; take less wind, or a faster train."
+            "aerodynamic uplift is that of air from ahead; take less wind, or a faster train."
         )
 
 

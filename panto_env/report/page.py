@@ -44,10 +44,11 @@ def page_template(package: str, **filters: Callable[..., Any]) -> Template:
 
 
 LEFT_OUT = (
-    "section insulators, crossings and neutral sections",
+    "crossings, and of section insulators and neutral sections all but mass, spring and height (points)",
     "two contact wires whose droppers alternate: they are one equivalent wire",
     "sideways waves: stagger, curves and wind act through steady arms whose length is given, at rest",
-    "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
+    "wind on stitch wires, droppers and arms, waves of pressure in tunnels; ice and temperature that differ "
+    "along the line",
     "rigid rails and third rails",
     "pitch of the collector head and its two strips: it is touched at one point; roll where none is given",
     "motion of the vehicle and of the track",

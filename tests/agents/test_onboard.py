@@ -16,6 +16,7 @@ from panto_agents.policy import Prepared
 from panto_baselines.policies.repetitive import Repetitive
 from panto_env import InputError
 from panto_env.analysis.simulation import ready_pass
+from panto_env.catalog import pantograph
 from panto_env.cli import make_app
 
 from .onboard import AS_BUILT, COMPILERS, GCC, STRICT, Compiled, fed, needs_gcc, passed
@@ -39,6 +40,8 @@ SHINKANSEN = HIGH_SPEED | {"catenary": "shinkansen-simple", "pantograph": "ident
 FAULTY = HIGH_SPEED | {"faults": ["readings-silent"], "distance": 1500.0}
 FROZEN = HIGH_SPEED | {"faults": ["force-frozen"], "distance": 1500.0}
 BRAKING = HIGH_SPEED | {"speed_profile": "place:0=280,600=280,1100=230,1400=230", "distance": 1700.0}
+TABLED = [[100.0, 12.0], [240.0, 60.0], [350.0, 80.0]]  # of the uplift, by speed
+PRESSED = HIGH_SPEED | {"pantograph": pantograph({"uplift_over_speed": TABLED}, like="dsa380")}
 OF_A_PASS = ("distance", "speed_kmh", "speed_profile", "line_condition", "faults")
 CASES = {
     "any-pantograph": ("agent-any-pantograph", HIGH_SPEED),
@@ -54,6 +57,7 @@ CASES = {
     "guarded-pd": ("guarded:pd", FROZEN),
     "guarded-harm": ("guarded:p:gain=2.5", HIGH_SPEED | {"distance": 2500.0}),
     "pd": ("pd", HIGH_SPEED),
+    "pd-uplift-by-table": ("pd", PRESSED),
     "forward": ("fb+ff:dead_zone=10,gain=0.3", HIGH_SPEED),
     "centred": ("pd", HIGH_SPEED | {"observation": "centred"}),
     "repetitive": ("repetitive", HIGH_SPEED),

@@ -29,7 +29,8 @@ from .test_line_check import of_unlike_spans
 def test_the_names_of_an_entry_are_all_its_numbers():
     assert parameter_names(load_pantograph("three-mass"), "p") == [
         *(f"p.{key}.{k}" for key in ("masses", "stiffnesses", "dampings") for k in (1, 2, 3)),
-        *("p.static_force", "p.aerodynamic_coefficient", "p.contact_stiffness", "p.contact_damping"),
+        *("p.static_force", "p.aerodynamic_coefficient", "p.aerodynamic_linear"),
+        *("p.contact_stiffness", "p.contact_damping"),
         "p.frame_friction",
     ]
     names = parameter_names(load_catenary("re250"), "c")

@@ -105,7 +105,7 @@ def test_what_gives_way_at_rest_is_refused(name, load, key, value, sentence):
 
 def test_an_uplift_per_m_s_instead_of_km_h_is_refused():
     entry = load_pantograph("dsa380")
-    with pytest.raises(ValueError, match=r"must be a number from 0 to 0\.01"):
+    with pytest.raises(ValueError, match=r"must be a number from -0\.01 to 0\.01"):
         type(entry).model_validate(table_of(entry, "aerodynamic_coefficient", 0.00097 * 3.6**2))
 
 

@@ -30,7 +30,14 @@ EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
 SPOT = {"hard_spots": [(3, 27.0, 8.0, 3000.0)]}
 WORN = {"worn_stretches": [(3, 10.5, 19.5, 0.2)]}
 LOST = {"lost_contact_tension": 0.1, "lost_messenger_tension": 0.15}
-CONDITIONS = {"hard spot": SPOT, "worn stretch": WORN, "lost tension": LOST, "all": SPOT | WORN | LOST}
+BUMP = {"surface_bumps": [(3, 36.0, 4.0, 0.005)]}
+CONDITIONS = {
+    "hard spot": SPOT,
+    "worn stretch": WORN,
+    "bump": BUMP,
+    "lost tension": LOST,
+    "all": SPOT | WORN | BUMP | LOST,
+}
 
 
 def without(system, data, condition, element):
@@ -60,11 +67,16 @@ def without(system, data, condition, element):
 
 
 def surface(nodes, data, condition):
-    """How much higher the running surface of worn wire is, and its slope, (nodes, 2)."""
-    rise = np.zeros((len(nodes), 2))
+    """How much higher the running surface of worn wire or of a bump is, and its slope, (nodes, 2)."""
+    rise, profiles = np.zeros((len(nodes), 2)), []
     for span, offset, length, share in condition.worn_stretches:
         begin, depth = (span - 1) * data.span_length + offset, worn_depth(data.contact_wire, share)
-        profile = [begin, begin + RAMP, begin + length - RAMP, begin + length], [0, depth, depth, 0]
+        profiles.append(([begin, begin + RAMP, begin + length - RAMP, begin + length], [0, depth, depth, 0]))
+    for span, offset, length, height in condition.surface_bumps:
+        middle, quarter = (span - 1) * data.span_length + offset, length / 4
+        knots = [middle - 2 * quarter, middle - quarter, middle + quarter, middle + 2 * quarter]
+        profiles.append((knots, [0, height, height, 0]))
+    for profile in profiles:
         rise[:, 0] += np.interp(nodes, *profile)
         rise[:, 1] += (np.interp(nodes + 1e-6, *profile) - np.interp(nodes - 1e-6, *profile)) / 2e-6
     return rise
@@ -165,11 +177,13 @@ def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
     assert (ours - fine).std() < 0.08 * (intact - fine).std()
 
 
-@pytest.mark.parametrize("defects", [SPOT, WORN, LOST], ids=["hard spot", "worn stretch", "lost tension"])
+@pytest.mark.parametrize(
+    "defects", [SPOT, WORN, BUMP, LOST], ids=["hard spot", "worn stretch", "bump", "lost tension"]
+)
 def test_a_defect_of_no_size_changes_nothing(defects):
     """But rounding: what carries a line out of its design is there, with zeros in it."""
     none = {
-        key: [(*row[:-1], 0.0) if key == "worn_stretches" else (*row[:-2], 0.0, 0.0) for row in value]
+        key: [(*row[:-2], 0.0, 0.0) if key == "hard_spots" else (*row[:-1], 0.0) for row in value]
         if isinstance(value, list)
         else 0.0
         for key, value in defects.items()

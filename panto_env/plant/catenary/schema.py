@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, TypeAlias
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...base.arrays import Array
 from ...base.errors import InputError, shown
@@ -36,6 +37,25 @@ def check_span_count(spans: Any) -> int:
     return spans
 
 
+PORTAL = 20.0
+"""Length (m) over which a tunnel's factor comes in at a portal, half of it outside (own choice): a step would
+lift all of a frame at once, and air is already displaced before the portal."""
+
+
+class Tunnel(Settings):
+    """A stretch of the line where the train's own air lifts its pantographs by another force, and no wind
+    blows.
+    """
+
+    begin: Annotated[float, Between(-1000, 1e6, "m")] = Field(
+        description="place of the first portal along the line, below 0 where a run begins in the tunnel (m)"
+    )
+    end: Annotated[float, Between(0, 1e6, "m")] = Field(description="place of the other portal (m)")
+    factor: Annotated[float, Between(0, 5)] = Field(
+        description="on the aerodynamic uplift that a pantograph has in the open (-)"
+    )
+
+
 class CatenaryData(Settings):
     """Data that lines of every kind have."""
 
@@ -59,6 +79,9 @@ class CatenaryData(Settings):
         "then, otherwise twice",
     )
     spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
+    tunnels: tuple[Tunnel, ...] = Field(
+        (), max_length=100, description="where air lifts otherwise than in the open, in their order"
+    )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     def __hash__(self) -> int:
@@ -68,6 +91,30 @@ class CatenaryData(Settings):
     def source_of(self, name: str) -> str:
         """Source of a value that lines of every kind have; reports whether it is the default."""
         return self.sources.get(name, NO_SOURCE if name in self.model_fields_set else BY_DEFAULT)
+
+    @model_validator(mode="after")
+    def _tunnels_in_order(self) -> Self:
+        portals = [place for tunnel in self.tunnels for place in (tunnel.begin, tunnel.end)]
+        if any(there - here < PORTAL for here, there in pairwise(portals)):
+            raise ValueError(f"portals of tunnels must follow one another by {PORTAL:g} m or more each")
+        return self
+
+    @property
+    def tunnel_rows(self) -> Array:
+        """Places (m), share of the wind that blows there (-), and excess of the factor on the uplift over 1
+        (-), (3, places), all linear between; no places without tunnels.
+        """
+        rows = [
+            (place + side * PORTAL / 2, float(outside), (1 - outside) * (tunnel.factor - 1))
+            for tunnel in self.tunnels
+            for place, side, outside in (
+                (tunnel.begin, -1, 1),
+                (tunnel.begin, 1, 0),
+                (tunnel.end, -1, 0),
+                (tunnel.end, 1, 1),
+            )
+        ]
+        return np.array(rows).reshape(-1, 3).T.copy()
 
     @property
     def ends(self) -> bool:

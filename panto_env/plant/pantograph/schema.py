@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
@@ -33,6 +33,8 @@ SOFTEST_SPRING = 1.0
 """Minimum spring between two masses (N/m): with less the frame's lift does not reach the head."""
 Contact = Annotated[float, Between(1e3, STIFFEST_CONTACT, "N/m")]
 StaticForce = Annotated[float, Between(0, 1000, "N")]
+QUICKEST_AIR = 1500.0
+"""Speed (km/h) up to which a linear uplift is tabled: no train and head wind reach it."""
 
 
 class PantographData(Settings):
@@ -63,8 +65,19 @@ class PantographData(Settings):
         description="height of the contact wire about which the spring to the ground acts, local or nominal",
     )
     # Up to ten times EN 50367's 0.00097; the same in N/(m/s)^2, 0.0126, is refused.
-    aerodynamic_coefficient: Annotated[float, Between(0, 0.01, "N/(km/h)^2")] = Field(
-        description="aerodynamic uplift on the lowest mass per speed squared (N/(km/h)^2)"
+    aerodynamic_coefficient: Annotated[float, Between(-0.01, 0.01, "N/(km/h)^2")] = Field(
+        description="aerodynamic uplift on the lowest mass per speed squared, negative where air presses it "
+        "down (N/(km/h)^2)"
+    )
+    aerodynamic_linear: Annotated[float, Between(-2, 2, "N/(km/h)")] = Field(
+        0.0, description="aerodynamic uplift per speed, beside that per speed squared (N/(km/h))"
+    )
+    uplift_over_speed: tuple[
+        tuple[Annotated[float, Between(0, 1000, "km/h")], Annotated[float, Between(-1000, 1000, "N")]], ...
+    ] = Field(
+        (),
+        description="in the place of both, as measured: pairs of speed (km/h), rising, and aerodynamic "
+        "uplift (N), linear between and from 0 N at 0 km/h to the first; faster trains are refused",
     )
     contact_stiffness: Contact | Literal["rigid"] = Field(
         description="spring between collector strip and contact wire (N/m), or 'rigid'"
@@ -82,6 +95,24 @@ class PantographData(Settings):
         0.0, description="dry friction on the lowest mass, in either direction (N)"
     )
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table_alone(cls, values: Any) -> Any:
+        """With a table of the uplift there is no coefficient to be given."""
+        tabled = isinstance(values, Mapping) and values.get("uplift_over_speed")
+        return {"aerodynamic_coefficient": 0.0, **values} if tabled else values
+
+    @model_validator(mode="after")
+    def _uplift_as_table_or_law(self) -> Self:
+        speeds = [speed for speed, _ in self.uplift_over_speed]
+        if speeds and (self.aerodynamic_coefficient or self.aerodynamic_linear):
+            raise ValueError(
+                "give either uplift_over_speed, or aerodynamic_coefficient and aerodynamic_linear, not both"
+            )
+        if speeds and not (speeds[-1] > 0 and (np.diff(speeds) > 0).all()):
+            raise ValueError("speeds of uplift_over_speed must rise from pair to pair, the last above 0 km/h")
+        return self
 
     @model_validator(mode="after")
     def _one_spring_and_damper_a_mass(self) -> Self:
@@ -163,8 +194,45 @@ class PantographData(Settings):
         return self.static_force + self.aerodynamic_uplift(speed)
 
     def aerodynamic_uplift(self, speed: Any) -> Any:
-        """Aerodynamic uplift on the lowest mass (N) at a train speed (m/s), or at each of an array."""
-        return self.aerodynamic_coefficient * to_kmh(speed) ** 2
+        """Aerodynamic uplift on the lowest mass (N) at a train speed (m/s), or at each of an array.
+
+        The speed is that of the air from ahead. Raises InputError beyond the last one of a table.
+        """
+        fastest, last = to_kmh(np.max(speed)), self.uplift_over_speed[-1:]
+        if last and fastest > last[0][0] * (1 + 1e-9):
+            raise InputError(
+                f"uplift_over_speed of '{self.name}' ends at {last[0][0]:g} km/h, and the air comes with up "
+                f"to {beside(fastest, last[0][0], '.4g')} km/h, wind included; give the uplift up to there."
+            )
+        return self.aerodynamic_coefficient * to_kmh(speed) ** 2 + self.tabled_uplift(speed)
+
+    def uplift_change(self, speed: Any, before: float) -> Any:
+        """By how much the uplift at a speed (m/s), or at each of an array, exceeds that at another (N).
+
+        Beyond a table its last value holds: a speed that is read off a record may be off by rounding.
+        """
+        squares = to_kmh(speed) ** 2 - to_kmh(before) ** 2
+        return self.aerodynamic_coefficient * squares + self.tabled_uplift(speed) - self.tabled_uplift(before)
+
+    @property
+    def lifted_by_air(self) -> bool:
+        """Whether air lifts or presses the pantograph at any speed."""
+        return bool(self.aerodynamic_coefficient) or any(force for _, force in self.uplift_table)
+
+    @property
+    def uplift_table(self) -> tuple[tuple[float, float], ...]:
+        """Speeds (km/h), from 0 up, and that part of the uplift (N) that is linear between them."""
+        if self.aerodynamic_linear:
+            return ((0.0, 0.0), (QUICKEST_AIR, QUICKEST_AIR * self.aerodynamic_linear))
+        first = self.uplift_over_speed[:1]
+        return ((0.0, 0.0), *self.uplift_over_speed) if first and first[0][0] else self.uplift_over_speed
+
+    def tabled_uplift(self, speed: Any) -> Any:
+        """Uplift by ``uplift_table`` (N) at a speed (m/s), or at each of an array; even beyond its ends."""
+        if not self.uplift_table:
+            return 0.0
+        speeds, forces = zip(*self.uplift_table, strict=True)
+        return np.interp(to_kmh(speed), speeds, forces)
 
 
 STRIP_STIFFNESS = 50e3  # contact spring (N/m) of a 'rigid' collector strip on a wire with mass: EN 50318's

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 NEAREST = 1.0  # least distance of a dropper on a stitch wire from its clamps (m)
 MOST_TENSION = 0.9  # maximum share of the messenger's tension that a stitch wire takes
+NOT_OF_ITS_OWN = {"sources", "spans", "span_types", "overlaps", "points"}
+"""What a tension length has not as a line of its own: points reach it as the hard spots of a condition do."""
 
 
 class Dropper(NamedTuple):
@@ -278,7 +280,7 @@ class Layout:
         }
         if line.plan is not None:
             changes["plan"] = line.plan.from_support(first)
-        kept = line.model_dump(exclude={"sources", "spans", "span_types", "overlaps"}, exclude_none=True)
+        kept = line.model_dump(exclude=NOT_OF_ITS_OWN, exclude_none=True)
         return valid(type(line), kept | changes, f"An overlap of line '{line.name}'").layout()
 
     @cached_property

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....base.arrays import Array
 from ....base.errors import InputError
-from ...line_condition import DrawnLine, LineCondition
+from ...line_condition import ON_WIRE, DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ...wind import draw_side_wind
 from ..protocol import LineView, StartPoint, check_speeds
@@ -22,6 +22,7 @@ from .fixed_wires import check_loaded, tensions_of_fixed
 from .grid import point_gain
 from .layout import Layout, TensionLength
 from .plan import in_wind
+from .points import with_points
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
@@ -117,17 +118,19 @@ class DefectiveParts:
 def _on_wire(part: TensionLength, layout: Layout, condition: LineCondition) -> LineCondition:
     """A condition with the defects of the contact wire of one tension length, by its own numbers of spans."""
     supports, (begin, end), first = layout.supports, part.in_use, part.first_span
-    spots = [row for row in condition.hard_spots if begin <= supports[row[0] - 1] + row[1] < end]
-    worn = [row for row in condition.worn_stretches if begin <= supports[row[0] - 1] + row[1] < end]
-    return condition.model_copy(
-        update={
-            "hard_spots": tuple((span - first, *rest) for span, *rest in spots),
-            "worn_stretches": tuple(
-                (span - first, offset, min(length, end - supports[span - 1] - offset), share)
-                for span, offset, length, share in worn
-            ),
-        }
+    own = {
+        name: tuple(
+            (span - first, *rest)
+            for span, *rest in getattr(condition, name)
+            if begin <= supports[span - 1] + rest[0] < end
+        )
+        for name in ON_WIRE
+    }
+    own["worn_stretches"] = tuple(
+        (span, offset, min(length, end - supports[first + span - 1] - offset), share)
+        for span, offset, length, share in own["worn_stretches"]
     )
+    return condition.model_copy(update=own)
 
 
 DESIGNED = -1  # key, instead of a lane's number, of the shape of all lanes without a shape of their own
@@ -164,6 +167,7 @@ class FlexibleCatenary:
                 f"Line '{data.name}' is a sequence of {data.spans} spans, so it has no other number of them: "
                 "leave out spans, or give a shorter distance."
             )
+        given, runs = runs.conditions, with_points(data, runs, spans)
         condition = of_wires(runs.conditions)
         self.data = data = designed = in_wind(data, spans, runs.conditions)
         self._fixed = contact, messenger = tensions_of_fixed(designed, condition)
@@ -202,21 +206,35 @@ class FlexibleCatenary:
         self._defective: dict[LineCondition, DefectiveParts] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions) or designed.arms_in_wind:
-            self._make_defective(designed, spans, runs.conditions, lanes)
+            self._make_defective(designed, spans, given, runs.conditions, lanes)
         if data is not designed:
             both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
-            for (was, now), line in zip(both, self._defective[condition].lines, strict=True):
+            for (was, now), line in zip(both, self._defective[given[0]].lines, strict=True):
                 shape = shape_left(was.layout.line, now.layout.line)
                 check_loaded(now.layout, shape, line.rise(line.solve()))
         if any(each.side_wind for each in runs.conditions):
+            if data.tunnels:
+                raise InputError(
+                    f"Line '{data.name}' has tunnels, in which no wind blows across the track; leave out "
+                    "side_wind, or compute the line in parts."
+                )
             air = air_about(self.line, data.wires, condition.ice, self.time_step)
             self.line = self.line._replace(air=air)
         self.wire = at_rest(self.line, lanes, collectors)
 
     def _make_defective(
-        self, data: FlexibleCatenaryData, spans: int, conditions: Sequence[LineCondition], lanes: int
+        self,
+        data: FlexibleCatenaryData,
+        spans: int,
+        conditions: Sequence[LineCondition],
+        pointed: Sequence[LineCondition],
+        lanes: int,
     ) -> None:
-        self._defective = {each: DefectiveParts(data.layout(spans), each, self._fixed) for each in conditions}
+        """conditions: of the runs; pointed: the same with the line's points."""
+        self._defective = {
+            each: DefectiveParts(data.layout(spans), with_its_points, self._fixed)
+            for each, with_its_points in zip(conditions, pointed, strict=True)
+        }
         first = conditions[0]
         self._lines_differ = len(conditions) > 1 or first.scatters
         rows = lanes if self._lines_differ else 1
@@ -287,7 +305,7 @@ def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
     if len({condition.of_wires for condition in conditions}) > 1:
         raise InputError(
             "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
-            "worn_stretches, lost_contact_tension, lost_messenger_tension, ice or temperature; make a "
-            "separate run for each."
+            "worn_stretches, surface_bumps, lost_contact_tension, lost_messenger_tension, ice or "
+            "temperature; make a separate run for each."
         )
     return conditions[0]

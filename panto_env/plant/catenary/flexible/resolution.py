@@ -23,6 +23,7 @@ from ....backend import WIDTH
 from ....base.arrays import to_kmh
 from ....base.checksums import remembered
 from ....base.errors import AccuracyWarning, InputError
+from ...line_condition import ON_WIRE
 from ...numerics import SAMPLES_PER_WAVE, Numerics, Runs
 from ...pantograph.schema import HARD_DAMPING, HARD_STIFFNESS
 from ..schema import CLEAR, MOST_SPANS, Wire
@@ -191,7 +192,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
         longest = min(longest, HARD_CONTACT_ON_CLAMPS) if _heavy(data) else longest
         swing = math.sqrt(data.contact_wire.mass * spacing / runs.hard_contact)
         longest = min(longest, HARD_CONTACT_STEP * swing)
-    if any(each.hard_spots for each in runs.conditions):
+    if any(each.hard_spots or each.surface_bumps for each in runs.conditions):
         spacing = min(spacing, HARD_SPOT_GRID)
     kink = math.sqrt(data.contact_wire.bending_stiffness / data.contact_wire.tension)
     spacing = min(spacing, max(kink / LIMP_NODES, LIMP))
@@ -352,11 +353,13 @@ def window_of(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> int
 
     Raises InputError for a given window where the wire itself has defects, or is blown upon before a run.
     """
-    whole = any(each.hard_spots or each.worn_stretches or each.side_wind for each in runs.conditions)
+    named = [getattr(each, name) for each in runs.conditions for name in (*ON_WIRE, "side_wind")]
+    whole = any(named) or data.has_points
     if whole and numerics.window:
         raise InputError(
-            "A line with hard_spots, worn_stretches or side_wind is computed as a whole, not in a window "
-            f"that travels with the train: leave out window={numerics.window}, or set it to 0."
+            "A line with points, hard_spots, worn_stretches, surface_bumps or side_wind is computed as a "
+            "whole, not in a window that travels with the train: leave out "
+            f"window={numerics.window}, or set it to 0."
         )
     if numerics.window is not None or whole:
         return numerics.window or 0

@@ -33,7 +33,8 @@ from .parts import (
     Support,
     check_inside,
 )
-from .spans import laid_out
+from .points import Point
+from .spans import laid_out, valid
 
 __all__ = [
     "CLOSEST",
@@ -51,11 +52,39 @@ __all__ = [
 SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}  # values of a line whose spans differ
 
 
+class DampingRatio(Settings):
+    """Damping by its ratio, which it has at two frequencies."""
+
+    ratio: Annotated[float, Between(0, 0.5)] = Field(
+        description="of both frequencies to critical damping (-)"
+    )
+    frequencies: tuple[
+        Annotated[float, Between(0.05, 500, "Hz")], Annotated[float, Between(0.05, 500, "Hz")]
+    ] = Field(description="at which damping has this ratio (Hz); it is less between them, more beyond")
+
+    @property
+    def of_rayleigh(self) -> dict[str, float]:
+        """Coefficients alpha (1/s) and beta (s): the ratio at omega is alpha / (2 omega) + beta omega / 2."""
+        low, high = (2 * math.pi * each for each in self.frequencies)
+        beta = 2 * self.ratio / (low + high)
+        return {"alpha": beta * low * high, "beta": beta}
+
+
 class Rayleigh(Settings):
-    """Damping matrix alpha M + beta K."""
+    """Damping matrix alpha M + beta K; the coefficients, or the ratio of which they follow."""
 
     alpha: Annotated[float, Between(0, 50, "1/s")] = Field(description="mass-proportional damping (1/s)")
     beta: Annotated[float, Between(0, 0.1, "s")] = Field(description="stiffness-proportional damping (s)")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_ratio(cls, values: Any) -> Any:
+        by_ratio = isinstance(values, Mapping) and not values.keys().isdisjoint(DampingRatio.model_fields)
+        if not by_ratio:
+            return values
+        if not values.keys().isdisjoint(cls.model_fields):
+            raise InputError("Give damping either alpha and beta, or ratio and frequencies, not both.")
+        return valid(DampingRatio, values, "").of_rayleigh
 
 
 class FlexibleCatenaryData(CatenaryData):
@@ -89,6 +118,11 @@ class FlexibleCatenaryData(CatenaryData):
     )
     end_support: EndSupport | None = Field(
         None, description="heights and stitch wire at the last support, by default those of the last span"
+    )
+    points: tuple[Point, ...] = Field(
+        (),
+        max_length=1000,
+        description="section insulators, splices, neutral sections, mid-point anchors on the contact wire",
     )
     overlaps: tuple[Overlap, ...] = Field(
         (), description="where one pair of wires ends and the next begins, in the order of travel"
@@ -132,6 +166,9 @@ class FlexibleCatenaryData(CatenaryData):
         given = end.get("stitch_wire") if isinstance(end, Mapping) else None
         if isinstance(end, Mapping) and isinstance(given, Mapping) and isinstance(own, Mapping):
             table["end_support"] = {**end, "stitch_wire": {**own, **given}}
+        sources = table.get("sources") or {}
+        if "damping.ratio" in sources:  # alpha and beta follow from it
+            table["sources"] = {"damping": f"from damping.ratio: {sources['damping.ratio']}", **sources}
         line = handler(table)
         if not line.sequence:
             if line.span_types or line.end_support is not None or line.overlaps:
@@ -159,6 +196,20 @@ class FlexibleCatenaryData(CatenaryData):
     def _droppers_in_span(self) -> Self:
         check_inside(self.droppers.positions, self.span_length)
         return self
+
+    @model_validator(mode="after")
+    def _points_in_spans(self) -> Self:
+        for number, point in enumerate(self.points, start=1):
+            if point.span > self.spans:
+                raise ValueError(
+                    f"point {number} is in span {point.span}, and the line has {self.spans} spans"
+                )
+        return self
+
+    @property
+    def has_points(self) -> bool:
+        """Whether any point changes the line."""
+        return any(point.mass or point.stiffness or point.step for point in self.points)
 
     def layout(self, spans: int | None = None) -> Layout:
         """Spans, tension lengths, stitch wires and droppers of the line's sequence, or of a number of spans.

@@ -1,4 +1,5 @@
-"""Defects of the contact wire at places of their own, in metres along the line: hard spots, worn stretches.
+"""Defects of the contact wire at places of their own, in metres along the line: hard spots, worn stretches,
+bumps of its running surface.
 
 A hard spot is a mass on the wire, a spring to the ground that is unstressed at rest, or both. Worn wire is
 lighter, and its running surface is higher by the depth of wear. Its tension and bending stiffness are kept:
@@ -42,11 +43,25 @@ class Stretch(NamedTuple):
     depth: float  # of wear (m)
 
 
+class Bump(NamedTuple):
+    """A part of the contact wire whose running surface is higher, or lower, by straight ramps at its ends."""
+
+    position: float  # of its middle (m)
+    length: float  # m; each ramp is a quarter of it
+    height: float  # m
+
+    @property
+    def knots(self) -> list[float]:
+        """Where it begins, is as high as it gets, comes down and ends (m)."""
+        return [self.position + share * self.length for share in (-0.5, -0.25, 0.25, 0.5)]
+
+
 class WireDefects(NamedTuple):
-    """Hard spots and worn stretches of a line's contact wire, in positions along the line (m)."""
+    """Hard spots, worn stretches and bumps of a line's contact wire, in positions along the line (m)."""
 
     spots: tuple[Spot, ...] = ()
     stretches: tuple[Stretch, ...] = ()
+    bumps: tuple[Bump, ...] = ()
 
     def within(self, begin: float, end: float) -> WireDefects:
         """Those that begin from one position of the line up to before another (m); the end cuts stretches."""
@@ -57,6 +72,7 @@ class WireDefects(NamedTuple):
                 for stretch in self.stretches
                 if begin <= stretch.begin < end
             ),
+            tuple(bump for bump in self.bumps if begin <= bump.position < end),
         )
 
     @property
@@ -73,6 +89,7 @@ class WireDefects(NamedTuple):
         positions, span = [*further, *(spot.position for spot in self.spots)], own[-1]
         for begin, end, _, _ in self.stretches:
             positions += [begin, begin + RAMP, end - RAMP, end]
+        positions += [knot for bump in self.bumps for knot in bump.knots]
         if begins is None:
             places = [position % span for position in positions]
         else:
@@ -107,10 +124,12 @@ class WireDefects(NamedTuple):
         return gone
 
     def surface(self, x: Array) -> Array:
-        """Rise of the running surface over the axis of the wire by wear (m), (n,), at places x (m)."""
+        """Rise of the running surface over the axis of the wire (m), (n,), at places x (m)."""
         height = np.zeros(len(x))
         for begin, end, _, depth in self.stretches:
             height += np.interp(x, [begin, begin + RAMP, end - RAMP, end], [0.0, depth, depth, 0.0])
+        for bump in self.bumps:
+            height += np.interp(x, bump.knots, [0.0, bump.height, bump.height, 0.0])
         return height
 
 
@@ -151,12 +170,24 @@ def locate(layout: Layout, condition: LineCondition) -> WireDefects:
             )
         stretches.append(Stretch(begin, begin + length, share * metal, worn_depth(wire, share)))
     whole = alignment.length
+    bumps = tuple(
+        Bump(position(span, offset), length, height)
+        for span, offset, length, height in condition.surface_bumps
+    )
+    for bump in bumps:
+        if not 0 <= bump.knots[0] <= bump.knots[-1] <= whole:
+            raise InputError(
+                f"A bump reaches from {bump.knots[0]:g} to {bump.knots[-1]:g} m, and the line from 0 to "
+                f"{whole:g} m."
+            )
     for spot in spots:
         if not 0 < spot.position < whole:
-            raise InputError(f"A hard spot must lie between the line's anchors, at 0 and {whole:g} m.")
+            raise InputError(
+                f"A hard spot or a point must lie between the line's anchors, at 0 and {whole:g} m."
+            )
     if stretches and stretches[-1].end > whole:
         raise InputError(f"A worn stretch ends at {stretches[-1].end:g} m, but the line at {whole:g} m.")
-    return WireDefects(spots, tuple(stretches))
+    return WireDefects(spots, tuple(stretches), bumps)
 
 
 def worn_depth(wire: Wire, share: float) -> float:

@@ -187,8 +187,11 @@ class Rig:
                 f"The cylinder of rig '{data.name}' follows the motion that is computed for an even contact "
                 "wire; use a line_condition without irregularity and wear, such as 'new'."
             )
-        if any(condition.wind or condition.side_wind for condition in runs.conditions):
-            raise InputError(f"No wind blows on a rig; leave it out, or use another line than '{data.name}'.")
+        if data.tunnels or any(condition.wind or condition.side_wind for condition in runs.conditions):
+            raise InputError(
+                "No wind blows on a rig, nor is it in a tunnel; leave out both, or use another line than "
+                f"'{data.name}'."
+            )
         if getattr(data.line, "overlaps", ()):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows one contact wire, and its line has overlaps of "
