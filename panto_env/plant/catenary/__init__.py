@@ -27,6 +27,7 @@ KINDS = [
     "three_span",
     "periodic_stiffness",
     "rig",
+    "single",
 ]
 """Values of ``kind`` in a line's TOML file: the names of the modules."""
 CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}

@@ -1,0 +1,11 @@
+"""A single wire on point supports (tram, trolley, depot), and with a tension of 0 a conductor rail."""
+
+from ..protocol import CatenaryKind
+from . import step as step
+from .model import Single
+from .resolution import clear_spans
+from .schema import SingleData
+
+__all__ = ["KIND", "Single", "SingleData"]
+
+KIND = CatenaryKind(SingleData, Single, clear_spans=clear_spans, several_collectors=True)

@@ -1,0 +1,187 @@
+"""A single wire or a rail for a number of lanes: its shape at rest, its window, what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ....backend import python_function
+from ....base.arrays import Array, one_thread
+from ....base.errors import InputError
+from ...line_condition import DrawnLine, LineCondition
+from ...numerics import Numerics, Runs
+from ..flexible.shape import GRAVITY, solve_band
+from ..protocol import NOTHING, LineView, StartPoint, check_speeds
+from .resolution import Resolution, resolution
+from .schema import SingleData
+from .step import SingleLine, SingleWire, stiffness_terms
+
+
+class Single:
+    """A beam under tension on point supports; a run starts at the line's first anchor, where it is held."""
+
+    massless = False
+    wires_per_collector = 1
+    contact_gain = 0.0  # a contact of any stiffness is stable
+    contact_share = 1.0  # the implicit midpoint rule: a force's work is then exact
+    grid: Mapping[str, float]
+
+    def __init__(
+        self,
+        data: SingleData,
+        *,
+        lanes: int,
+        collectors: int,
+        spans: int,
+        numerics: Numerics,
+        runs: Runs,
+    ) -> None:
+        """Build the line.
+
+        Raises InputError for conditions that a single wire has not, for a speed that is too high, and where
+        lengths of spans are given for another number of spans.
+        """
+        if data.span_lengths and spans != data.spans:
+            raise InputError(
+                f"Line '{data.name}' has {data.spans} span_lengths, so it has no other number of spans: "
+                "leave out spans, or give a shorter distance."
+            )
+        refuse_conditions(data, runs.conditions)
+        self.wave_speed = data.wave_speed
+        check_speeds(data.name, self.wave_speed, runs.speeds)
+        chosen = resolution(data, numerics, runs)
+        self.time_step = chosen.time_step
+        runs.check_wave(self.time_step)
+        window, about_one = chosen.spans_of(spans)
+        self.grid = {"spacing": data.longest_span / chosen.elements, "window": about_one}
+        self.alignment = alignment = data.alignment(spans)
+        self.line: Any = constants(data, spans, chosen, window, runs.train_length)
+        each, nodes = (lanes, collectors), window * chosen.elements + 1
+        self.wire: Any = SingleWire(
+            first=np.full(lanes, -1),
+            element=np.zeros(each, dtype=np.int64),
+            affected=np.zeros((*each, 2), dtype=np.int64),
+            weight=np.zeros((*each, 4)),
+            moved=np.zeros((lanes, nodes, 2)),
+            rate=np.zeros((lanes, nodes, 2)),
+            mean=np.zeros((lanes, nodes, 2)),
+            pivot=np.zeros((lanes, nodes, 3)),
+            lower=np.zeros((lanes, nodes, 4)),
+            response=np.zeros((*each, nodes, 2)),
+        )
+        self.length = alignment.length
+        self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
+        self.supports: Array = alignment.support(np.arange(1, spans))
+        self.droppers: Array = np.zeros(0)
+        # The anchor does not yield: the pantograph is at rest there exactly.
+        self.start_point = StartPoint(float(self.line.rest[0, 0]), 0.0, 0.0)
+
+    def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
+        """Put one lane's wire at rest; a force (N) at the anchor does not move it."""
+        self.wire.first[lane] = -1
+        for each in (self.wire.moved, self.wire.rate, self.wire.mean):
+            each[lane] = 0.0
+
+    def rest_tension(self, lane: int) -> Array:
+        """No tension: there are no droppers."""
+        return np.zeros(0)
+
+    def view(self, lane: int, begin: float, end: float) -> LineView:
+        """Present shape of one lane's line within the window about the train."""
+        moved, elements = self.wire.moved[lane, :, 0], self.line.elements
+        first = max(int(self.wire.first[lane]), 0) * elements
+        inside = slice(first, first + len(moved))
+        x, contact = nodes_of(self.alignment.lengths, elements)[inside], self.line.rest[inside, 0] + moved
+        shown = (x >= begin) & (x <= end)
+        supports = self.alignment.supports_within(max(begin, x[0]), min(end, x[-1]))
+        return NOTHING._replace(x=x[shown], contact=contact[shown], supports=supports)
+
+
+OF_LINES = {
+    "droppers": ("broken_droppers", "miscut_droppers", "dropper_scatter"),
+    "messenger wire whose supports could be out of height": ("raised_supports", "support_scatter"),
+    "messenger wire that could lose its tension": ("lost_messenger_tension",),
+    "tension that differs from its data's; change contact_wire.tension there": (
+        *("tension_scatter", "lost_contact_tension", "temperature"),
+    ),
+    "ice; raise contact_wire.mass in its data instead": ("ice",),
+    "masses, springs or worn stretches on it; wear_depth gives waves of wear": (
+        *("hard_spots", "worn_stretches"),
+    ),
+    "plan, so no wind blows across it": ("side_wind",),
+}
+"""What a single wire has not, and the values of a line condition that need it."""
+
+
+def refuse_conditions(data: SingleData, conditions: Sequence[LineCondition]) -> None:
+    """Raise InputError for a line condition that a single wire has not."""
+    for words, names in OF_LINES.items():
+        for name in names:
+            if any(getattr(condition, name) for condition in conditions):
+                raise InputError(
+                    f"Line '{data.name}' is a single wire or rail on point supports and has no {words}. "
+                    f"Leave out {name}, as the line condition 'fair' does, or take a flexible line."
+                )
+
+
+def nodes_of(lengths: Array, elements: int) -> Array:
+    """Places of all nodes (m), (spans * elements + 1,), for spans of these lengths (m)."""
+    return np.append(0.0, np.cumsum(np.repeat(lengths / elements, elements)))
+
+
+def constants(data: SingleData, spans: int, chosen: Resolution, window: int, train: float) -> SingleLine:
+    """Constants of the line for kernels, with a window of this many spans."""
+    alignment, wire = data.alignment(spans), data.contact_wire
+    alpha, beta = data.rayleigh
+    line = SingleLine(
+        alignment=alignment.arrays,
+        elements=chosen.elements,
+        window=window,
+        behind=chosen.behind,
+        train=train,
+        time_step=chosen.time_step,
+        mass=wire.mass,
+        tension=wire.tension,
+        bending=wire.bending_stiffness,
+        alpha=alpha,
+        beta=beta,
+        support=np.array([data.support.stiffness, data.support.damping]),
+        layer=chosen.layer(window),
+        rest=np.zeros(0),
+        free_uplift=data.free_uplift,
+    )
+    rest = at_rest(line, alignment.lengths)
+    if data.ramp is not None:
+        bent = np.maximum(1 - nodes_of(alignment.lengths, chosen.elements) / data.ramp.length, 0.0)
+        rest[:, 0] += data.ramp.rise * bent**2
+        rest[:, 1] -= 2 * data.ramp.rise / data.ramp.length * bent
+    return line._replace(rest=rest)
+
+
+def at_rest(line: SingleLine, lengths: Array) -> Array:
+    """Heights (m) and slopes (-) of all nodes, (nodes, 2), under the wire's weight, at 0 m at all supports.
+
+    lengths: of the spans (m). The ends may turn, so that a rail sags more in its first and last span.
+    """
+    h = np.repeat(lengths / line.elements, line.elements)
+    a, b, c, d = python_function(stiffness_terms)(line, h)
+    band = np.zeros((4, 2 * len(h) + 2))  # lower diagonals
+    for k, size in enumerate((a, c)):
+        band[0, k:-2:2] += size
+        band[0, k + 2 :: 2] += size
+    band[1, :-2:2] += b
+    band[1, 2::2] -= b
+    band[1, 1:-2:2], band[2, :-2:2], band[2, 1:-2:2], band[3, :-2:2] = -b, -a, d, b
+    load, half = np.zeros(2 * len(h) + 2), GRAVITY * line.mass * h / 2
+    load[:-2:2] -= half
+    load[2::2] -= half
+    load[1:-2:2] -= half * h / 6
+    load[3::2] += half * h / 6
+    held = np.arange(0, len(load), 2 * line.elements)
+    load[held], band[1:, held] = 0.0, 0.0
+    for k in range(1, 4):
+        band[k, held[1:] - k] = 0.0
+    with one_thread():
+        return solve_band(band, load).reshape(-1, 2)

@@ -1,0 +1,158 @@
+"""What a single wire or a rail on point supports is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ....base.errors import InputError
+from ....base.settings import Between, Settings
+from ...alignment import Alignment
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, SpanLength
+
+BENT = 0.01  # share of the tension in the restoring force from which bending counts
+DAMPED = 20.0  # frequency of the second damping ratio (Hz), the highest that figures contain
+OF_OTHERS = (
+    *("messenger_wire", "droppers", "stitch_wire", "steady_arm", "encumbrance"),
+    *("sequence", "span_types", "overlaps", "plan", "masts", "as_found", "published"),
+)
+"""Keys of a flexible line that a single wire has not."""
+
+
+class Beam(Settings):
+    """A beam under tension: a contact wire, or with a tension of 0 a rail."""
+
+    mass: Annotated[float, Between(0.05, 100, "kg/m")] = Field(description="mass per length (kg/m)")
+    tension: Annotated[float, Between(0, 200e3, "N")] = Field(description="tension (N); 0 for a rail")
+    bending_stiffness: Annotated[float, Between(0, 1e7, "N m^2")] = Field(
+        description="bending stiffness EI (N m^2)"
+    )
+
+
+class PointSupport(Settings):
+    """A spring and a dashpot between the beam and the ground at each support."""
+
+    stiffness: Annotated[float, Between(100, 1e9, "N/m")] = Field(description="vertical stiffness (N/m)")
+    damping: Annotated[float, Between(0, 1e6, "N s/m")] = Field(0.0, description="vertical damping (N s/m)")
+
+
+class Damping(Settings):
+    """Damping of the beam: the matrix alpha M + beta K, or a ratio from which both follow."""
+
+    alpha: Annotated[float, Between(0, 50, "1/s")] = Field(0.0, description="mass-proportional damping (1/s)")
+    beta: Annotated[float, Between(0, 0.1, "s")] = Field(
+        0.0, description="stiffness-proportional damping (s)"
+    )
+    damping_ratio: Annotated[float, Between(0, 0.5)] | None = Field(
+        None,
+        description="instead of alpha and beta: damping ratio at the first frequency of a span and at 20 Hz, "
+        "or at twice the first where that is higher; smaller between them (-)",
+    )
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.damping_ratio is not None and self.model_fields_set & {"alpha", "beta"}:
+            raise InputError("Give the damping either alpha and beta or a damping_ratio, not both.")
+        return self
+
+
+class Ramp(Settings):
+    """The beginning of a rail, bent up in a parabola so that a pantograph comes to it from below."""
+
+    length: Annotated[float, Between(0.1, 100, "m")] = Field(description="length of the bent part (m)")
+    rise: Annotated[float, Between(0, 0.25, "m")] = Field(
+        description="height of the line's beginning over the level part (m)"
+    )
+
+
+class SingleData(CatenaryData):
+    """A single wire, or a rail, on point supports: tram, trolley and depot lines, conductor rails."""
+
+    kind: Literal["single"] = "single"
+    contact_wire: Beam
+    support: PointSupport
+    damping: Damping
+    ramp: Ramp | None = Field(None, description="at the beginning of a rail; without it the line is level")
+    span_lengths: tuple[SpanLength, ...] = Field(
+        (), description="length of each span in the order of travel, where they are not all span_length (m)"
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_spans(cls, values: Any, handler: Callable[[Any], Self]) -> Self:
+        """Refuse what only other lines have, and count the spans whose lengths are given."""
+        if not isinstance(values, Mapping):
+            return handler(values)
+        for key in OF_OTHERS:
+            if key in values:
+                raise InputError(
+                    f'A line of kind "single" has no {key.replace("_", " ")}: leave {key} out, or give the '
+                    'line kind "flexible".'
+                )
+        table, lengths = dict(values), values.get("span_lengths", ())
+        if isinstance(lengths, list | tuple) and lengths:
+            if not FEWEST_SPANS <= len(lengths) <= MOST_SPANS:
+                raise InputError(f"Give {FEWEST_SPANS} to {MOST_SPANS} span_lengths, not {len(lengths)}.")
+            if table.setdefault("spans", len(lengths)) != len(lengths):
+                raise InputError(
+                    f"There are {len(lengths)} span_lengths, but spans is {table['spans']}; leave spans out."
+                )
+        line = handler(table)
+        if line.contact_wire.tension == line.contact_wire.bending_stiffness == 0:
+            raise InputError("A contact_wire needs a tension (a wire) or a bending_stiffness (a rail).")
+        return line
+
+    @property
+    def ends(self) -> bool:
+        """Whether no wire goes on after the line's own spans: where their lengths are given, none does."""
+        return bool(self.span_lengths)
+
+    @property
+    def longest_span(self) -> float:
+        """Length of the longest span (m)."""
+        return max(self.span_lengths, default=self.span_length)
+
+    @property
+    def contact_heights(self) -> tuple[float, ...]:
+        """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
+        if self.ramp is None:
+            return ()
+        bent = [max(1 - x / self.ramp.length, 0.0) for x in self.alignment().supports]
+        return tuple(self.ramp.rise * each**2 for each in bent)
+
+    def alignment(self, spans: int | None = None) -> Alignment:
+        """Where supports and spans lie; spans: their number, by default the line's own.
+
+        Beyond given lengths, spans are as long as the last one.
+        """
+        if not self.span_lengths:
+            return super().alignment(spans)
+        count = len(self.span_lengths) if spans is None else spans
+        more = self.span_lengths[-1:] * max(count - len(self.span_lengths), 0)
+        return Alignment.of_spans((*self.span_lengths, *more)[:count])
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of the longest waves (m/s), which no train may reach; infinite where bending carries them.
+
+        Waves of length 2 pi / k run at sqrt((T + EI k^2) / m). Bending counts where it adds ``BENT`` or more
+        of the tension in the longest wave between supports, k = pi / L. A train can then outrun no wave that
+        matters, and a rail has no limit at all.
+        """
+        wire = self.contact_wire
+        bending = wire.bending_stiffness * (math.pi / self.longest_span) ** 2
+        return math.inf if bending >= BENT * wire.tension else math.sqrt(wire.tension / wire.mass)
+
+    @property
+    def rayleigh(self) -> tuple[float, float]:
+        """Factors of mass (1/s) and stiffness (s) in the damping matrix."""
+        own, wire, k = self.damping, self.contact_wire, math.pi / self.longest_span
+        if own.damping_ratio is None:
+            return own.alpha, own.beta
+        first = k * math.sqrt((wire.tension + wire.bending_stiffness * k**2) / wire.mass)
+        last = max(2 * math.pi * DAMPED, 2 * first)
+        beta = 2 * own.damping_ratio / (first + last)
+        return beta * first * last, beta
