@@ -125,6 +125,8 @@ IN_TURN = (
     ({"stiffness"}, {"axial_stiffness"}),
     ({"stiffness"}, {"length", "clamp_mass"}),  # of a steady arm
     ({"sequence"}, {"spans"}),
+    ({"span_lengths"}, {"spans"}),
+    ({"alpha", "beta"}, {"damping_ratio"}),
 )
 """Keys that exclude each other: where one is given, those of the other kind are no longer what they were."""
 

@@ -48,7 +48,7 @@ LEFT_OUT = (
     "two contact wires whose droppers alternate: they are one equivalent wire",
     "sideways waves: stagger, curves and wind act through steady arms whose length is given, at rest",
     "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
-    "rigid rails and third rails",
+    "third rails",
     "roll and pitch of the collector head and its two strips: it is one point",
     "motion of the vehicle and of the track",
     "longitudinal motion of droppers and arms, large rotations: motion is linear about the static shape, but "

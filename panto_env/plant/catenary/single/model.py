@@ -160,20 +160,26 @@ def constants(data: SingleData, spans: int, chosen: Resolution, window: int, tra
     return line._replace(rest=rest)
 
 
-def at_rest(line: SingleLine, lengths: Array) -> Array:
-    """Heights (m) and slopes (-) of all nodes, (nodes, 2), under the wire's weight, at 0 m at all supports.
-
-    lengths: of the spans (m). The ends may turn, so that a rail sags more in its first and last span.
-    """
-    h = np.repeat(lengths / line.elements, line.elements)
+def lower_diagonals(line: SingleLine, h: Array) -> Array:
+    """Lower diagonals, (4, unknowns), of the stiffness of elements of lengths h (m), (elements,), alone."""
     a, b, c, d = python_function(stiffness_terms)(line, h)
-    band = np.zeros((4, 2 * len(h) + 2))  # lower diagonals
+    band = np.zeros((4, 2 * len(h) + 2))
     for k, size in enumerate((a, c)):
         band[0, k:-2:2] += size
         band[0, k + 2 :: 2] += size
     band[1, :-2:2] += b
     band[1, 2::2] -= b
     band[1, 1:-2:2], band[2, :-2:2], band[2, 1:-2:2], band[3, :-2:2] = -b, -a, d, b
+    return band
+
+
+def at_rest(line: SingleLine, lengths: Array) -> Array:
+    """Heights (m) and slopes (-) of all nodes, (nodes, 2), under the wire's weight, at 0 m at all supports.
+
+    lengths: of the spans (m). The ends may turn, so that a rail sags more in its first and last span.
+    """
+    h = np.repeat(lengths / line.elements, line.elements)
+    band = lower_diagonals(line, h)
     load, half = np.zeros(2 * len(h) + 2), GRAVITY * line.mass * h / 2
     load[:-2:2] -= half
     load[2::2] -= half
