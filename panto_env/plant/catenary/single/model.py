@@ -99,30 +99,29 @@ class Single:
         return NOTHING._replace(x=x[shown], contact=contact[shown], supports=supports)
 
 
-OF_LINES = {
-    "droppers": ("broken_droppers", "miscut_droppers", "dropper_scatter"),
-    "messenger wire whose supports could be out of height": ("raised_supports", "support_scatter"),
-    "messenger wire that could lose its tension": ("lost_messenger_tension",),
-    "tension that differs from its data's; change contact_wire.tension there": (
-        *("tension_scatter", "lost_contact_tension", "temperature"),
+FLEXIBLE_ALONE = (
+    ("droppers", "", ("broken_droppers", "miscut_droppers", "dropper_scatter")),
+    ("messenger wire", "", ("raised_supports", "support_scatter", "lost_messenger_tension")),
+    (
+        "tension but its data's",
+        "change contact_wire.tension there, ",
+        ("tension_scatter", "lost_contact_tension", "temperature"),
     ),
-    "ice; raise contact_wire.mass in its data instead": ("ice",),
-    "masses, springs or worn stretches on it; wear_depth gives waves of wear": (
-        *("hard_spots", "worn_stretches"),
-    ),
-    "plan, so no wind blows across it": ("side_wind",),
-}
-"""What a single wire has not, and the values of a line condition that need it."""
+    ("load of ice", "raise contact_wire.mass in its data, ", ("ice",)),
+    ("spots or stretches unlike the rest", "", ("hard_spots", "worn_stretches")),
+    ("plan seen from above", "", ("side_wind",)),
+)
+"""What a single wire has not, what to do instead, and the values of a line condition that are about it."""
 
 
 def refuse_conditions(data: SingleData, conditions: Sequence[LineCondition]) -> None:
     """Raise InputError for a line condition that a single wire has not."""
-    for words, names in OF_LINES.items():
+    for what, instead, names in FLEXIBLE_ALONE:
         for name in names:
             if any(getattr(condition, name) for condition in conditions):
                 raise InputError(
-                    f"Line '{data.name}' is a single wire or rail on point supports and has no {words}. "
-                    f"Leave out {name}, as the line condition 'fair' does, or take a flexible line."
+                    f"Line '{data.name}' is a single wire or rail and has no {what}, which {name} is about: "
+                    f"{instead}take another line_condition, such as 'fair', or a flexible line."
                 )
 
 
