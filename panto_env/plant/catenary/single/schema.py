@@ -35,7 +35,7 @@ class Beam(Settings):
 class PointSupport(Settings):
     """A spring and a dashpot between the beam and the ground at each support."""
 
-    stiffness: Annotated[float, Between(100, 1e9, "N/m")] = Field(description="vertical stiffness (N/m)")
+    stiffness: Annotated[float, Between(100, 1e8, "N/m")] = Field(description="vertical stiffness (N/m)")
     damping: Annotated[float, Between(0, 1e6, "N s/m")] = Field(0.0, description="vertical damping (N s/m)")
 
 
@@ -94,13 +94,12 @@ class SingleData(CatenaryData):
                 )
         table, lengths = dict(values), values.get("span_lengths", ())
         if isinstance(lengths, list | tuple) and lengths:
-            if not FEWEST_SPANS <= len(lengths) <= MOST_SPANS:
-                raise InputError(f"Give {FEWEST_SPANS} to {MOST_SPANS} span_lengths, not {len(lengths)}.")
-            if table.setdefault("spans", len(lengths)) != len(lengths):
-                raise InputError(
-                    f"There are {len(lengths)} span_lengths, but spans is {table['spans']}; leave spans out."
-                )
+            table.setdefault("spans", min(max(len(lengths), FEWEST_SPANS), MOST_SPANS))
         line = handler(table)
+        if (count := len(line.span_lengths)) and not FEWEST_SPANS <= count <= MOST_SPANS:
+            raise InputError(f"Give {FEWEST_SPANS} to {MOST_SPANS} span_lengths, not {count}.")
+        if count and count != line.spans:
+            raise InputError(f"There are {count} span_lengths, but spans is {line.spans}: leave spans out.")
         if line.contact_wire.tension == line.contact_wire.bending_stiffness == 0:
             raise InputError("A contact_wire needs a tension (a wire) or a bending_stiffness (a rail).")
         return line
