@@ -4,18 +4,26 @@ The judge shares the catalogue and the pantograph's data with the simulator, and
 Hermite matrices, Newmark's step, and contacts as a complementarity problem (tests/finite_element).
 """
 
+import json
+import re
+
+import gymnasium
 import numpy as np
 import pytest
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu, spsolve
 
-from panto_env import simulate
+from panto_baselines.policies.line_model import mean_of_single
+from panto_env import InputError, simulate
+from panto_env.analysis.single_check import spans_at_rest
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog.loader import text_of
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact
 from panto_env.plant.catenary.single import Single
 from panto_env.plant.catenary.single.resolution import spacing
 from panto_env.plant.numerics import Numerics, Runs
 
+from ..command import panto
 from ..finite_element import hermite
 from ..finite_element.figures import figures
 from ..finite_element.simulation import ride
@@ -145,6 +153,23 @@ def test_a_slow_force_lifts_the_line_as_in_statics():
     stiffness.setdiag(stiffness.diagonal() + fixed)
     lifted = spsolve(stiffness.tocsc(), load)
     assert heights[-1] == pytest.approx(height + lifted[unknowns] @ values, rel=1e-3)
+
+
+@pytest.mark.parametrize("data", [RAIL, TRAM], ids=["rail", "tram"])
+def test_elasticity_is_by_the_judge_s_matrices(data):
+    """And of model-based policies the mean line's spring is the inverse of its mean over a span."""
+    (span,) = spans_at_rest(data)
+    system = build_single(data, 11, data.span_length / 64, turning=True)
+    stiffness = system.stiffness.tolil()
+    stiffness.setdiag(stiffness.diagonal() + 1 - system.free)
+    solve, yields = splu(stiffness.tocsc()), []
+    for share in np.linspace(0, 1, 33):
+        unknowns, values, *_ = system.contact_point((5 + share) * data.span_length)
+        load = np.zeros(system.free.size)
+        load[unknowns] = values
+        yields.append(values @ solve.solve(load)[unknowns])
+    assert [span.at_support, span.at_middle] == pytest.approx([yields[0], yields[16]], rel=2e-3)
+    assert 1 / mean_of_single(data).spring == pytest.approx(np.mean(yields), rel=0.07)
 
 
 def whole_pass(data, pantograph, speed, **settings):
@@ -284,6 +309,28 @@ def test_a_second_pantograph_meets_the_waves_of_the_first():
     assert second != pytest.approx(first, rel=0.02)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", ["pd", "repetitive", "fb+ff", "agent-robust", "agent-any-pantograph"])
+def test_policies_act_on_it(policy):
+    given = {"speed_kmh": 50.0, "distance": 150.0, "policy": policy, "line_condition": "fair"}
+    run = simulate("tram-30", "own-tram", **given)
+    assert run.position[-1] > 149.0
+    assert np.ptp(run.frame_force) > 1.0
+
+
+def test_lanes_of_an_environment_do_not_touch_each_other():
+    """Two of three have the same seed and commands; over 200 steps their windows travel."""
+    settings = {"catenary": "rail-10", "pantograph": "dsa380", "speed_kmh": 120.0, "line_condition": "new"}
+    lanes = gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=3, **settings)
+    lanes.reset(seed=[5, 6, 5])
+    command = np.zeros(lanes.action_space.shape, np.float32)
+    command[[0, 2]] = 0.5
+    for _ in range(200):
+        seen, *_ = lanes.step(command)
+    assert (seen[0] == seen[2]).all()
+    assert (seen[0] != seen[1]).any()
+
+
 WORDS = [
     (
         {"line_condition": "new:broken_droppers=[(3, 1)]"},
@@ -315,7 +362,7 @@ WORDS = [
 @pytest.mark.parametrize(("settings", "words"), WORDS)
 def test_what_a_single_wire_has_not_is_refused_in_its_own_words(settings, words):
     given = {"catenary": "tram-30", "pantograph": "own-tram", "speed_kmh": 50.0} | settings
-    with pytest.raises(ValueError) as refused:  # noqa: PT011 - an InputError, whose words follow
+    with pytest.raises(InputError) as refused:
         simulate(given.pop("catenary"), given.pop("pantograph"), **given)
     assert words in str(refused.value)
 
@@ -334,3 +381,24 @@ def test_what_a_single_wire_has_not_is_refused_in_its_own_words(settings, words)
 def test_data_that_do_not_go_together_are_refused(changes, words):
     with pytest.raises(ValueError, match=words.replace("(", r"\(")):
         changed(TRAM, **changes)
+
+
+@pytest.mark.parametrize("missing", ["tension", "droppers"])
+def test_a_rail_or_a_tram_given_as_a_flexible_line_is_told_its_kind(tmp_path, missing):
+    text = text_of("en50318-2002")
+    if missing == "tension":
+        text = re.sub(r"\ntension = \{ value = [^,]+", r"\ntension = { value = 1.0", text, count=1)
+    else:
+        text = re.sub(r"\[droppers\].*?\n\n", "", text, flags=re.DOTALL)
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(InputError, match='is of kind "single"'):
+        load_catenary(tmp_path / "mine.toml")
+
+
+def test_panto_line_shows_it_at_rest():
+    told = panto("line", "rail-10", "--json")
+    (span,) = json.loads(told.stdout)["spans"]
+    assert span["sag"] == pytest.approx(7.64e-3, rel=2e-3)
+    assert span["first_frequency"] == pytest.approx(2.87, rel=2e-3)
+    refused = panto("line", "rail-10", "--plot", "rail.png")
+    assert "of which only a table at rest is shown; leave out --plot" in " ".join(refused.stderr.split())
