@@ -321,7 +321,7 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
             table["base"] = _base(table["base"])
         entry = schema.model_validate(table)
     except ValidationError as error:
-        single = _hint_of_single(given) if schema is FlexibleCatenaryData else ""
+        single = _hint_of_single(table) if schema is FlexibleCatenaryData else ""
         raise InputError(f"{path} is not a valid entry: {explain(error, schema)}{single}.") from error
     except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
@@ -337,12 +337,12 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
     return entry
 
 
-def _hint_of_single(given: Mapping[str, Any]) -> str:
+def _hint_of_single(table: Mapping[str, Any]) -> str:
     """What to do where a flexible line lacks a messenger, droppers or tension, as a tram's or a rail does."""
-    wire = given.get("contact_wire")
+    wire = table.get("contact_wire")
     tension = wire.get("tension") if isinstance(wire, Mapping) else None
     slack = isinstance(tension, int | float) and tension < LOWEST_TENSION
-    if slack or not {"messenger_wire", "droppers"} <= given.keys():
+    if slack or not {"messenger_wire", "droppers"} <= table.keys():
         return '; a wire without messenger and droppers, or a rail without tension, is of kind "single"'
     return ""
 
