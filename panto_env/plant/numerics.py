@@ -38,7 +38,7 @@ class Numerics(Settings):
         None,
         description="spans of a flexible catenary or a single wire computed about the train, with an even "
         "number one more ahead than behind; by default 4 to 40, as many as the slowest train needs for the "
-        'waves that come back to it, and 8 at most with accuracy="fast", and of a single wire those in 60 m '
+        'waves that come back to it, and 8 at most with accuracy="fast", and of a single wire those in 90 m '
         "and a damping layer on both sides; several pantographs get as many more as the train "
         "is long; 0: the whole line",
     )
