@@ -16,6 +16,7 @@ from panto_baselines.policies.line_model import mean_of_single
 from panto_env import InputError, simulate
 from panto_env.analysis.single_check import spans_at_rest
 from panto_env.backend import kernel
+from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.catalog.loader import text_of
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact
@@ -365,6 +366,23 @@ def test_what_a_single_wire_has_not_is_refused_in_its_own_words(settings, words)
     with pytest.raises(InputError) as refused:
         simulate(given.pop("catenary"), given.pop("pantograph"), **given)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("numerics", "words"),
+    [({"window": 5}, "A window of 5 spans is short"), ({"spacing": 3.0}, "Elements of 3 m are coarser")],
+)
+def test_a_short_window_and_long_elements_warn(numerics, words):
+    with pytest.warns(AccuracyWarning, match=words):
+        simulate("tram-30", "own-tram", 50.0, spans=24, distance=60.0, **numerics)
+
+
+@pytest.mark.parametrize("speed", [0.0, -5.0, float("nan"), float("inf"), 348.5])
+def test_a_speed_that_no_train_has_is_refused_without_spans_as_with_them(speed):
+    """The number of spans is found before the line is built."""
+    for settings in ({}, {"spans": 24}):
+        with pytest.raises(InputError, match="The speed must lie above 0 and below the wave speed"):
+            simulate("tram-30", "own-tram", speed, **settings)
 
 
 @pytest.mark.parametrize(

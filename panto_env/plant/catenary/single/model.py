@@ -14,7 +14,7 @@ from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..flexible.shape import GRAVITY, solve_band
 from ..protocol import NOTHING, LineView, StartPoint, check_speeds
-from .resolution import Resolution, resolution
+from .resolution import step_and_elements, window_of
 from .schema import SingleData
 from .step import SingleLine, SingleWire, stiffness_terms
 
@@ -51,14 +51,33 @@ class Single:
         refuse_conditions(data, runs.conditions)
         self.wave_speed = data.wave_speed
         check_speeds(data.name, self.wave_speed, runs.speeds)
-        chosen = resolution(data, numerics, runs)
-        self.time_step = chosen.time_step
+        self.time_step, elements = step_and_elements(data, numerics, runs)
         runs.check_wave(self.time_step)
-        window, about_one = chosen.spans_of(spans)
-        self.grid = {"spacing": data.longest_span / chosen.elements, "window": about_one}
+        travelling = window_of(data, numerics.window, runs)
+        window, about_one = travelling.spans_of(spans)
+        self.grid = {"spacing": data.longest_span / elements, "window": about_one}
         self.alignment = alignment = data.alignment(spans)
-        self.line: Any = constants(data, spans, chosen, window, runs.train_length)
-        each, nodes = (lanes, collectors), window * chosen.elements + 1
+        alpha, beta = data.rayleigh
+        wire = data.contact_wire
+        line = SingleLine(
+            alignment=alignment.arrays,
+            elements=elements,
+            window=window,
+            behind=travelling.behind,
+            train=runs.train_length,
+            time_step=self.time_step,
+            mass=wire.mass,
+            tension=wire.tension,
+            bending=wire.bending_stiffness,
+            alpha=alpha,
+            beta=beta,
+            support=np.array([data.support.stiffness, data.support.damping]),
+            layer=travelling.layer(elements, window),
+            rest=np.zeros((0, 2)),
+            free_uplift=data.free_uplift,
+        )
+        self.line: Any = line._replace(rest=shape_at_rest(data, line, alignment.lengths))
+        each, nodes = (lanes, collectors), window * elements + 1
         self.wire: Any = SingleWire(
             first=np.full(lanes, -1),
             element=np.zeros(each, dtype=np.int64),
@@ -130,33 +149,14 @@ def nodes_of(lengths: Array, elements: int) -> Array:
     return np.append(0.0, np.cumsum(np.repeat(lengths / elements, elements)))
 
 
-def constants(data: SingleData, spans: int, chosen: Resolution, window: int, train: float) -> SingleLine:
-    """Constants of the line for kernels, with a window of this many spans."""
-    alignment, wire = data.alignment(spans), data.contact_wire
-    alpha, beta = data.rayleigh
-    line = SingleLine(
-        alignment=alignment.arrays,
-        elements=chosen.elements,
-        window=window,
-        behind=chosen.behind,
-        train=train,
-        time_step=chosen.time_step,
-        mass=wire.mass,
-        tension=wire.tension,
-        bending=wire.bending_stiffness,
-        alpha=alpha,
-        beta=beta,
-        support=np.array([data.support.stiffness, data.support.damping]),
-        layer=chosen.layer(window),
-        rest=np.zeros(0),
-        free_uplift=data.free_uplift,
-    )
-    rest = at_rest(line, alignment.lengths)
+def shape_at_rest(data: SingleData, line: SingleLine, lengths: Array) -> Array:
+    """Heights (m) and slopes (-) of all nodes, (nodes, 2), with a ramp; lengths: of the spans (m)."""
+    rest = at_rest(line, lengths)
     if data.ramp is not None:
-        bent = np.maximum(1 - nodes_of(alignment.lengths, chosen.elements) / data.ramp.length, 0.0)
+        bent = np.maximum(1 - nodes_of(lengths, line.elements) / data.ramp.length, 0.0)
         rest[:, 0] += data.ramp.rise * bent**2
         rest[:, 1] -= 2 * data.ramp.rise / data.ramp.length * bent
-    return line._replace(rest=rest)
+    return rest
 
 
 def lower_diagonals(line: SingleLine, h: Array) -> Array:
