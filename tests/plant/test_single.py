@@ -355,6 +355,8 @@ WORDS = [
         "has no spots or stretches unlike the rest",
     ),
     ({"speed_kmh": 400.0}, "below the wave speed of the contact wire, 348 km/h on line 'tram-30'"),
+    ({"catenary": changed(RAIL, span_length=40.0)}, "would sag by 1.96 m in a span of 40 m"),
+    ({"catenary": changed(TRAM, contact_wire__tension=2e3)}, "more tension or bending_stiffness"),
     ({"catenary": "rail-10", "speed_kmh": 1200.0}, "below 1000 km/h on line 'rail-10'"),
     ({"catenary": changed(TRAM, span_lengths=[25.0, 30.0, 35.0, 30.0]), "spans": 9}, "has 4 span_lengths"),
 ]

@@ -4,10 +4,8 @@ from ..protocol import CatenaryKind
 from . import step as step
 from .model import Single
 from .resolution import clear_spans, warn_if_short
-from .schema import SingleData
+from .schema import SingleData, check_sag
 
 __all__ = ["KIND", "Single", "SingleData"]
 
-KIND = CatenaryKind(
-    SingleData, Single, clear_spans=clear_spans, warn_if_short=warn_if_short, several_collectors=True
-)
+KIND = CatenaryKind(SingleData, Single, check_sag, clear_spans, warn_if_short, several_collectors=True)

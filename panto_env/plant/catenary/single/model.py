@@ -15,7 +15,7 @@ from ...numerics import Numerics, Runs
 from ..flexible.shape import GRAVITY, solve_band
 from ..protocol import NOTHING, LineView, StartPoint, check_speeds
 from .resolution import step_and_elements, window_of
-from .schema import SingleData
+from .schema import SingleData, check_sag
 from .step import SingleLine, SingleWire, stiffness_terms
 
 
@@ -40,14 +40,15 @@ class Single:
     ) -> None:
         """Build the line.
 
-        Raises InputError for conditions that a single wire has not, for a speed that is too high, and where
-        lengths of spans are given for another number of spans.
+        Raises InputError for conditions that a single wire has not, for a speed that is too high, for a sag
+        out of a head's reach, and where lengths of spans are given for another number of spans.
         """
         if data.span_lengths and spans != data.spans:
             raise InputError(
                 f"Line '{data.name}' has {data.spans} span_lengths, so it has no other number of spans: "
                 "leave out spans, or give a shorter distance."
             )
+        check_sag(data)
         refuse_conditions(data, runs.conditions)
         self.wave_speed = data.wave_speed
         check_speeds(data.name, self.wave_speed, runs.speeds)

@@ -8,9 +8,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ....base.errors import InputError
+from ....base.errors import InputError, beside
 from ....base.settings import Between, Settings
 from ...alignment import Alignment
+from ...state import HEAD_RANGE
+from ..flexible.shape import GRAVITY
 from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, SpanLength
 
 BENT = 0.01  # share of the tension in the restoring force from which bending counts
@@ -155,3 +157,17 @@ class SingleData(CatenaryData):
         last = max(2 * math.pi * DAMPED, 2 * first)
         beta = 2 * own.damping_ratio / (first + last)
         return beta * first * last, beta
+
+
+def check_sag(data: SingleData) -> None:
+    """Raise InputError where the wire would hang lower between its supports than a head may go."""
+    wire, length = data.contact_wire, data.longest_span
+    # Of a beam that cannot turn at its supports, and of a string, as springs side by side.
+    stiffness = 384 * wire.bending_stiffness / length**4 + 8 * wire.tension / length**2
+    sag = GRAVITY * wire.mass / stiffness
+    if sag > HEAD_RANGE:
+        most = beside(sag, HEAD_RANGE, ".2f")
+        raise InputError(
+            f"The contact wire of line '{data.name}' would sag by {most} m in a span of {length:g} m, and a head "
+            f"works within {HEAD_RANGE:g} m: give shorter spans, or more tension or bending_stiffness."
+        )
