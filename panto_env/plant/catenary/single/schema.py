@@ -168,6 +168,6 @@ def check_sag(data: SingleData) -> None:
     if sag > HEAD_RANGE:
         most = beside(sag, HEAD_RANGE, ".2f")
         raise InputError(
-            f"The contact wire of line '{data.name}' would sag by {most} m in a span of {length:g} m, and a head "
-            f"works within {HEAD_RANGE:g} m: give shorter spans, or more tension or bending_stiffness."
+            f"The contact wire of line '{data.name}' would sag by {most} m in a span of {length:g} m, and a "
+            f"head works within {HEAD_RANGE:g} m: give shorter spans, or more tension or bending_stiffness."
         )
