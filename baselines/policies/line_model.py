@@ -19,6 +19,7 @@ from panto_env.base.arrays import Array
 from panto_env.base.errors import InputError
 from panto_env.control.observation import Context
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
+from panto_env.plant.catenary.single import SingleData
 from panto_env.plant.pantograph.schema import STRIP_STIFFNESS, matrices
 
 DELAY, LAG = 0.010, 0.015
@@ -40,16 +41,31 @@ class MeanLine:
 
 
 def mean_line(context: Context) -> MeanLine:
-    """Mean line of an episode, from the closed form. Raises InputError for a line without wires."""
+    """Mean line of an episode, from closed forms. Raises InputError for a line without wires."""
     line = context.catenary
+    if isinstance(line, SingleData):
+        return mean_of_single(line)
     if not isinstance(line, FlexibleCatenaryData):
         raise InputError(
             f"The line '{line.name}' has no wires with mass and tension, which this policy needs for its "
-            "model; choose a line of kind 'flexible', or another policy."
+            "model; choose a line of kind 'flexible' or 'single', or another policy."
         )
     wires = line.contact_wire, line.messenger_wire
     tension, mass = sum(wire.tension for wire in wires), sum(wire.mass for wire in wires)
     return MeanLine(2 * float(np.sqrt(tension * mass)), 6 * tension / line.alignment().mean_length)
+
+
+def mean_of_single(line: SingleData) -> MeanLine:
+    """Mean line of a single wire or a rail.
+
+    The damper is that of a wave two spans long, which bending carries too. The spring is the inverse of the
+    mean yield between supports that do not move, in series with theirs: of a string L / 6 T, of a beam that
+    goes on over its supports about L^3 / 180 EI (L^3 / 90 EI if hinged there, L^3 / 420 EI if held).
+    """
+    wire, length = line.contact_wire, line.alignment().mean_length
+    pull = wire.tension + wire.bending_stiffness * (np.pi / length) ** 2
+    spring = 6 * wire.tension / length + 180 * wire.bending_stiffness / length**3
+    return MeanLine(2 * float(np.sqrt(pull * wire.mass)), 1 / (1 / spring + 1 / line.support.stiffness))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from ..base.files import read_toml
 from ..base.settings import Settings, explain
 from ..plant.catenary import CATENARIES, CatenaryData, check_line
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.schema import LOWEST_TENSION
 from ..plant.pantograph.schema import PantographData, check_at_rest
 from .drawn_lines import DRAWN, DrawnLines
 from .family import LineFamily
@@ -127,6 +128,7 @@ IN_TURN = (
     ({"sequence"}, {"spans"}),
     ({"uplift_over_speed"}, {"aerodynamic_coefficient", "aerodynamic_linear"}),
     ({"ratio", "frequencies"}, {"alpha", "beta"}),
+    ({"span_lengths"}, {"spans"}),
 )
 """Keys that exclude each other: where one is given, those of the other kind are no longer what they were."""
 
@@ -323,7 +325,8 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
             table["base"] = _base(table["base"])
         entry = schema.model_validate(table)
     except ValidationError as error:
-        raise InputError(f"{path} is not a valid entry: {explain(error, schema)}.") from error
+        single = _hint_of_single(table) if schema is FlexibleCatenaryData else ""
+        raise InputError(f"{path} is not a valid entry: {explain(error, schema)}{single}.") from error
     except _TableError as error:
         raise InputError(f"{path} is not a valid entry: {error}.") from error
     try:
@@ -336,6 +339,16 @@ def _entry(family: str, given: Mapping[str, Any], path: Path) -> Any:
     except InputError as error:
         raise InputError(f"{path} is not a valid entry: {error}") from error
     return entry
+
+
+def _hint_of_single(table: Mapping[str, Any]) -> str:
+    """What to do where a flexible line lacks a messenger, droppers or tension, as a tram's or a rail does."""
+    wire = table.get("contact_wire")
+    tension = wire.get("tension") if isinstance(wire, Mapping) else None
+    slack = isinstance(tension, int | float) and tension < LOWEST_TENSION
+    if slack or not {"messenger_wire", "droppers"} <= table.keys():
+        return '; a wire without messenger and droppers, or a rail without tension, is of kind "single"'
+    return ""
 
 
 def _base(source: str) -> Any:

@@ -29,10 +29,23 @@ class Value(NamedTuple):
 
 def values_of(entry: Any) -> list[Value]:
     """All values of a line or a pantograph that are not None."""
+    every = list(leaves(entry))
+    known = {key for key, *_ in every}
+    others = {name: text for name, text in entry.sources.items() if name not in known}
     return [
-        Value(key, value, text, _source(entry.sources, key, given))
-        for key, value, text, given in leaves(entry)
+        Value(key, value, text, _source(entry.sources, key, given) or _of_others(others, key))
+        for key, value, text, given in every
     ]
+
+
+def _of_others(others: Mapping[str, str], key: str) -> str:
+    """Sources of what a value was computed from: other keys of its table, such as damping.ratio for alpha."""
+    table = key.rpartition(".")[0]
+    return "; ".join(
+        f"{name.rpartition('.')[2]}: {text}"
+        for name, text in others.items()
+        if table and name.rpartition(".")[0] == table
+    )
 
 
 def _source(sources: Mapping[str, str], key: str, given: bool) -> str:

@@ -13,6 +13,7 @@ from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, s
 from ..analysis.line_plan import line_plan
 from ..analysis.options import print_criteria
 from ..analysis.plots import plot_line, save
+from ..analysis.single_check import spans_at_rest, table_at_rest
 from ..base.errors import InputError
 from ..base.files import write_text
 from ..base.settings import parse
@@ -23,10 +24,27 @@ from ..control.lines import line_of_seed
 from ..plant.catenary.flexible.as_run import as_run, as_run_tables
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.flexible.static import dropper_table
+from ..plant.catenary.single import SingleData
 from ..plant.line_condition import LINE_CONDITIONS, NEW, LineCondition, together
 from ..terminal import Json, Plot, alert, console, counting, into_file, print_json, print_table, written_last
 from .identify import given
 from .records import Heading, Unit
+
+
+def show_single(chosen: SingleData, line_condition: str, plot: str | None, json: bool) -> None:
+    """Print a single wire or a rail at rest. Raises InputError for what only other lines have at rest."""
+    if plot is not None or line_condition != "new":
+        option = "--plot" if plot is not None else "--line-condition"
+        raise InputError(
+            f"Line '{chosen.name}' is a single wire or rail, of which only a table at rest is shown; leave "
+            f"out {option}."
+        )
+    found = spans_at_rest(chosen)
+    if json:
+        spans = [each._asdict() for each in found]
+        print_json({"line": chosen.model_dump(mode="json"), "spans": spans})
+    else:
+        print_table(table_at_rest(chosen, found))
 
 
 def line(
@@ -77,6 +95,9 @@ def line(
         chosen, *_ = line_of_seed(load_drawn(name), seed)
     else:
         chosen = load_catenary(name)
+    if isinstance(chosen, SingleData):
+        show_single(chosen, line_condition, plot, json)
+        return
     if not isinstance(chosen, FlexibleCatenaryData):
         raise InputError(f"Line '{chosen.name}' has no spans with droppers to show; name a flexible line.")
     found = check(chosen, force)

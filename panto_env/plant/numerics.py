@@ -31,14 +31,15 @@ class Numerics(Settings):
     )
     spacing: Annotated[float, Between(1e-3, 1000, "m")] | None = Field(
         None,
-        description="grid of the flexible catenary (m), instead of the one for the accuracy; "
-        "rounded down to the next one with a multiple of 8 nodes per span",
+        description="grid of a flexible catenary or a single wire (m), instead of the one for the accuracy; "
+        "rounded down to the next one with a multiple of 8 nodes per span (of a single wire: any number)",
     )
     window: Annotated[int, Between(0, 1000)] | None = Field(
         None,
-        description="spans of the flexible catenary computed about the train, with an even number one more "
-        "ahead than behind; by default 4 to 40, as many as the slowest train needs for the waves that come "
-        'back to it, and 8 at most with accuracy="fast"; several pantographs get as many more as the train '
+        description="spans of a flexible catenary or a single wire computed about the train, with an even "
+        "number one more ahead than behind; by default 4 to 40, as many as the slowest train needs for the "
+        'waves that come back to it, and 8 at most with accuracy="fast", and of a single wire those in 90 m '
+        "and a damping layer on both sides; several pantographs get as many more as the train "
         "is long; 0: the whole line",
     )
     precision: Literal["single", "double"] = Field(

@@ -21,6 +21,7 @@ from ..metrics.low_pass import amplitudes
 from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
+from ..plant.catenary.single import SingleData
 from ..terminal import number
 from .likeness import check_period
 from .record import ABOVE, Record, Samples
@@ -197,6 +198,7 @@ def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) 
     facts = LineFacts(system_source="own choice, as no line is given")
     if line is not None:
         wave = line.contact_wire.wave_speed if isinstance(line, FlexibleCatenaryData) else math.inf
+        wave = line.wave_speed if isinstance(line, SingleData) else wave
         facts = LineFacts.of(line, wave, speed)
     figures, none = replace(part.figures, max_uplift=uplift), np.zeros(0)
     found = compliance(figures, part.arcing, facts, speed, none, none)

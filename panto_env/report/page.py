@@ -49,7 +49,7 @@ LEFT_OUT = (
     "sideways waves: stagger, curves and wind act through steady arms whose length is given, at rest",
     "wind on stitch wires, droppers and arms, waves of pressure in tunnels; ice and temperature that differ "
     "along the line",
-    "rigid rails and third rails",
+    "third rails",
     "pitch of the collector head and its two strips: it is touched at one point; roll where none is given",
     "motion of the vehicle and of the track",
     "longitudinal motion of droppers and arms, large rotations: motion is linear about the static shape, but "

@@ -124,7 +124,13 @@ def test_the_page_says_it_and_is_the_same_twice(found):
     # What is left out is the same list in the documents and in every report.
     section = (DOCS / "validation.md").read_text(encoding="utf-8").split("## What the model leaves out\n\n")
     assert [" ".join(each.split()) for each in section[1].split("\n- ")[1:]] == list(LEFT_OUT)
-    assert set(CATENARIES) == {"flexible", "three_span", "periodic_stiffness", "rig"}  # no rigid rail
+    assert set(CATENARIES) == {
+        "flexible",
+        "three_span",
+        "periodic_stiffness",
+        "rig",
+        "single",
+    }  # no third rail
     shown = re.search(r'<ul id="left-out">(.*?)</ul>', text, re.DOTALL)[1]
     assert [html.unescape(each) for each in re.findall("<li>(.*?)</li>", shown)] == list(LEFT_OUT)
     # Lengths, forces and stretches of the line as designed, for each dropper of a span.

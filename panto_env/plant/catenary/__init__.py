@@ -27,6 +27,7 @@ KINDS = [
     "three_span",
     "periodic_stiffness",
     "rig",
+    "single",
 ]
 """Values of ``kind`` in a line's TOML file: the names of the modules."""
 CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__).KIND for name in KINDS}
@@ -42,6 +43,6 @@ def check_collectors(line: CatenaryData, count: int) -> None:
     """Raise InputError where a line cannot carry waves between this many collectors."""
     if count > 1 and not CATENARIES[line.kind].several_collectors:
         raise InputError(
-            f"Several pantographs need a flexible catenary, whose waves run from one to the other, and line "
-            f"'{line.name}' is not one; give one pantograph, or another line."
+            "Several pantographs need a flexible catenary or a single wire, whose waves run from one to the "
+            f"other, and line '{line.name}' is neither; give one pantograph, or another line."
         )

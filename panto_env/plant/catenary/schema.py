@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from ...base.arrays import Array
 from ...base.errors import InputError, shown
-from ...base.settings import Between, Settings
+from ...base.settings import Between, Settings, parse
 from ..alignment import Alignment
 from ..line_condition import LineCondition
 from ..state import FREE_UPLIFT
@@ -140,6 +140,41 @@ class CatenaryData(Settings):
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Reflection coefficients of a dropper and of a support at a frequency (Hz); nan for none."""
         return math.nan, math.nan
+
+
+class DampingRatio(Settings):
+    """Damping by its ratio, which it has at two frequencies."""
+
+    ratio: Annotated[float, Between(0, 0.5)] = Field(
+        description="of both frequencies to critical damping (-)"
+    )
+    frequencies: tuple[
+        Annotated[float, Between(0.05, 500, "Hz")], Annotated[float, Between(0.05, 500, "Hz")]
+    ] = Field(description="at which damping has this ratio (Hz); it is less between them, more beyond")
+
+    @property
+    def of_rayleigh(self) -> dict[str, float]:
+        """Coefficients alpha (1/s) and beta (s): the ratio at omega is alpha / (2 omega) + beta omega / 2."""
+        low, high = (2 * math.pi * each for each in self.frequencies)
+        beta = 2 * self.ratio / (low + high)
+        return {"alpha": beta * low * high, "beta": beta}
+
+
+class Rayleigh(Settings):
+    """Damping matrix alpha M + beta K; the coefficients, or the ratio of which they follow."""
+
+    alpha: Annotated[float, Between(0, 50, "1/s")] = Field(description="mass-proportional damping (1/s)")
+    beta: Annotated[float, Between(0, 0.1, "s")] = Field(description="stiffness-proportional damping (s)")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_ratio(cls, values: Any) -> Any:
+        by_ratio = isinstance(values, Mapping) and not values.keys().isdisjoint(DampingRatio.model_fields)
+        if not by_ratio:
+            return values
+        if not values.keys().isdisjoint(cls.model_fields):
+            raise InputError("Give damping either alpha and beta, or ratio and frequencies, not both.")
+        return parse(DampingRatio, values, "damping").of_rayleigh
 
 
 LOWEST_TENSION = 500.0  # N

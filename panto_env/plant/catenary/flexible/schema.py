@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ....base.arrays import Array
 from ....base.errors import InputError
-from ....base.settings import Between, Settings
 from ...alignment import Alignment
 from ...line_condition import LineCondition
-from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData
+from ..schema import FEWEST_SPANS, MOST_SPANS, CatenaryData, Rayleigh
 from .layout import Layout, layout_of, stitch_at_end
 from .parts import (
     CLOSEST,
@@ -34,7 +33,7 @@ from .parts import (
     check_inside,
 )
 from .points import Point
-from .spans import laid_out, valid
+from .spans import laid_out
 
 __all__ = [
     "CLOSEST",
@@ -50,41 +49,6 @@ __all__ = [
 ]
 
 SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}  # values of a line whose spans differ
-
-
-class DampingRatio(Settings):
-    """Damping by its ratio, which it has at two frequencies."""
-
-    ratio: Annotated[float, Between(0, 0.5)] = Field(
-        description="of both frequencies to critical damping (-)"
-    )
-    frequencies: tuple[
-        Annotated[float, Between(0.05, 500, "Hz")], Annotated[float, Between(0.05, 500, "Hz")]
-    ] = Field(description="at which damping has this ratio (Hz); it is less between them, more beyond")
-
-    @property
-    def of_rayleigh(self) -> dict[str, float]:
-        """Coefficients alpha (1/s) and beta (s): the ratio at omega is alpha / (2 omega) + beta omega / 2."""
-        low, high = (2 * math.pi * each for each in self.frequencies)
-        beta = 2 * self.ratio / (low + high)
-        return {"alpha": beta * low * high, "beta": beta}
-
-
-class Rayleigh(Settings):
-    """Damping matrix alpha M + beta K; the coefficients, or the ratio of which they follow."""
-
-    alpha: Annotated[float, Between(0, 50, "1/s")] = Field(description="mass-proportional damping (1/s)")
-    beta: Annotated[float, Between(0, 0.1, "s")] = Field(description="stiffness-proportional damping (s)")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _by_ratio(cls, values: Any) -> Any:
-        by_ratio = isinstance(values, Mapping) and not values.keys().isdisjoint(DampingRatio.model_fields)
-        if not by_ratio:
-            return values
-        if not values.keys().isdisjoint(cls.model_fields):
-            raise InputError("Give damping either alpha and beta, or ratio and frequencies, not both.")
-        return valid(DampingRatio, values, "").of_rayleigh
 
 
 class FlexibleCatenaryData(CatenaryData):
