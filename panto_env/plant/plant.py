@@ -75,8 +75,8 @@ class Plant:
         )
         if bilateral and self.model.wires_per_collector > 1:
             raise InputError(
-                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has overlaps "
-                "of two; take a line without overlaps."
+                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has two, if "
+                "only in overlaps; take a line of one contact wire without overlaps."
             )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
@@ -154,7 +154,7 @@ class Plant:
     def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
         own = self.train.collectors[collector]
         reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
-        constants = parts(pantograph, self.model, reflected)
+        constants = parts(pantograph, self.model, reflected, self.catenary.wires_touched)
         self.pantographs.table[collector, lanes, : len(constants)] = constants
 
     def start(
@@ -215,6 +215,7 @@ class Plant:
         for lane, pantograph in zip(lanes, pantographs, strict=False):
             self._set_pantograph(collector, lane, pantograph)
         strip = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
+        strip /= self.catenary.wires_touched
         compliance = strip + wire + spring
         speeds = self.speed[lanes]
         nominal_forces = own.pantograph.nominal_force(speeds)

@@ -25,6 +25,7 @@ from .plan import in_wind
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
+from .two_wires import check_condition
 from .view import view_of
 from .wire_defects import locate
 
@@ -67,7 +68,7 @@ class DefectiveParts:
         """Limits of a pair's contact wire's pieces (m), and their number."""
         if len(self._parts) == 1:
             own = self.lines[0]
-            return (np.zeros(0), 0) if pair else (own.breaks, own.pieces)
+            return (own.breaks, own.pieces) if pair < own.wires else (np.zeros(0), 0)
         breaks = [0.0]
         for k, (part, own) in enumerate(zip(self._parts, self.lines, strict=True)):
             if part.pair == pair:
@@ -108,7 +109,8 @@ class DefectiveParts:
                 None if heights is None else heights[part.inner],
             )
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
-            rises[part.pair][its_rise] = state.rise
+            for wire, rise in enumerate((state.rise, *state.further)):
+                rises[part.pair + wire][its_rise] = rise
         line.link_static[row], line.link_gap[row] = tension, gap
         line.rise_decay[row] = self.lines[0].decay
         return tension
@@ -136,7 +138,7 @@ Own = tuple[StaticShape, Tensioned, DefectiveParts]
 
 
 class FlexibleCatenary:
-    """Two tensioned beams with droppers between them; a run starts at the line's first anchor."""
+    """Tensioned beams with droppers between them; a run starts at the line's first anchor."""
 
     massless = False
     contact_share = (
@@ -172,6 +174,8 @@ class FlexibleCatenary:
         if data is not designed:
             shape = shape_left(designed, data)
         self.layout = layout = data.layout(spans)
+        for each in runs.conditions:
+            check_condition(designed, each)
         own = locate(designed.layout(spans), condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
@@ -191,7 +195,7 @@ class FlexibleCatenary:
         self.alignment = alignment = layout.alignment
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
-        self.supports = alignment.support(np.arange(1, spans))
+        self.supports = np.repeat(alignment.support(np.arange(1, spans)), designed.contact_wires)
         self.droppers = layout.positions
         self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.

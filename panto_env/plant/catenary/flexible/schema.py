@@ -32,6 +32,7 @@ from .parts import (
     check_inside,
 )
 from .spans import laid_out
+from .two_wires import check_contact_wires
 
 __all__ = [
     "CLOSEST",
@@ -65,6 +66,11 @@ class FlexibleCatenaryData(CatenaryData):
 
     kind: Literal["flexible"] = "flexible"
     encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
+    contact_wires: Literal[1, 2] = Field(
+        1,
+        description="contact wires side by side, each with droppers and steady arms of its own: contact_wire "
+        "and steady_arm are then one wire's",
+    )
     contact_wire: Conductor
     messenger_wire: Conductor
     droppers: Droppers
@@ -131,6 +137,7 @@ class FlexibleCatenaryData(CatenaryData):
         if isinstance(end, Mapping) and isinstance(given, Mapping) and isinstance(own, Mapping):
             table["end_support"] = {**end, "stitch_wire": {**own, **given}}
         line = handler(table)
+        check_contact_wires(line)
         if not line.sequence:
             if line.span_types or line.end_support is not None or line.overlaps:
                 raise InputError(
@@ -202,7 +209,12 @@ class FlexibleCatenaryData(CatenaryData):
     @property
     def one_by_one(self) -> bool:
         """Whether what hangs on the wires is laid out on the grid one by one, not in equal rows."""
-        return bool(self.sequence) or self.stitch_wire is not None
+        return bool(self.sequence) or self.stitch_wire is not None or self.contact_wires > 1
+
+    @property
+    def wires_touched(self) -> int:
+        """Number of contact wires side by side all along the line."""
+        return self.contact_wires
 
     @property
     def period(self) -> float:

@@ -189,6 +189,11 @@ class Rig:
             )
         if any(condition.wind or condition.side_wind for condition in runs.conditions):
             raise InputError(f"No wind blows on a rig; leave it out, or use another line than '{data.name}'.")
+        if data.line.wires_touched > 1:
+            raise InputError(
+                f"The cylinder of rig '{data.name}' follows one contact wire, and its line has two side by "
+                "side; take one equivalent wire of both."
+            )
         if getattr(data.line, "overlaps", ()):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows one contact wire, and its line has overlaps of "
