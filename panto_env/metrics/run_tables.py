@@ -55,9 +55,9 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     for name, places, unit in measured:
         for k, (column, place) in enumerate(zip(getattr(run, name).T, places, strict=False)):
             if place <= run.distance:
-                second = k > 0 and place == places[k - 1]  # of two contact wires
+                whose = " of wire 2" if k > 0 and place == places[k - 1] else ""  # of two contact wires
                 columns[f"{name}_{k}"] = column
-                headings[f"{name}_{k}"] = f"{name}{' of wire 2' * second} at {place:.6g} m ({unit})"
+                headings[f"{name}_{k}"] = f"{name}{whose} at {place:.6g} m ({unit})"
     return Sheet("run", columns, headings)
 
 
