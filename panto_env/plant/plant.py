@@ -74,9 +74,10 @@ class Plant:
             runs=runs,
         )
         if bilateral and self.model.wires_per_collector > 1:
+            two = "two side by side" if catenary.wires_touched > 1 else "overlaps of two"
             raise InputError(
-                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has two, if "
-                "only in overlaps; take a line of one contact wire without overlaps."
+                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has {two}; "
+                "take a line of one contact wire without overlaps."
             )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)

@@ -31,9 +31,9 @@ IN_PROOFS = ("far apart, 160 km/h",)
 def made(name):
     """Section, runs of its collectors by the simulator, and by the judge."""
     speed, droppers, count = CASES[name]
-    one = section(speed)
+    one = replace(section(speed), element=0.5)
     if droppers == "in pairs":
-        one = replace(one, line=paired(), element=0.5)
+        one = replace(one, line=paired())
     behind = [BEHIND] * (count - 1)
     train = {"pantographs": [one.pantograph] * 2, "distances": behind} if behind else {}
     run = simulate(
@@ -59,7 +59,7 @@ def test_figures_of_both_wires_are_those_of_finite_elements(name):
             assert getattr(own, key) == pytest.approx(getattr(other, key), rel=0.03), key
         assert own.loss_percent == other.loss_percent == 0
     supports = slice(one.spans[0] - 2, one.spans[1])
-    per_wire = np.split(theirs[0].uplift.max(axis=0), 2)
-    for wire, judged in enumerate(per_wire):
-        uplift = ours[0].uplift[:, wire::2].max(axis=0)[supports]
-        np.testing.assert_allclose(uplift, judged[supports], rtol=0.03)
+    for uplift, judged in zip(
+        *(np.split(each[0].uplift.max(axis=0), 2) for each in (ours, theirs)), strict=True
+    ):
+        np.testing.assert_allclose(uplift[supports], judged[supports], rtol=0.03)

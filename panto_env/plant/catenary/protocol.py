@@ -75,7 +75,9 @@ class CatenaryModel(Protocol):
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # maximum distance of a run (m)
     usual_end: float  # default distance of a run (m)
-    supports: Array  # (supports,): positions whose uplift is recorded (m), twice each with two contact wires
+    supports: (
+        Array  # (supports,): positions whose uplift is recorded (m), of a second contact wire behind all
+    )
     droppers: Array  # (droppers,): positions (m)
     start_point: StartPoint
 

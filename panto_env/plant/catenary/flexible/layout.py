@@ -174,7 +174,9 @@ class Layout:
     @cached_property
     def held(self) -> Index:
         """Number, from 0, of the contact wire side by side that each dropper holds, (droppers,)."""
-        return np.array([dropper.pair for dropper in self._in_spans])
+        if self.line.overlaps:
+            return np.zeros(len(self.droppers), dtype=np.int64)
+        return np.array([dropper.pair for dropper in self.droppers])
 
     @cached_property
     def _numbers(self) -> dict[tuple[int, int], int]:

@@ -195,7 +195,7 @@ class FlexibleCatenary:
         self.alignment = alignment = layout.alignment
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
-        self.supports = np.repeat(alignment.support(np.arange(1, spans)), designed.contact_wires)
+        self.supports = np.tile(alignment.support(np.arange(1, spans)), designed.contact_wires)
         self.droppers = layout.positions
         self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.

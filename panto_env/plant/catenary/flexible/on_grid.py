@@ -103,11 +103,11 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
 def _of_second_wire(first: Springs) -> Springs:
     """The same steady arms on a second contact wire: under its messenger, which is none, is no support.
 
-    At each mast the uplift of both is recorded, one after the other.
+    Its uplift is recorded behind that of the first wire at all masts.
     """
     levels = first.levels.copy()
     levels[1::2] = 0.0
-    return first._replace(number=2 * first.number + 1, wire=first.wire + 2, levels=levels)
+    return first._replace(number=first.number + first.masts, wire=first.wire + 2, levels=levels)
 
 
 def _joined_springs(each: Sequence[Springs]) -> Springs:
@@ -285,7 +285,7 @@ def on_grid(
     ]
     if data.contact_wires > 1:
         (arms,) = held_by
-        held_by = [arms._replace(number=2 * arms.number), _of_second_wire(arms)]
+        held_by = [arms, _of_second_wire(arms)]
     springs = _joined_springs(held_by)
     over = shape.over(len(layout.spans))
     links = _links_of(layout, over)

@@ -228,8 +228,13 @@ class FlexibleCatenaryData(CatenaryData):
 
     @property
     def wires(self) -> tuple[Conductor, Conductor]:
-        """Contact wire and messenger."""
+        """Contact wire, of two side by side one, and messenger."""
         return self.contact_wire, self.messenger_wire
+
+    @property
+    def every_wire(self) -> tuple[Conductor, ...]:
+        """All contact wires and the messenger."""
+        return (*(self.contact_wire,) * self.contact_wires, self.messenger_wire)
 
     def reflections(self, frequency: float) -> tuple[float, float]:
         """Share of a wave on the contact wire that comes back from a dropper and from a steady arm.

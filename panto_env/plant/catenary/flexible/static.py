@@ -236,15 +236,17 @@ class RestingDropper(NamedTuple):
     static_force: float  # at the contact wire, clamp and half its own weight included (N)
     stretch: float  # under the static force (m)
     span: int = 1  # number of its span, from 1; 1 where all are alike
+    wire: int = 1  # contact wire that it holds, of two
 
 
 def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str] = str) -> Table:
     """The droppers as a table to print, with sag and stretch in millimetres; name: of a span's number."""
-    differ = any(each.span > 1 for each in droppers)
+    differ, both = any(each.span > 1 for each in droppers), any(each.wire > 1 for each in droppers)
     rows = [
         (
             *([name(each.span)] if differ else []),
             str(each.number),
+            *([str(each.wire)] if both else []),
             f"{each.position:g}" if not differ else f"{each.position:.3f}",
             f"{1e3 * each.sag:.1f}",
             f"{each.length:.4f}",
@@ -254,18 +256,22 @@ def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str]
         for each in droppers
     ]
     in_mm = HEADINGS | {"sag": "sag (mm)", "stretch": "stretch at rest (mm)"}
-    headings = (*(["span"] if differ else []), "dropper", *in_mm.values())
+    headings = (*(["span"] if differ else []), "dropper", *(["wire"] if both else []), *in_mm.values())
     title = f"Droppers of {'all spans' if differ else 'a span'} at rest, as designed"
     last = [k for k, each in enumerate(droppers[1:]) if each.span != droppers[k].span]
     return Table(title, headings, rows, text_columns=0, section_ends=tuple(last))
 
 
 def as_rows(droppers: Sequence[RestingDropper]) -> list[dict[str, Any]]:
-    """The droppers as rows of a table to write; numbers of spans are among them only where spans differ."""
+    """The droppers as rows of a table to write.
+
+    Numbers of spans are among them only where spans differ, those of contact wires where there are two.
+    """
     rows = [each._asdict() for each in droppers]
-    if not any(each.span > 1 for each in droppers):
-        for row in rows:
-            del row["span"]
+    for key in ("span", "wire"):
+        if not any(row[key] > 1 for row in rows):
+            for row in rows:
+                del row[key]
     return rows
 
 
@@ -277,10 +283,10 @@ def droppers_at_rest(line: Any) -> list[RestingDropper]:
     line = getattr(line, "line", line)  # of a rig
     if not isinstance(line, FlexibleCatenaryData):
         return []
-    shape = hang(line)
+    shape, layout = hang(line), line.layout(1)
     stretch = shape.dropper_tension / shape.dropper_stiffness
     values = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
     return [
-        RestingDropper(own.number, own.place, own.sag, *of_own, own.span)
-        for own, of_own in zip(line.layout(1).droppers, values, strict=True)
+        RestingDropper(own.number, own.place, own.sag, *of_own, own.span, 1 + held)
+        for own, of_own, held in zip(layout.droppers, values, layout.held.tolist(), strict=True)
     ]
