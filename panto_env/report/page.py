@@ -45,7 +45,7 @@ def page_template(package: str, **filters: Callable[..., Any]) -> Template:
 
 LEFT_OUT = (
     "section insulators, crossings and neutral sections",
-    "two contact wires whose droppers alternate: they are one equivalent wire",
+    "two contact wires where the line gives one equivalent wire; with both, their distance across the head",
     "sideways waves: stagger, curves and wind act through steady arms whose length is given, at rest",
     "wind on stitch wires, droppers and arms, tunnels; ice and temperature that differ along the line",
     "rigid rails and third rails",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -123,6 +124,7 @@ def compare_twins() -> None:
         rows = {
             "finite differences, one wire": (one.by_simulator(), ()),
             "finite elements, one wire": (one.by_finite_elements(), ()),
+            "finite differences, two wires": (replace(one, line=twin.two_wires(one.line)).by_simulator(), ()),
             "finite elements, two wires": (twins, own),
         }
         for model, (run, more) in rows.items():

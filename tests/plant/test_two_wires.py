@@ -6,7 +6,7 @@ Finite elements of both wires are in ``tests/finite_element/test_two_wires.py``.
 import numpy as np
 import pytest
 
-from panto_env import InputError, simulate
+from panto_env import InputError, Trajectory, simulate
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.metrics.run_tables import samples as table_of
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
@@ -183,11 +183,15 @@ def test_the_head_shares_its_force_between_the_wires():
         Plant(FAR, Train.of(DSA), runs=Runs((44.0, 44.0)), bilateral=True)
 
 
-def test_records_and_pictures_show_both_wires():
+def test_records_and_pictures_show_both_wires(tmp_path):
     run = simulate(CA, DSA, 160.0, distance=1000.0)
     assert run.uplift.shape[1] == 2 * (run.alignment.spans - 1) == len(run.support_position)
     both = run.uplift[:, [11, 11 + run.alignment.spans - 1]].max(axis=0)
     assert abs(both[1] / both[0] - 1) > 1e-3
+    run.save(tmp_path / "run.parquet")
+    again = Trajectory.load(tmp_path / "run.parquet")
+    np.testing.assert_array_equal(again.uplift, run.uplift)
+    np.testing.assert_array_equal(again.support_position, run.support_position)
     found = {number: uplift for number, _, uplift in Findings(run, "run.parquet").uplifts}
     assert found[12] == both.max()
     near = (run.support_position >= 600.0) & (run.support_position <= 720.0)
@@ -230,7 +234,11 @@ def test_elasticity_is_that_of_a_force_shared_by_both():
             {"contact_wire": CA.contact_wire.model_dump(exclude_none=True) | {"axial_stiffness": 1e7}},
             "with wires that are fixed at both ends",
         ),
-        ({"contact_wires": 1}, "have a wire each, but it has one contact wire; give contact_wires = 2"),
+        (
+            {"contact_wires": 1, "droppers": {"spacing": 6.0, "stiffness": 1e5, "wire": [1, 2] * 5}},
+            "have a wire each, but it has one contact wire; give contact_wires = 2",
+        ),
+        ({"plan": {"stagger": [0.2, -0.2]}}, "not computed with a plan"),
         ({"contact_wires": 3}, "contact_wires"),
         (
             {"droppers": {"spacing": 6.0, "stiffness": 1e5, "wire": [2] * 10}},

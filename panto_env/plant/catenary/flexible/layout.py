@@ -21,7 +21,7 @@ from ...alignment import Alignment
 from ..schema import FEWEST_SPANS, Wire
 from .parts import CLOSEST, SAME, Droppers, Overlap, Span, StitchWire, nearer
 from .spans import in_sequence, valid
-from .two_wires import held_wires
+from .two_wires import hung
 
 if TYPE_CHECKING:
     from .schema import FlexibleCatenaryData
@@ -155,15 +155,7 @@ class Layout:
         return tuple(
             Dropper(k, number, begin + place, place, sag, span.droppers, wire)
             for k, (begin, span) in enumerate(zip(self.supports, self.spans, strict=False), start=1)
-            for number, (place, sag, wire) in enumerate(
-                zip(
-                    span.droppers.positions,
-                    span.droppers.sag,
-                    held_wires(span.droppers, self.line.contact_wires),
-                    strict=True,
-                ),
-                start=1,
-            )
+            for number, (place, sag, wire) in enumerate(hung(span.droppers, self.line.contact_wires), start=1)
         )
 
     @cached_property

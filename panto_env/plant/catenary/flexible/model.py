@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -211,7 +212,9 @@ class FlexibleCatenary:
             both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
             for (was, now), line in zip(both, self._defective[condition].lines, strict=True):
                 shape = shape_left(was.layout.line, now.layout.line)
-                check_loaded(now.layout, shape, line.rise(line.solve()))
+                state = line.solve()
+                for wire, (contact, _) in enumerate(shape.contacts):
+                    check_loaded(now.layout, replace(shape, contact=contact), line.rise(state, wire))
         if any(each.side_wind for each in runs.conditions):
             air = air_about(self.line, data.wires, condition.ice, self.time_step)
             self.line = self.line._replace(air=air)

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 INSTEAD = "contact_wires = 1, with one equivalent wire of twice the mass, tension and bending stiffness"
 
 
-def held_wires(droppers: Droppers, contact_wires: int) -> list[int]:
-    """Number, from 0, of the contact wire that each dropper of a span holds."""
-    given = droppers.wire or [1 + k % contact_wires for k in range(len(droppers.positions))]
-    return [number - 1 for number in given]
+def hung(droppers: Droppers, contact_wires: int) -> list[tuple[float, float, int]]:
+    """Place and sag (m) of each dropper of a span, and number, from 0, of the contact wire that it holds."""
+    wires = droppers.wire or [1 + k % contact_wires for k in range(len(droppers.positions))]
+    each = zip(droppers.positions, droppers.sag, wires, strict=True)
+    return [(place, sag, wire - 1) for place, sag, wire in each]
 
 
 def check_contact_wires(line: FlexibleCatenaryData) -> None:
@@ -35,7 +36,7 @@ def check_contact_wires(line: FlexibleCatenaryData) -> None:
             )
         return
     for number, span in enumerate(spans, start=1):
-        if len(set(held_wires(span.droppers, 2))) < 2:
+        if len({wire for *_, wire in hung(span.droppers, 2)}) < 2:
             raise InputError(
                 f"In span {number} of {name} the droppers hold one of its two contact wires only; give both "
                 "some in droppers.wire."
@@ -44,6 +45,7 @@ def check_contact_wires(line: FlexibleCatenaryData) -> None:
     wires = {
         "stitch wires": stitched,
         "overlaps": bool(line.overlaps),
+        "a plan": line.plan is not None or any(mast.stagger is not None for mast in line.masts),
         "steady arms whose length is given": line.arms_by_plan,
         "wires that are fixed at both ends": any(wire.axial_stiffness is not None for wire in line.wires),
     }
