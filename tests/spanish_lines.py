@@ -138,22 +138,23 @@ def tables() -> list[Table]:
             differ = (100 * (each / told - 1) for each, told in zip(armed, own.elasticity, strict=True))
             cells = (
                 "{:.2f} / {:.2f}".format(*own.elasticity),
+                "{:.3f} / {:.3f}".format(*plain),
                 "{:.3f} / {:.3f}".format(*yields(name, arm=False, both=True)) if own.wires == 2 else "–",
-                *("{:.3f} / {:.3f}".format(*each) for each in (plain, armed)),
+                "{:.3f} / {:.3f}".format(*armed),
             )
             rows.append((name, *cells, "{:+.0f} / {:+.0f}".format(*differ)))
         lifts = [uplift(name, arm, count) for arm in (False, True) for count in (1, 2)]
         off = [100 * (each / own.uplift - 1) for each in lifts[2:]]
         cells = (
+            "{:.1f} / {:.1f}".format(*lifts[:2]),
             "{:.1f} / {:.1f}".format(*(uplift(name, False, count, both=True) for count in (1, 2)))
             if own.wires == 2
             else "–",
-            "{:.1f} / {:.1f}".format(*lifts[:2]),
             "{:.1f} / {:.1f}".format(*lifts[2:]),
             "{:+.0f} / {:+.0f}".format(*off),
         )
         lifted.append((name, f"{own.speed:g}", f"{own.uplift:g}", *cells))
-    both = ("published", "both wires, without arm", "without arm", "arm as pendulum", "difference (%)")
+    both = ("published", "without arm", "without arm, both wires", "arm as pendulum", "difference (%)")
     return [
         Table("Elasticity at 100 N, mid-span / support (mm/N)", ("line", *both), rows),
         Table(

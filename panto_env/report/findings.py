@@ -171,14 +171,10 @@ class Findings:
         """
         run = self.run
         begin, end = run.position[self.inside][[0, -1]]
-        stride = 1.5 * run.stride
+        stride, places = 1.5 * run.stride, run.support_position[: run.uplift.shape[1]]
         return [
-            (
-                round(run.alignment.in_spans(place)),
-                float(place),
-                float(run.uplift[:, run.support_position == place].max()),
-            )
-            for place in np.unique(run.support_position[: run.uplift.shape[1]])
+            (round(run.alignment.in_spans(place)), float(place), float(run.uplift[:, places == place].max()))
+            for place in np.unique(places)
             if begin - stride <= place <= end + stride
         ]
 

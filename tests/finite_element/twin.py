@@ -188,11 +188,18 @@ def along_twins(one: Section, kind: str, element: float | None = None) -> Result
 
 
 def train_along_twins(
-    one: Section, kind: str, behind: Sequence[float] = (), element: float | None = None
+    one: Section,
+    kind: str,
+    behind: Sequence[float] = (),
+    element: float | None = None,
+    time_step: float | None = None,
 ) -> list[Result]:
-    """The same of several like pantographs; behind: distances of further ones from the first (m)."""
+    """The same of several like pantographs; behind: distances of further ones from the first (m).
+
+    time_step: s, by default as many milliseconds as elements have metres.
+    """
     element = element or one.element
     system = tied(*halves(one.line, kind, element))
     collectors = [Collector(on_both(one.pantograph), each) for each in (0.0, *behind)]
     distance = one.distance + max(behind, default=0.0)
-    return ride_together(system, collectors, one.speed_kmh, 1e-3 * element, distance)
+    return ride_together(system, collectors, one.speed_kmh, time_step or 1e-3 * element, distance)
