@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -212,12 +213,11 @@ class Plant:
         static_forces: Array | None,
     ) -> Array:
         """Rows of a collector in lanes, (n, rows), at rest at the start; heights: of the wire there (m)."""
-        own, run, (_, wire, spring) = self.train.collectors[collector], self.run, self.model.start_point
+        own, run, start = self.train.collectors[collector], self.run, self.model.start_point
         for lane, pantograph in zip(lanes, pantographs, strict=False):
             self._set_pantograph(collector, lane, pantograph)
-        strip = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
-        strip /= self.catenary.wires_touched
-        compliance = strip + wire + spring
+        strip: Any = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
+        compliance: Any = strip + start.wire_compliance + start.spring_compliance
         speeds = self.speed[lanes]
         nominal_forces = own.pantograph.nominal_force(speeds)
         if static_forces is not None:
@@ -229,7 +229,16 @@ class Plant:
         by_wind = run.aerodynamic[collector] * wind * (2 * now + wind)
         begin = run.levels[:1].sum()  # height there; 0 on a level line
         by_height = np.array([each.lift_over(begin) for each in pantographs or [own.pantograph]])
-        state = rest_state(pantographs or own.pantograph, lifts + by_wind + by_height, heights, compliance)
+        rest = partial(rest_state, pantographs or own.pantograph, lifts + by_wind + by_height)
+        state = rest(heights, compliance)
+        if self.catenary.wires_touched > 1:  # the lower wire alone is touched, or both
+            above = heights + max(start.apart, 0.0)
+            lower, middle = heights + min(start.apart, 0.0), heights + start.apart / 2
+            one, both = rest(lower, compliance), rest(middle, compliance / 2)
+            touched = both[:, 0] > above
+            state = np.where(touched[:, None], both, one)
+            heights = np.where(touched, middle, lower)
+            compliance = strip = np.where(touched, strip / 2, strip)
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         table = np.zeros((len(lanes), run.table.shape[2]))

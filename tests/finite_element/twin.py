@@ -73,6 +73,13 @@ def two_wires(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
     return FlexibleCatenaryData.model_validate(table | {"contact_wires": 2})
 
 
+def mirrored(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """A line as a sequence of its spans, whose wires hang at its ends as in finite elements: mirrored."""
+    end = {"encumbrance": line.encumbrance + 1e-6}  # else it is the one span that is repeated
+    table = line.model_dump(exclude_none=True) | {"sequence": [{}] * line.spans, "end_support": end}
+    return FlexibleCatenaryData.model_validate(table)
+
+
 def section(speed_kmh: float, spacing: float = 5.0) -> Section:
     """That line as one equivalent wire, under a pantograph pressed by 110 N and 0.00097 N/(km/h)^2.
 

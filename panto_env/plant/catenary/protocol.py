@@ -57,6 +57,7 @@ class StartPoint(NamedTuple):
     height: float  # of the contact wire (m)
     wire_compliance: float  # m/N
     spring_compliance: float  # of a massless spring in series (m/N), 0 if none
+    apart: float = 0.0  # height over this wire of a second one side by side (m)
 
 
 class CatenaryModel(Protocol):

@@ -200,7 +200,9 @@ class FlexibleCatenary:
         self.droppers = layout.positions
         self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.
-        self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
+        first = float(self.line.shape[0, 0])
+        apart = float(self.line.beside.shape[0, 0]) - first if designed.contact_wires > 1 else 0.0
+        self.start_point = StartPoint(first, 0.0, 0.0, apart)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
         # Of the line drawn last: lanes of a fit mostly share their tensions.
         self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
@@ -213,8 +215,8 @@ class FlexibleCatenary:
             for (was, now), line in zip(both, self._defective[condition].lines, strict=True):
                 shape = shape_left(was.layout.line, now.layout.line)
                 state = line.solve()
-                for wire, (contact, _) in enumerate(shape.contacts):
-                    check_loaded(now.layout, replace(shape, contact=contact), line.rise(state, wire))
+                for wire, (its_shape, _) in enumerate(shape.contacts):
+                    check_loaded(now.layout, replace(shape, contact=its_shape), line.rise(state, wire))
         if any(each.side_wind for each in runs.conditions):
             air = air_about(self.line, data.wires, condition.ice, self.time_step)
             self.line = self.line._replace(air=air)
@@ -265,6 +267,9 @@ class FlexibleCatenary:
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
         self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
         self.line.beside.shape[row] = tensioned.beside
+        if shape.second is not None:
+            begin = self.start_point.height + self.start_point.apart
+            self.line.beside.shape[row] -= tensioned.beside[0] - begin
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
         """Put one lane's wires at rest, on the line ``drawn``; a force (N) at the anchor moves no wire."""
