@@ -58,7 +58,7 @@ def paired() -> FlexibleCatenaryData:
     """The line with droppers in pairs 0.5 m apart, of which each holds another wire."""
     places = np.add.outer(5.0 + 7.0 * np.arange(8), [0.0, 0.5]).ravel()
     line = direct_current()
-    table = {"positions": places.tolist(), "sag": parabola(places, 0.03).tolist()}
+    table = {"positions": tuple(places.tolist()), "sag": tuple(parabola(places, 0.03).tolist())}
     return line.model_copy(update={"droppers": line.droppers.model_copy(update=table)})
 
 

@@ -15,7 +15,7 @@ from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.shape import GRAVITY
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.line_condition import LineCondition
-from panto_env.plant.numerics import Runs
+from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 from panto_env.plant.train import Train
@@ -181,6 +181,25 @@ def test_the_head_shares_its_force_between_the_wires():
     assert (first - second)[half:].std() > 10.0
     with pytest.raises(InputError, match="has one wire, and line 'direct-current' has two side by side"):
         Plant(FAR, Train.of(DSA), runs=Runs((44.0, 44.0)), bilateral=True)
+
+
+@pytest.mark.filterwarnings("ignore:At 3.6 km/h a train passes")
+@pytest.mark.parametrize("touched", [1, 2])
+def test_a_run_starts_at_rest_where_the_wires_begin_at_unlike_heights(touched):
+    """The lower one is 32 mm lower, and carries all, or 3 mm, and carries more."""
+    pantograph = DSA.model_copy(update={"static_force": 110.0})
+    line = twin.mirrored(FAR if touched == 1 else twin.two_wires(twin.paired()))
+    plant = Plant(line, Train.of(pantograph), runs=Runs((1.0, 1.0)), numerics=Numerics(window=0))
+    plant.start(0, 1.0)
+    nominal = plant.of(0, Row.CONTACT_FORCE)
+    assert nominal == pytest.approx(
+        plant.of(0, Row.NOMINAL_FORCE), rel=0.02
+    )  # but for the spring to the ground
+    plant.advance_passively(1, plant.samples(1))
+    first, second = plant.of(0, Row.FIRST_FORCE), plant.of(0, Row.SECOND_FORCE)
+    assert first + second == pytest.approx(nominal, abs=1.0)
+    assert second > first
+    assert (first > 0) == (touched == 2)
 
 
 def test_records_and_pictures_show_both_wires(tmp_path):
