@@ -101,10 +101,11 @@ def made(name: str, arm: bool, both: bool = False) -> FlexibleCatenaryData:
         },
         "droppers": {"positions": places.tolist(), "sag": sag, "stiffness": 100e3},
         "steady_arm": (ARM if arm else NO_ARM) | {"holds_wire": False},
-        "plan": {"stagger": (own.stagger, -own.stagger)},
         "support": {"stiffness": 500e3, "damping": 1000.0},
         "spans": 34,
     }  # fmt: skip
+    if not both:
+        table["plan"] = {"stagger": (own.stagger, -own.stagger)}
     if own.stitch is not None:
         table["stitch_wire"] = {"length": own.stitch[0], "tension": own.stitch[1], "mass": 0.31}
     found = line_of(table, like="re250-stitched" if own.stitch else "re250", name=name)
