@@ -32,14 +32,14 @@ APART = 200.0  # m, between two pantographs
 class Published(NamedTuple):
     """A line, and what is published of it."""
 
-    wires: int  # contact wires side by side, here one equivalent wire
+    wires: int  # contact wires side by side
     section: float  # of one (mm^2)
     contact: float  # tension of one (kgf)
     messenger: tuple[float, float, float]  # section (mm^2), mass (kg/m), tension (kgf)
     span: float  # m
     encumbrance: float  # m
     pre_sag: float  # share of the span (-)
-    droppers: tuple[float, ...]  # places (m)
+    droppers: tuple[float, ...]  # places, of two wires the middles of pairs 0.5 m apart (m)
     stitch: tuple[float, float] | None = None  # length (m), tension (N)
     stagger: float = 0.2  # m
     elasticity: tuple[float, float] | None = None  # mid-span and support (mm/N)
@@ -79,29 +79,33 @@ LINES = {
 }  # fmt: skip
 
 
-def made(name: str, arm: bool) -> FlexibleCatenaryData:
-    """The line, with its steady arms as pendulums or with none."""
+def made(name: str, arm: bool, both: bool = False) -> FlexibleCatenaryData:
+    """The line, with its steady arms as pendulums or with none; both: two contact wires, not one for both."""
     own = LINES[name]
     area, (_, mass, tension) = own.section * 1e-6, own.messenger
-    sag = parabola(np.array(own.droppers), own.pre_sag * own.span).tolist()
+    wires = 1 if both else own.wires  # for which the contact wire stands
+    places = np.add.outer(own.droppers, [-0.25, 0.25]).ravel() if both else np.array(own.droppers)
+    sag = parabola(places, own.pre_sag * own.span).tolist()
     table: dict[str, Any] = {
         "span_length": own.span,
         "encumbrance": own.encumbrance,
         "system": "DC 3 kV" if own.wires == 2 else "AC 25 kV",
+        "contact_wires": 1 + both,
         "contact_wire": {
-            "mass": own.wires * own.section * 8.89e-3,
-            "tension": own.wires * own.contact * KGF,
-            "bending_stiffness": own.wires * area**2 * YOUNG / (4 * math.pi),
+            "mass": wires * own.section * 8.89e-3,
+            "tension": wires * own.contact * KGF,
+            "bending_stiffness": wires * area**2 * YOUNG / (4 * math.pi),
         },
         "messenger_wire": {
             "mass": mass, "tension": tension * KGF, "bending_stiffness": 41.4 * (mass / 0.6) ** 2
         },
-        "droppers": {"positions": own.droppers, "sag": sag, "stiffness": 100e3},
+        "droppers": {"positions": places.tolist(), "sag": sag, "stiffness": 100e3},
         "steady_arm": (ARM if arm else NO_ARM) | {"holds_wire": False},
-        "plan": {"stagger": (own.stagger, -own.stagger)},
         "support": {"stiffness": 500e3, "damping": 1000.0},
         "spans": 34,
     }  # fmt: skip
+    if not both:
+        table["plan"] = {"stagger": (own.stagger, -own.stagger)}
     if own.stitch is not None:
         table["stitch_wire"] = {"length": own.stitch[0], "tension": own.stitch[1], "mass": 0.31}
     found = line_of(table, like="re250-stitched" if own.stitch else "re250", name=name)
@@ -109,20 +113,20 @@ def made(name: str, arm: bool) -> FlexibleCatenaryData:
     return found
 
 
-def yields(name: str, arm: bool) -> tuple[float, float]:
+def yields(name: str, arm: bool, both: bool = False) -> tuple[float, float]:
     """Elasticity at 100 N in mid-span and at a support (mm/N)."""
-    line = made(name, arm)
+    line = made(name, arm, both)
     places, lifts = elasticity(line, 100.0)
     return 1e3 * float(lifts[index_at(places, line.span_length / 2)]), 1e3 * float(lifts[0])
 
 
-def uplift(name: str, arm: bool, pantographs: int) -> float:
+def uplift(name: str, arm: bool, pantographs: int, both: bool = False) -> float:
     """Largest uplift at the supports of spans 10 to 19 (mm), the mean force at the limit of EN 50367."""
     speed = LINES[name].speed
     assert speed is not None
     pantograph = "dsa250" if speed <= 250 else "dsa380"
     two = {"pantographs": [pantograph] * 2, "distances": [APART]} if pantographs == 2 else {}
-    run = simulate(made(name, arm), pantograph, speed, mean_force="en50367", **two)
+    run = simulate(made(name, arm, both), pantograph, speed, mean_force="en50367", **two)
     return 1e3 * max(own.summary((10, 19)).max_uplift for own in run.train)
 
 
@@ -135,18 +139,23 @@ def tables() -> list[Table]:
             differ = (100 * (each / told - 1) for each, told in zip(armed, own.elasticity, strict=True))
             cells = (
                 "{:.2f} / {:.2f}".format(*own.elasticity),
-                *("{:.3f} / {:.3f}".format(*each) for each in (plain, armed)),
+                "{:.3f} / {:.3f}".format(*plain),
+                "{:.3f} / {:.3f}".format(*yields(name, arm=False, both=True)) if own.wires == 2 else "–",
+                "{:.3f} / {:.3f}".format(*armed),
             )
             rows.append((name, *cells, "{:+.0f} / {:+.0f}".format(*differ)))
         lifts = [uplift(name, arm, count) for arm in (False, True) for count in (1, 2)]
         off = [100 * (each / own.uplift - 1) for each in lifts[2:]]
         cells = (
             "{:.1f} / {:.1f}".format(*lifts[:2]),
+            "{:.1f} / {:.1f}".format(*(uplift(name, False, count, both=True) for count in (1, 2)))
+            if own.wires == 2
+            else "–",
             "{:.1f} / {:.1f}".format(*lifts[2:]),
             "{:+.0f} / {:+.0f}".format(*off),
         )
         lifted.append((name, f"{own.speed:g}", f"{own.uplift:g}", *cells))
-    both = ("published", "without arm", "arm as pendulum", "difference (%)")
+    both = ("published", "without arm", "without arm, both wires", "arm as pendulum", "difference (%)")
     return [
         Table("Elasticity at 100 N, mid-span / support (mm/N)", ("line", *both), rows),
         Table(

@@ -50,7 +50,7 @@ def mean_line(context: Context) -> MeanLine:
             f"The line '{line.name}' has no wires with mass and tension, which this policy needs for its "
             "model; choose a line of kind 'flexible' or 'single', or another policy."
         )
-    wires = line.contact_wire, line.messenger_wire
+    wires = line.every_wire
     tension, mass = sum(wire.tension for wire in wires), sum(wire.mass for wire in wires)
     return MeanLine(2 * float(np.sqrt(tension * mass)), 6 * tension / line.alignment().mean_length)
 

@@ -153,7 +153,7 @@ def elasticity_table(checks: Sequence[LineCheck]) -> Table:
         pairs = zip((middle, end, uneven), np.multiply(told, (1e3, 1e3, 1)), strict=True)
         cells = (f"{own:#.3g} ({other:g})" if other else f"{own:#.3g}" for own, other in pairs)
         stiffness = 1e3 * line.span_length / middle  # N
-        rows.append((line.name, *cells, f"{stiffness / sum(wire.tension for wire in line.wires):.2f}"))
+        rows.append((line.name, *cells, f"{stiffness / sum(wire.tension for wire in line.every_wire):.2f}"))
     headings = ("mid-span (mm/N)", "support (mm/N)", "non-uniformity (%)", "span / (mid-span × tensions)")
     return Table("Elasticity (in brackets: published, see `panto list LINE`)", ("line", *headings), rows)
 

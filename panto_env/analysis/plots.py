@@ -230,6 +230,11 @@ def plot_line(found: LineCheck, above: LinePlan | None = None) -> Figure:
         wires.plot(own, upper.height(own - part.begin), color=GREEN, label="messenger wire")
         wires.plot(own, lower.height(own - part.begin), color=BLUE, label="contact wire")
         bottoms[part.droppers] = lower.height(droppers[part.droppers] - part.begin)
+    if shape.second is not None:
+        second, held = shape.second.height, layout.held == 1
+        wires.plot(x, second(x), "--", color=BLUE, label="second contact wire")
+        contact.plot(x, 1e3 * second(x), "--", color=BLUE)
+        bottoms[held] = second(droppers[held])
     for rope in shape.ropes:
         for begin in [0.0] if line.sequence else supports:
             wires.plot(begin + rope.places, rope.heights, color=ORANGE, linewidth=1.0, label="stitch wire")

@@ -39,7 +39,7 @@ LINE_ENTRIES = (
     ("messenger wire mass", 1.0, "kg/m"),
     ("droppers of a span", 10.0, "-"),
 )
-"""Name, scale and unit of each value of the whole line."""
+"""Name, scale and unit of each value of the whole line; of two contact wires tension and mass together."""
 
 
 def line_values(line: CatenaryData) -> Array:
@@ -49,13 +49,13 @@ def line_values(line: CatenaryData) -> Array:
             f"Only a flexible catenary has the values that line_values observes, and line '{line.name}' is "
             "not one; leave out line_values."
         )
-    contact, messenger = line.contact_wire, line.messenger_wire
+    contact, messenger, side_by_side = line.contact_wire, line.messenger_wire, line.contact_wires
     return np.array(
         [
             contact.wave_speed,
-            contact.tension,
+            side_by_side * contact.tension,
             messenger.tension,
-            contact.mass,
+            side_by_side * contact.mass,
             messenger.mass,
             float(len(line.droppers.positions)),
         ]

@@ -43,7 +43,7 @@ def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) 
     """Draw the starts of lanes, (n,), each from its own generator, which is only made where it is needed."""
     settings, plant, (low, high) = task.settings, task.plant, task.length.speed_range
     conditions, scatter, run_in = settings.line_condition, settings.pantograph_scatter, settings.run_in
-    parts = len(plant.model.droppers), len(plant.model.supports)
+    parts = len(plant.model.droppers), len(np.unique(plant.model.supports))
     lines_differ = len(conditions) > 1 or any(condition.random for condition in conditions)
     speed, way, rms = np.full(len(lanes), low), np.zeros(len(lanes)), settings.drift
     profile = settings.speed_profile

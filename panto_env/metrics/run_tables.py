@@ -55,8 +55,9 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     for name, places, unit in measured:
         for k, (column, place) in enumerate(zip(getattr(run, name).T, places, strict=False)):
             if place <= run.distance:
+                whose = " of wire 2" if place in places[:k] else ""  # of two contact wires
                 columns[f"{name}_{k}"] = column
-                headings[f"{name}_{k}"] = f"{name} at {place:.6g} m ({unit})"
+                headings[f"{name}_{k}"] = f"{name}{whose} at {place:.6g} m ({unit})"
     return Sheet("run", columns, headings)
 
 

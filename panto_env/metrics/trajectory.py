@@ -56,8 +56,9 @@ class Trajectory:
     frame_velocity: Array  # (n,): m/s
     frame_force: Array  # (n,): of the actuator on the frame (N)
     head_force: Array  # (n,): of the actuator between head and frame (N)
-    uplift: Array  # (n, supports): of the contact wire, at the end of each step (m)
-    support_position: Array  # (supports,): m
+    # (n, supports): of the contact wire, at the end of each step (m); behind all that of a second one
+    uplift: Array
+    support_position: Array  # (supports,): m; with two contact wires all twice
     dropper_force: Array  # (n, droppers): tension, 0 where slack (N)
     dropper_position: Array  # (droppers,): m
     catenary: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,9 +75,10 @@ class Plant:
             runs=runs,
         )
         if bilateral and self.model.wires_per_collector > 1:
+            two = "two side by side" if catenary.wires_touched > 1 else "overlaps of two"
             raise InputError(
-                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has overlaps "
-                "of two; take a line without overlaps."
+                f"A contact that may pull (bilateral) has one wire, and line '{catenary.name}' has {two}; "
+                "take a line of one contact wire without overlaps."
             )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
@@ -175,7 +177,7 @@ class Plant:
     def _set_pantograph(self, collector: int, lanes: Lanes, pantograph: PantographData) -> None:
         own = self.train.collectors[collector]
         reflected = own.actuator.reflected_masses if own.driven else NONE_REFLECTED
-        constants = parts(pantograph, self.model, reflected)
+        constants = parts(pantograph, self.model, reflected, self.catenary.wires_touched)
         self.pantographs.table[collector, lanes, : len(constants)] = constants
 
     def start(
@@ -232,11 +234,11 @@ class Plant:
         static_forces: Array | None,
     ) -> Array:
         """Rows of a collector in lanes, (n, rows), at rest at the start; heights: of the wire there (m)."""
-        own, run, (_, wire, spring) = self.train.collectors[collector], self.run, self.model.start_point
+        own, run, start = self.train.collectors[collector], self.run, self.model.start_point
         for lane, pantograph in zip(lanes, pantographs, strict=False):
             self._set_pantograph(collector, lane, pantograph)
-        strip = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
-        compliance = strip + wire + spring
+        strip: Any = float(self.pantographs.table[collector, 0, Part.STRIP_COMPLIANCE])  # alike in all lanes
+        compliance: Any = strip + start.wire_compliance + start.spring_compliance
         speeds = self.speed[lanes]
         nominal_forces = own.pantograph.nominal_force(speeds)
         if static_forces is not None:
@@ -260,7 +262,16 @@ class Plant:
         aside = float(run.lateral[:1].sum())  # 0 where no head rolls
         rolled = aside**2 / own.pantograph.roll_stiffness if own.pantograph.rolls else 0.0
         compliance += rolled
-        state = rest_state(pantographs or own.pantograph, lifts + by_wind + by_height, heights, compliance)
+        rest = partial(rest_state, pantographs or own.pantograph, lifts + by_wind + by_height)
+        state = rest(heights, compliance)
+        if self.catenary.wires_touched > 1:  # the lower wire alone is touched, or both
+            above = heights + max(start.apart, 0.0)
+            lower, middle = heights + min(start.apart, 0.0), heights + start.apart / 2
+            one, both = rest(lower, compliance), rest(middle, compliance / 2)
+            touched = both[:, 0] > above
+            state = np.where(touched[:, None], both, one)
+            heights = np.where(touched, middle, lower)
+            compliance = strip = np.where(touched, strip / 2, strip)
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         table = np.zeros((len(lanes), run.table.shape[2]))

@@ -41,9 +41,10 @@ def measured(
         return np.asarray((end - begin) / step)
 
     uplift = None
-    if run.uplift.size:  # of the support in the middle of the run
-        middle = int(np.argmin(np.abs(run.support_position - run.distance / 2)))
-        uplift = np.asarray(np.interp(time, run.time + 0.5 * run.time_step, run.uplift[:, middle]))
+    if run.uplift.size:  # of the support in the middle of the run, of two wires that of the higher one
+        middle = run.support_position[np.argmin(np.abs(run.support_position - run.distance / 2))]
+        highest = run.uplift[:, run.support_position == middle].max(axis=1)
+        uplift = np.asarray(np.interp(time, run.time + 0.5 * run.time_step, highest))
     noise = force_noise * np.random.default_rng(seed).standard_normal(count)
     piece = Piece(
         run="",

@@ -165,14 +165,17 @@ class Findings:
 
     @cached_property
     def uplifts(self) -> list[tuple[int, float, float]]:
-        """Number, position (m) and maximum uplift (m) of the supports of the evaluated spans."""
+        """Number, position (m) and maximum uplift (m) of the supports of the evaluated spans.
+
+        Of two contact wires it is that of the one that rises more.
+        """
         run = self.run
         begin, end = run.position[self.inside][[0, -1]]
-        stride = 1.5 * run.stride
+        stride, places = 1.5 * run.stride, run.support_position[: run.uplift.shape[1]]
         return [
-            (round(run.alignment.in_spans(place)), float(place), float(run.uplift[:, k].max()))
-            for k, place in enumerate(run.support_position)
-            if begin - stride <= place <= end + stride and k < run.uplift.shape[1]
+            (round(run.alignment.in_spans(place)), float(place), float(run.uplift[:, places == place].max()))
+            for place in np.unique(places)
+            if begin - stride <= place <= end + stride
         ]
 
     @cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -117,12 +118,14 @@ def compare_twins() -> None:
         table.add_column(name)
     for speed, spacing in twin.CASES:
         one = twin.section(speed, spacing)
+        both = replace(one, line=twin.mirrored(twin.two_wires(one.line)))
         twins = twin.along_twins(one, twin.ALTERNATING)
         by_wire = twin.shared(twins, one.spans)
         own = (f"{by_wire.std:.2f}", f"{by_wire.first:.1f}", f"{by_wire.alone:.1f}")
         rows = {
             "finite differences, one wire": (one.by_simulator(), ()),
             "finite elements, one wire": (one.by_finite_elements(), ()),
+            "finite differences, two wires": (both.by_simulator(), ()),
             "finite elements, two wires": (twins, own),
         }
         for model, (run, more) in rows.items():

@@ -5,6 +5,7 @@ The messenger is one: two half messengers at the same heights, each with one con
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,13 +13,15 @@ from scipy import sparse
 
 from panto_env.catalog import load_pantograph
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData, Span
+from panto_env.plant.catenary.flexible.spans import parabola
 from panto_env.plant.catenary.schema import Wire
 from panto_env.plant.pantograph.schema import PantographData
 
+from .contacts import Collector
 from .figures import low_passed
 from .rest import pair_at_rest, pairs_of
 from .sections import Section
-from .simulation import Result, ride
+from .simulation import Result, ride_together
 from .system import LineSystem, joined, of_pair
 
 ALTERNATING, IN_PAIRS = "alternating", "in pairs"
@@ -49,6 +52,32 @@ def direct_current(spacing: float = 5.0) -> FlexibleCatenaryData:
             "damping": {"alpha": 0.0125, "beta": 1e-4},
         }
     )
+
+
+def paired() -> FlexibleCatenaryData:
+    """The line with droppers in pairs 0.5 m apart, of which each holds another wire."""
+    places = np.add.outer(5.0 + 7.0 * np.arange(8), [0.0, 0.5]).ravel()
+    line = direct_current()
+    table = {"positions": tuple(places.tolist()), "sag": tuple(parabola(places, 0.03).tolist())}
+    return line.model_copy(update={"droppers": line.droppers.model_copy(update=table)})
+
+
+def two_wires(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """The simulator's line of two contact wires, for which this one has an equivalent one."""
+    table = line.model_dump(exclude_none=True)
+    for part, *keys in (
+        ("contact_wire", "mass", "tension", "bending_stiffness"),
+        ("steady_arm", "mass", "stiffness"),
+    ):
+        table[part] |= {key: table[part][key] / 2 for key in keys}
+    return FlexibleCatenaryData.model_validate(table | {"contact_wires": 2})
+
+
+def mirrored(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """A line as a sequence of its spans, whose wires hang at its ends as in finite elements: mirrored."""
+    end = {"encumbrance": line.encumbrance + 1e-6}  # else it is the one span that is repeated
+    table = line.model_dump(exclude_none=True) | {"sequence": [{}] * line.spans, "end_support": end}
+    return FlexibleCatenaryData.model_validate(table)
 
 
 def section(speed_kmh: float, spacing: float = 5.0) -> Section:
@@ -161,6 +190,23 @@ def shared(run: Result, spans: tuple[int, int]) -> Shared:
 
 def along_twins(one: Section, kind: str, element: float | None = None) -> Result:
     """A pass of a section along its line with two contact wires; uplifts of the first, then of the other."""
+    (result,) = train_along_twins(one, kind, element=element)
+    return result
+
+
+def train_along_twins(
+    one: Section,
+    kind: str,
+    behind: Sequence[float] = (),
+    element: float | None = None,
+    time_step: float | None = None,
+) -> list[Result]:
+    """The same of several like pantographs; behind: distances of further ones from the first (m).
+
+    time_step: s, by default as many milliseconds as elements have metres.
+    """
     element = element or one.element
     system = tied(*halves(one.line, kind, element))
-    return ride(system, on_both(one.pantograph), one.speed_kmh, 1e-3 * element, one.distance)
+    collectors = [Collector(on_both(one.pantograph), each) for each in (0.0, *behind)]
+    distance = one.distance + max(behind, default=0.0)
+    return ride_together(system, collectors, one.speed_kmh, time_step or 1e-3 * element, distance)

@@ -57,6 +57,7 @@ class StartPoint(NamedTuple):
     height: float  # of the contact wire (m)
     wire_compliance: float  # m/N
     spring_compliance: float  # of a massless spring in series (m/N), 0 if none
+    apart: float = 0.0  # height over this wire of a second one side by side (m)
 
 
 class CatenaryModel(Protocol):
@@ -75,7 +76,9 @@ class CatenaryModel(Protocol):
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
     length: float  # maximum distance of a run (m)
     usual_end: float  # default distance of a run (m)
-    supports: Array  # (supports,): positions whose uplift is recorded (m)
+    supports: (
+        Array  # (supports,): positions whose uplift is recorded (m), of a second contact wire behind all
+    )
     droppers: Array  # (droppers,): positions (m)
     start_point: StartPoint
 

@@ -126,6 +126,11 @@ class CatenaryData(Settings):
         """Height of the contact wire at each support over the nominal one (m); empty where all are 0."""
         return ()
 
+    @property
+    def wires_touched(self) -> int:
+        """Number of contact wires side by side all along the line."""
+        return 1
+
     def alignment(self, spans: int | None = None) -> Alignment:
         """Where supports and spans lie; spans: their number, by default the line's own."""
         return Alignment.equal(self.span_length, self.spans if spans is None else spans)

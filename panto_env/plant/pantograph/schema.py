@@ -261,17 +261,23 @@ class Pantographs(NamedTuple):
 
 
 def parts(
-    pantograph: PantographData, catenary: CatenaryModel, reflected: ReflectedMasses = NONE_REFLECTED
+    pantograph: PantographData,
+    catenary: CatenaryModel,
+    reflected: ReflectedMasses = NONE_REFLECTED,
+    wires: int = 1,
 ) -> Array:
-    """Constants of a pantograph, as rows of ``Part``; under a massless wire a strip can be rigid."""
+    """Constants of a pantograph, as rows of ``Part``; under a massless wire a strip can be rigid.
+
+    wires: contact wires side by side, between which the contact's spring and damper are shared.
+    """
     time_step = catenary.time_step
     transition, inputs = discretise(pantograph, time_step, reflected)
     rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
     stiffness = pantograph.contact_stiffness
-    compliance = rigid if stiffness == "rigid" else 1 / stiffness
+    compliance = wires * (rigid if stiffness == "rigid" else 1 / stiffness)
     bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
     share = max(catenary.contact_share, 1.0 - bearable / gain if gain else 0.0)
-    damping = pantograph.contact_damping / time_step
+    damping = pantograph.contact_damping / wires / time_step
     scalars = [compliance, damping, share, pantograph.frame_friction, pantograph.local_spring]
     return np.concatenate([scalars, roll(pantograph, time_step), inputs.T.ravel(), transition.ravel()])
 

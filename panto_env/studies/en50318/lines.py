@@ -108,10 +108,13 @@ class LineCheck:
 
 
 def catalogue_lines() -> Iterator[tuple[str, FlexibleCatenaryData, PantographData]]:
-    """Name, line and pantograph of each flexible line of the catalogue whose spans are alike."""
+    """Name, line and pantograph of each flexible line of the catalogue whose spans are alike.
+
+    Lines with two contact wires are left out.
+    """
     for name in available("catenary"):
         line = load_catenary(name)
-        if isinstance(line, FlexibleCatenaryData) and not line.sequence:
+        if isinstance(line, FlexibleCatenaryData) and not line.sequence and line.contact_wires == 1:
             yield name, line, _applied(OWN_PANTOGRAPH.get(name, REFERENCE_MODEL))
 
 
@@ -306,8 +309,8 @@ def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> l
     entries = [load_catenary(name) for name in available("catenary")]
     limit, errors_of_lines = from_kmh(speed_kmh) / HIGHEST, []
     for line in entries:
-        if not isinstance(line, FlexibleCatenaryData) or line.ends:
-            continue  # it does not go on for as long as is required
+        if not isinstance(line, FlexibleCatenaryData) or line.ends or line.contact_wires > 1:
+            continue  # one that ends does not go on for as long as is required
         if line.contact_wire.tension / line.contact_wire.mass <= limit**2:
             continue
         distance = line.alignment().support(SETTLED[1])

@@ -112,7 +112,9 @@ class AlongLine(NamedTuple):
     leaves: Index  # (things,): first of the nodes that must be within a window
     enters: Index  # (things,): last one
     number: Index  # (things,): along the line, of its kind
-    wire: Index  # (things,): of the contact wire on which, or over which, it hangs
+    # (things,): of the contact wire on which, or over which, it hangs; for droppers of a second contact wire
+    # beside the first that of the messenger, and their constants are negative
+    wire: Index
     constants: Array  # (things, rows)
     empty: Array  # (rows,): of a slot that holds none, which then has no effect
 
@@ -179,7 +181,7 @@ STENCIL = constants(StencilRow)
 
 
 class Beside(NamedTuple):
-    """Height of the second pair's contact wire, as the line has it for the first; empty without overlaps.
+    """Height of the second pair's contact wire, as the line has it for the first; empty without one.
 
     It is far above where there is no such wire.
     """
@@ -236,7 +238,7 @@ class FlexibleLine(NamedTuple):
     link_static: Array  # (rows, links of the window or the line): static tension (N)
     link_gap: Array  # (rows, links of the window or the line): extension before a slack one pulls (m)
     scattered: Scattered  # what has rows of its own, of the whole line
-    pairs: int  # of wires: 2 where wires overlap
+    pairs: int  # of wires: 2 where wires overlap, or two contact wires hang side by side
     beside: Beside
     near: Near
     air: Air

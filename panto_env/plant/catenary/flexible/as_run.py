@@ -135,7 +135,10 @@ def as_run(line: FlexibleCatenaryData, condition: LineCondition, force: float) -
         whole = DefectiveLine(part.layout, along, factors)
         state = whole.solve()
         shape = shape_left(own_line, with_tension_left(own_line, along, factors))
-        risen = shape.contact.height(x) + whole.rise(state).height(x) - solve(own_line).contact.height(x)
+        designed, risen = solve(own_line).contacts, np.zeros(len(x))
+        for k, ((now, _), (was, _)) in enumerate(zip(shape.contacts, designed, strict=True)):
+            held = part.layout.held == k
+            risen[held] = (now.height(x) + whole.rise(state, k).height(x) - was.height(x))[held]
         # Where spans are alike, the middle one of several: anchors are not felt there.
         first = 0 if line.sequence else SPANS // 2 * len(found)
         for k, number in enumerate(part.droppers[: len(found)].tolist(), start=first):

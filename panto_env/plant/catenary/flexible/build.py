@@ -195,7 +195,8 @@ def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Arr
     """Tables of the static height of the contact wire, (n,), and of that beside it, or none."""
     if isinstance(shape.contact, Profile):
         breaks, _, _, repeats = own = shape.contact
-        return own.height_at(_table(data.period, tuple(breaks.tolist()), repeats)), np.zeros(0)
+        at = _table(data.period, tuple(breaks.tolist()), repeats)
+        return own.height_at(at), np.zeros(0) if shape.second is None else shape.second.height_at(at)
     layout, table = data.layout(), _table_places(data.period)
     return heights_of_pair(layout, shape, 0, table), heights_of_pair(layout, shape, 1, table)
 

@@ -39,7 +39,7 @@ class _Arms(NamedTuple):
 
     places: Array  # (arms,): m
     stiffness: Array  # (arms,): N/m
-    heights: Array  # (arms,): of the contact wire there (m)
+    heights: Array  # (contact wires side by side, arms): of these there (m)
     holding: Any  # (arms,): whether each holds the wire
 
 
@@ -48,7 +48,9 @@ class Misfit(NamedTuple):
 
     too_long: Array  # (droppers of the spans that repeat,): excess length of the droppers (m)
     lighter: Array  # (droppers,): missing weight of each half of a dropper (N)
-    lift: Array  # (supports between two spans, or one for all,): additional upward force of steady arms (N)
+    # (contact wires side by side, supports between two spans, or one for all): additional upward force of
+    # steady arms (N)
+    lift: Array
 
 
 def with_tension_left(
@@ -87,12 +89,13 @@ def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit
     was, now = solve(designed), solve(left)
     stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
     arms = _arms(designed)
-    lift: Any = arms.stiffness * (arms.heights - now.contact.height(arms.places))
-    lift[arms.holding] += was.arm_force - now.arm_force
+    lift: Any = arms.stiffness * (arms.heights - [wire.height(arms.places) for wire, _ in now.contacts])
+    for its_lift, (_, force), (_, its_force) in zip(lift, was.contacts, now.contacts, strict=True):
+        its_lift[arms.holding] += force - its_force
     return Misfit(
         too_long=was.dropper_length - now.dropper_length + stretch,
         lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,
-        lift=lift[1:-1] if designed.sequence else lift,
+        lift=lift[:, 1:-1] if designed.sequence else lift,
     )
 
 
@@ -105,16 +108,19 @@ def _arms(designed: FlexibleCatenaryData) -> _Arms:
         holding.append(holding[-1])
         stiffness = np.append(stiffness, stiffness[-1])
     x = np.array(layout.supports[: len(holding)])
-    return _Arms(x, stiffness, solve(designed).contact.height(x), np.array(holding))
+    heights = np.array([wire.height(x) for wire, _ in solve(designed).contacts])
+    return _Arms(x, stiffness, heights, np.array(holding))
 
 
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
 SLIGHT = 1e-6  # N, of tension or of its lack, that rounding may leave
 ROUNDS = 20  # in which droppers may all go slack or taut at once; then one by one, which must end
 UNKNOWNS, STITCHED = 4, 6
-"""Per node: height and slope of the contact wire, then of the messenger, then of a stitch wire (m, -)."""
+"""Per node: height and slope of the contact wire, then of the messenger, then of a stitch wire or a second
+contact wire (m, -)."""
 BAND, STITCHED_BAND = 6, 10
-"""Diagonals of the matrix: a wire's unknowns at the next node are at most 5 away, or 9 with stitch wires."""
+"""Diagonals of the matrix: a wire's unknowns at the next node are at most 5 away, or 9 with a third wire."""
+SECOND = 4  # of a second contact wire's unknowns behind the first one's
 
 
 @dataclass(frozen=True)
@@ -125,6 +131,7 @@ class StaticState:
     gap: Array  # (droppers,): how far the ends of a slack one must part before it pulls (m)
     rise: Array  # (pieces, 5): change of the running surface's height: a, b, c, d, e between nodes
     change: Array  # (unknowns,): of heights and slopes (m, -)
+    further: tuple[Array, ...] = ()  # the same as ``rise`` of a second contact wire side by side
 
 
 class DefectiveLine:
@@ -149,8 +156,9 @@ class DefectiveLine:
         self._broken, self._miscut, height = located or located_defects(layout, condition)
         self._own = own = locate(layout, condition)
         self._stitches = stitches = layout.moving
-        stitched = len(stitches.support) > 0
-        self._per_node = per_node = STITCHED if stitched else UNKNOWNS
+        stitched, wires = len(stitches.support) > 0, data.contact_wires
+        self._per_node = per_node = STITCHED if stitched or wires > 1 else UNKNOWNS
+        self.wires, self._contacts = wires, [SECOND * wire for wire in range(wires)]
 
         if data.sequence:
             begins = zip(each, layout.supports, strict=False)
@@ -164,6 +172,7 @@ class DefectiveLine:
         number = np.arange(firsts[-1] + 1)
         hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
         self._ends = per_node * hung[:, None] + [0, 2]  # of the droppers
+        self._ends[:, 0] += SECOND * layout.held
         if stitched:
             self._ends[stitches.carrying >= 0, 1] += 2
         self._masts = per_node * firsts[1:-1]
@@ -205,14 +214,18 @@ class DefectiveLine:
         wire, self._above = beams_of(left.contact_wire, lengths), beams_of(left.messenger_wire, lengths)
         self._beams = wire.repeated(times)
         add_to_band(self._band, self._in_band, wire.stiffness)
-        if per_node == STITCHED:
+        if len(self._stitches.support):
             self._stitch(left.messenger_wire)
         else:
             add_to_band(self._band, self._in_band + 2 * (MESSENGER - CONTACT), self._above.stiffness)
-        self._band[0, masts] += self._arm_stiffness
+        for at in self._contacts[1:]:
+            add_to_band(self._band, self._in_band + at, wire.stiffness)
+        for at in self._contacts:
+            self._band[0, masts + at] += self._arm_stiffness
         self._band[0, masts + 2] += self._support_stiffness
         self._load[self._lifted] = self._raised
-        self._band[0, [0, 2, -per_node, 2 - per_node]] = HELD
+        for at in (*self._contacts, 2):
+            self._band[0, [at, at - per_node]] = HELD
         self.decay = self._beams.decay
         self._carry(left)
 
@@ -251,7 +264,8 @@ class DefectiveLine:
             fit = misfit(self._data, left)
             self._error = self._miscut + np.tile(fit.too_long, self._times)
             self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
-            self._load[self._masts] += fit.lift
+            for at, lift in zip(self._contacts, fit.lift, strict=True):
+                self._load[self._masts + at] += lift
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
@@ -265,7 +279,7 @@ class DefectiveLine:
     ) -> StaticState:
         """Static state; scatter: length error of every dropper, heights: of every support's height (m), both
         added to those of the condition. pushed: position (m) of a node of the contact wire, and an upward
-        force (N) on it.
+        force (N) on it; on each of two half of it.
         """
         error = self._error if scatter is None else self._error + scatter
         load = self._load
@@ -274,7 +288,8 @@ class DefectiveLine:
             load[self._lifted] += self._support_stiffness * heights
         if pushed is not None:
             load = load.copy()
-            load[self._height_at(pushed[0])] += pushed[1]
+            for at in self._contacts:
+                load[self._height_at(pushed[0]) + at] += pushed[1] / len(self._contacts)
         taut = ~self._broken
         rounds = 0
         while True:
@@ -288,13 +303,19 @@ class DefectiveLine:
             turned = wrong if rounds <= ROUNDS else wrong[-1:]
             taut[turned] = ~taut[turned]
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)
-        rise = self._beams.pieces(change[self._unknowns], self._bulge)
-        rise[:, :2] += self._surface
-        return StaticState(np.where(taut, np.maximum(pull, 0.0), 0.0), np.where(taut, 0.0, gap), rise, change)
+        rises = tuple(self._beams.pieces(change[self._unknowns + at], self._bulge) for at in self._contacts)
+        for rise in rises:
+            rise[:, :2] += self._surface
+        tension = np.where(taut, np.maximum(pull, 0.0), 0.0)
+        return StaticState(tension, np.where(taut, 0.0, gap), rises[0], change, rises[1:])
 
-    def rise(self, state: StaticState) -> Profile:
-        """Change of the running surface's height in a state."""
-        return Profile(self.breaks, state.rise, self.decay, self._repeats)
+    def rise(self, state: StaticState, wire: int | None = None) -> Profile:
+        """Change of the running surface's height in a state; wire: of one of two contact wires side by side,
+        by default their mean.
+        """
+        each = (state.rise, *state.further)
+        pieces = np.mean(each, axis=0) if wire is None else each[wire]
+        return Profile(self.breaks, pieces, self.decay, self._repeats)
 
     def rises(self, state: StaticState) -> tuple[Profile, Profile]:
         """Change of the running surface's and of the messenger's height in a state."""
@@ -310,7 +331,7 @@ class DefectiveLine:
         contact, messenger = self._ends.T
         band[0, contact] += spring
         band[0, messenger] += spring
-        band[messenger - contact, contact] -= spring
+        band[np.abs(messenger - contact), np.minimum(messenger, contact)] -= spring
         gain = np.where(taut, -spring * error, -self._static)  # of tension, were the wires held
         load[contact] += gain
         load[messenger] -= gain

@@ -21,6 +21,7 @@ from ...alignment import Alignment
 from ..schema import FEWEST_SPANS, Wire
 from .parts import CLOSEST, SAME, Droppers, Overlap, Span, StitchWire, nearer
 from .spans import in_sequence, valid
+from .two_wires import hung
 
 if TYPE_CHECKING:
     from .schema import FlexibleCatenaryData
@@ -40,7 +41,7 @@ class Dropper(NamedTuple):
     place: float  # from the support at which its span begins (m)
     sag: float  # as ``Droppers.sag`` has it (m)
     table: Droppers  # of its span, with stiffness and masses
-    pair: int = 0  # of wires on the grid between which it hangs
+    pair: int = 0  # of wires on the grid, whose contact wire it holds
 
 
 class TensionLength(NamedTuple):
@@ -122,8 +123,11 @@ class Layout:
 
     @property
     def pairs(self) -> int:
-        """Number of pairs of wires on the grid: 2 where any wires overlap."""
-        return 2 if self.line.overlaps else 1
+        """Number of pairs of wires on the grid: 2 where any overlap, or two contact wires hang side by side.
+
+        The second one's messenger is then none, and at rest.
+        """
+        return 2 if self.line.overlaps else self.line.contact_wires
 
     @cached_property
     def droppers(self) -> tuple[Dropper, ...]:
@@ -151,17 +155,22 @@ class Layout:
     def _in_spans(self) -> tuple[Dropper, ...]:
         """The droppers of all spans, if no wires overlapped."""
         return tuple(
-            Dropper(k, number, begin + place, place, sag, span.droppers)
+            Dropper(k, number, begin + place, place, sag, span.droppers, wire)
             for k, (begin, span) in enumerate(zip(self.supports, self.spans, strict=False), start=1)
-            for number, (place, sag) in enumerate(
-                zip(span.droppers.positions, span.droppers.sag, strict=True), start=1
-            )
+            for number, (place, sag, wire) in enumerate(hung(span.droppers, self.line.contact_wires), start=1)
         )
 
     @cached_property
     def positions(self) -> Array:
         """Positions of the droppers along the line (m), (droppers,)."""
         return np.array([dropper.position for dropper in self.droppers])
+
+    @cached_property
+    def held(self) -> Index:
+        """Number, from 0, of the contact wire side by side that each dropper holds, (droppers,)."""
+        if self.line.overlaps:
+            return np.zeros(len(self.droppers), dtype=np.int64)
+        return np.array([dropper.pair for dropper in self.droppers])
 
     @cached_property
     def _numbers(self) -> dict[tuple[int, int], int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from .points import with_points
 from .resolution import resolution, spans_of_train
 from .schema import FlexibleCatenaryData
 from .static import StaticShape, hang
+from .two_wires import check_condition
 from .view import view_of
 from .wire_defects import locate
 
@@ -68,7 +70,7 @@ class DefectiveParts:
         """Limits of a pair's contact wire's pieces (m), and their number."""
         if len(self._parts) == 1:
             own = self.lines[0]
-            return (np.zeros(0), 0) if pair else (own.breaks, own.pieces)
+            return (own.breaks, own.pieces) if pair < own.wires else (np.zeros(0), 0)
         breaks = [0.0]
         for k, (part, own) in enumerate(zip(self._parts, self.lines, strict=True)):
             if part.pair == pair:
@@ -109,7 +111,8 @@ class DefectiveParts:
                 None if heights is None else heights[part.inner],
             )
             tension[part.droppers], gap[part.droppers] = state.tension, state.gap
-            rises[part.pair][its_rise] = state.rise
+            for wire, rise in enumerate((state.rise, *state.further)):
+                rises[part.pair + wire][its_rise] = rise
         line.link_static[row], line.link_gap[row] = tension, gap
         line.rise_decay[row] = self.lines[0].decay
         return tension
@@ -139,7 +142,7 @@ Own = tuple[StaticShape, Tensioned, DefectiveParts]
 
 
 class FlexibleCatenary:
-    """Two tensioned beams with droppers between them; a run starts at the line's first anchor."""
+    """Tensioned beams with droppers between them; a run starts at the line's first anchor."""
 
     massless = False
     contact_share = (
@@ -176,6 +179,8 @@ class FlexibleCatenary:
         if data is not designed:
             shape = shape_left(designed, data)
         self.layout = layout = data.layout(spans)
+        for each in runs.conditions:
+            check_condition(designed, each)
         own = locate(designed.layout(spans), condition)
         self.wave_speed = data.contact_wire.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
@@ -195,11 +200,13 @@ class FlexibleCatenary:
         self.alignment = alignment = layout.alignment
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
-        self.supports = alignment.support(np.arange(1, spans))
+        self.supports = np.tile(alignment.support(np.arange(1, spans)), designed.contact_wires)
         self.droppers = layout.positions
         self._tension = shape.over(spans).dropper_tension[None]
         # The anchor does not yield: the pantograph is at rest there exactly.
-        self.start_point = StartPoint(float(self.line.shape[0, 0]), 0.0, 0.0)
+        first = float(self.line.shape[0, 0])
+        apart = float(self.line.beside.shape[0, 0]) - first if designed.contact_wires > 1 else 0.0
+        self.start_point = StartPoint(first, 0.0, 0.0, apart)
         self._designed: FlexibleCatenaryData | None = None  # where each lane has tensions of its own
         # Of the line drawn last: lanes of a fit mostly share their tensions.
         self._latest: tuple[tuple[LineCondition, tuple[float, float]], Own] | None = None
@@ -211,7 +218,9 @@ class FlexibleCatenary:
             both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
             for (was, now), line in zip(both, self._defective[given[0]].lines, strict=True):
                 shape = shape_left(was.layout.line, now.layout.line)
-                check_loaded(now.layout, shape, line.rise(line.solve()))
+                state = line.solve()
+                for wire, (its_shape, _) in enumerate(shape.contacts):
+                    check_loaded(now.layout, replace(shape, contact=its_shape), line.rise(state, wire))
         if any(each.side_wind for each in runs.conditions):
             if data.tunnels:
                 raise InputError(
@@ -276,6 +285,9 @@ class FlexibleCatenary:
         # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
         self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
         self.line.beside.shape[row] = tensioned.beside
+        if shape.second is not None:
+            begin = self.start_point.height + self.start_point.apart
+            self.line.beside.shape[row] -= tensioned.beside[0] - begin
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
         """Put one lane's wires at rest, on the line ``drawn``; a force (N) at the anchor moves no wire."""

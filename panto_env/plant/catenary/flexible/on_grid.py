@@ -32,7 +32,7 @@ class Springs(NamedTuple):
 class Links(NamedTuple):
     """Droppers: links between two wires at one place along the line, which can only pull."""
 
-    wires: Index  # (links, 2): the lower and the upper one
+    wires: Index  # (links, 2): the lower and the upper one, of which this may come before that
     stitch: Index  # (links,): number of the stitch wire, of those in the window, at the upper end; -1: a wire
     position: Array  # (links,): m
     stiffness: Array  # (links,): in tension (N/m)
@@ -100,6 +100,16 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
     )
 
 
+def _of_second_wire(first: Springs) -> Springs:
+    """The same steady arms on a second contact wire: under its messenger, which is none, is no support.
+
+    Its uplift is recorded behind that of the first wire at all masts.
+    """
+    levels = first.levels.copy()
+    levels[1::2] = 0.0
+    return first._replace(number=first.number + first.masts, wire=first.wire + 2, levels=levels)
+
+
 def _joined_springs(each: Sequence[Springs]) -> Springs:
     """Those of several tension lengths: masts in their order along the line, then all hard spots."""
     masts = sorted(
@@ -119,8 +129,9 @@ def _links_of(layout: Layout, shape: StaticShape) -> Links:
     """The droppers of a line, whose static shape is ``shape`` over all its spans."""
     pairs = np.array([dropper.pair for dropper in layout.droppers], dtype=np.int64)
     clamps = [layout.of_droppers(f"{wire}_clamp_mass") for wire in ("contact", "messenger")]
+    messengers = MESSENGER + (2 * pairs if layout.line.overlaps else 0 * pairs)
     return Links(
-        wires=2 * pairs[:, None] + np.array([CONTACT, MESSENGER]),
+        wires=np.stack([2 * pairs + CONTACT, messengers], axis=1),
         stitch=layout.moving.carrying,
         position=layout.positions,
         stiffness=shape.dropper_stiffness,
@@ -269,16 +280,17 @@ def on_grid(
     data, parts, stitches = layout.line, layout.tension_lengths, layout.moving
     damping, wires, dx = data.damping, data.wires * layout.pairs, float(x[PAD + 1])
     defects = [own.within(*part.in_use) for part in parts] if len(parts) > 1 else [own]
-    springs = _joined_springs(
-        [
-            _springs_of(part, per_stride, x, step, its_own)
-            for part, its_own in zip(parts, defects, strict=True)
-        ]
-    )
+    held_by = [
+        _springs_of(part, per_stride, x, step, its_own) for part, its_own in zip(parts, defects, strict=True)
+    ]
+    if data.contact_wires > 1:
+        (arms,) = held_by
+        held_by = [arms, _of_second_wire(arms)]
+    springs = _joined_springs(held_by)
     over = shape.over(len(layout.spans))
     links = _links_of(layout, over)
     room = shape.messenger.height(links.position) - shape.contact.height(links.position)
-    usual = (links.stitch < 0) & (len(parts) == 1)
+    usual = (links.stitch < 0) & (layout.pairs == 1)
     room = np.where(usual, room, over.dropper_length + over.dropper_tension / over.dropper_stiffness)
     at_springs, at_links = Nodes.about(springs.place), Nodes.about(links.position / dx)
     bare = np.array([[wire.mass * dx] for wire in wires])
@@ -295,6 +307,8 @@ def on_grid(
         added[part.wire + CONTACT] += its_own.mass_of_nodes(x, dx, data.contact_wire)
     mass = bare + added
     held = _held(parts, len(wires), x)
+    if data.contact_wires > 1:
+        held[2 + MESSENGER] = True  # the second contact wire has none
     mobility = np.where(held, 0.0, step**2 / mass / (1.0 + damping.alpha * step / 2))
     mobility[:, : PAD + 1] = mobility[:, -PAD - 1 :] = 0.0  # no force moves the ends
 

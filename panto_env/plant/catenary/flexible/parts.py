@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -72,6 +72,9 @@ class Droppers(Settings):
     axial_stiffness: Annotated[float, Between(100, 1e8, "N")] | None = Field(
         None, description="EA in tension (N); the stiffness is EA over the dropper's length"
     )
+    wire: tuple[Literal[1, 2], ...] | None = Field(
+        None, description="contact wire that each dropper holds, of two; by default in turn"
+    )
     mass: Annotated[float, Between(0, 5, "kg/m")] = Field(0.0, description="mass per length (kg/m)")
     messenger_clamp_mass: Clamp = Field(0.0, description="clamp on the messenger (kg)")
     contact_clamp_mass: Clamp = Field(0.0, description="clamp on the contact wire (kg)")
@@ -82,6 +85,11 @@ class Droppers(Settings):
             raise ValueError(
                 f"sag must hold one value per dropper: {len(self.positions)} positions are given, "
                 f"but {len(self.sag)} sags{comma_hint(len(self.positions), len(self.sag))}"
+            )
+        if self.wire is not None and len(self.wire) != len(self.positions):
+            raise ValueError(
+                f"wire must hold one value per dropper: {len(self.positions)} positions are given, "
+                f"but {len(self.wire)} wires"
             )
         if any(nearer(b - a, CLOSEST) for a, b in zip(self.positions, self.positions[1:], strict=False)):
             raise ValueError(f"positions must increase from the support by {CLOSEST} m or more each")

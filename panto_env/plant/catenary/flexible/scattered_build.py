@@ -18,6 +18,7 @@ from .arrays import (
     MESSENGER,
     PAD,
     STITCH,
+    UPPER,
     AlongLine,
     FlexibleLine,
     FlexibleWire,
@@ -64,6 +65,12 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
         ],
         axis=1,
     )
+    # Kernels take the upper wire to be the one behind the lower one. The messenger comes before a second
+    # contact wire, so for its droppers both change places, and all forces and displacements their sign.
+    turned = grid.links.wires[:, UPPER] < grid.links.wires[:, LOWER]
+    of_links[turned, LINK.MOVE : LINK.PULL] = grid.move[turned][:, ::-1].reshape(-1, 2 * NODES)
+    of_links[turned, : LINK.PULL] *= -1
+    before = grid.links.wires.min(axis=1)
     # Springs come in pairs, at each mast the steady arm, then the support; a hard spot is an arm alone.
     springs, levels = grid.springs, grid.springs.levels
     first, weights, _ = grid.at_springs
@@ -95,7 +102,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
             at_links.first[on_messenger, None],
             of_links[on_messenger],
             links,
-            grid.links.wires[on_messenger, LOWER],
+            before[on_messenger],
             on_messenger,
         ),
         # A dropper on a stitch wire needs it in the window.

@@ -34,6 +34,7 @@ from .parts import (
 )
 from .points import Point
 from .spans import laid_out
+from .two_wires import check_contact_wires
 
 __all__ = [
     "CLOSEST",
@@ -60,6 +61,11 @@ class FlexibleCatenaryData(CatenaryData):
 
     kind: Literal["flexible"] = "flexible"
     encumbrance: Encumbrance = Field(description="height of messenger over contact wire at support (m)")
+    contact_wires: Literal[1, 2] = Field(
+        1,
+        description="contact wires side by side, each with droppers and steady arms of its own: contact_wire "
+        "and steady_arm are then one wire's",
+    )
     contact_wire: Conductor
     messenger_wire: Conductor
     droppers: Droppers
@@ -134,6 +140,7 @@ class FlexibleCatenaryData(CatenaryData):
         if "damping.ratio" in sources:  # alpha and beta follow from it
             table["sources"] = {"damping": f"from damping.ratio: {sources['damping.ratio']}", **sources}
         line = handler(table)
+        check_contact_wires(line)
         if not line.sequence:
             if line.span_types or line.end_support is not None or line.overlaps:
                 raise InputError(
@@ -219,7 +226,12 @@ class FlexibleCatenaryData(CatenaryData):
     @property
     def one_by_one(self) -> bool:
         """Whether what hangs on the wires is laid out on the grid one by one, not in equal rows."""
-        return bool(self.sequence) or self.stitch_wire is not None
+        return bool(self.sequence) or self.stitch_wire is not None or self.contact_wires > 1
+
+    @property
+    def wires_touched(self) -> int:
+        """Number of contact wires side by side all along the line."""
+        return self.contact_wires
 
     @property
     def period(self) -> float:
@@ -233,8 +245,13 @@ class FlexibleCatenaryData(CatenaryData):
 
     @property
     def wires(self) -> tuple[Conductor, Conductor]:
-        """Contact wire and messenger."""
+        """Contact wire, of two side by side one, and messenger."""
         return self.contact_wire, self.messenger_wire
+
+    @property
+    def every_wire(self) -> tuple[Conductor, ...]:
+        """All contact wires and the messenger."""
+        return (*(self.contact_wire,) * self.contact_wires, self.messenger_wire)
 
     def lateral(self, places: Array, spans: int, conditions: Sequence[LineCondition]) -> Array:
         """As ``CatenaryData.lateral``."""

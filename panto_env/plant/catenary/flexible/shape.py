@@ -297,6 +297,15 @@ class StaticShape:
     dropper_mass: Array  # kg, without clamps
     spans: int = 1  # number of spans that repeat: all of the line's where they differ
     ropes: tuple[Rope, ...] = ()  # stitch wires
+    # The other contact wire of two that hang side by side, and its steady arms, as those of the first.
+    second: Profile | None = None
+    second_arm_force: float | Array = 0.0
+
+    @property
+    def contacts(self) -> tuple[tuple[Profile | InUse, float | Array], ...]:
+        """Each contact wire of those side by side, with what its steady arms hold."""
+        first = self.contact, self.arm_force
+        return (first,) if self.second is None else (first, (self.second, self.second_arm_force))
 
     def over(self, spans: int) -> StaticShape:
         """The same with arrays of the droppers of so many spans."""
@@ -353,8 +362,8 @@ FAR = 100.0  # height (m) at which a wire counts that is not there: no pantograp
 
 def heights_of_pair(layout: Layout, shape: StaticShape, pair: int, x: Array, wire: int = CONTACT) -> Array:
     """Height of a pair's contact wire or messenger at positions x (m), (n,); ``FAR`` where it has none."""
-    if layout.pairs == 1:
-        return (shape.contact, shape.messenger)[wire].height(x)
+    if not layout.line.overlaps:
+        return (shape.contacts[pair][0], shape.messenger)[wire].height(x)
     found = np.full(len(x), FAR)
     for part, *both in profiles(layout, shape):
         if part.pair == pair:

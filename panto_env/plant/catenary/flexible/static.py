@@ -18,7 +18,7 @@ from ....base.errors import InputError, beside
 from ....base.table import Table
 from .layout import Layout
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, PeriodicWire, StaticShape, joined
+from .shape import GRAVITY, PeriodicWire, Profile, StaticShape, joined
 from .whole_line import StitchedMessenger, cut_droppers, settle_line
 
 __all__ = ["GRAVITY", "StaticShape", "hang", "solve"]
@@ -91,8 +91,9 @@ def _check_wires(layout: Layout, shape: StaticShape) -> None:
     """Raise InputError for wires that cross or are too steep, or a contact wire of too many heights."""
     for k, (span, begin) in enumerate(zip(layout.spans, layout.supports, strict=False)):
         where, x = _where(layout, k + 1), np.linspace(0.0, span.span_length, POINTS)
-        contact, messenger = shape.contact.height(begin + x), shape.messenger.height(begin + x)
-        below = contact - messenger
+        messenger = shape.messenger.height(begin + x)
+        contacts = [wire.height(begin + x) for wire, _ in shape.contacts]
+        below = np.max(contacts, axis=0) - messenger
         if below.max() >= 0:
             raise InputError(
                 f"At rest the messenger wire of {where} would hang {below.max():.2g} m below "
@@ -101,7 +102,8 @@ def _check_wires(layout: Layout, shape: StaticShape) -> None:
         straight = (layout.contact_heights[k + 1] - layout.contact_heights[k]) / span.span_length * x
         too_high = f" along a span, more than {HEIGHT_RANGE} m; give it more tension, or more droppers."
         too_steep = ", and the model is of nearly level wires; give it more tension, or shorter spans."
-        check_level(where, x, (contact, messenger), straight, too_high, too_steep)
+        for contact in contacts:
+            check_level(where, x, (contact, messenger), straight, too_high, too_steep)
 
 
 def check_level(
@@ -163,12 +165,18 @@ def _settle(layout: Layout) -> StaticShape:
     messenger = line.messenger_wire
     breaks = np.concatenate([[0.0], x, [line.span_length]])
     hung, support = np.arange(1, len(breaks) - 1), np.array([0])  # nodes
-    held, heights = hung, -sag
-    if line.steady_arm.holds_wire:
-        held, heights = np.append(hung, support), np.append(heights, 0.0)
-    lower, upper = PeriodicWire(line.contact_wire, breaks, held), PeriodicWire(messenger, breaks, support)
-    stitched = _stitched(layout)
-    contact, lifts = lower.hang(heights, np.zeros(len(breaks) - 1))
+    lifts = np.zeros(len(x))
+    lower: list[tuple[Profile, float]] = []
+    for wire in range(line.contact_wires):
+        own = np.flatnonzero(layout.held == wire)
+        held, heights = hung[own], -sag[own]
+        if line.steady_arm.holds_wire:
+            held, heights = np.append(held, support), np.append(heights, 0.0)
+        hanging = PeriodicWire(line.contact_wire, breaks, held)
+        contact, forces = hanging.hang(heights, np.zeros(len(breaks) - 1))
+        lifts[own] = forces[: len(own)]
+        lower.append((hanging.profile(contact), float(forces[len(own) :].sum())))
+    upper, stitched = PeriodicWire(messenger, breaks, support), _stitched(layout)
 
     def hang(pulled: Array) -> tuple[Array, Array]:
         """Unknowns above droppers that pull down (N), and heights of the droppers' upper ends (m)."""
@@ -180,13 +188,15 @@ def _settle(layout: Layout) -> StaticShape:
         above, _ = upper.hang(top, np.append(0.0, -pulled))
         return above, above[2 * hung]
 
-    above, droppers = cut_droppers(layout, lifts[: len(x)], -sag, hang)
+    above, droppers = cut_droppers(layout, lifts, -sag, hang)
     return StaticShape(
-        lower.profile(contact),
+        lower[0][0],
         upper.profile(above) if stitched is None else stitched.profile(above),
-        float(lifts[len(x) :].sum()),
+        lower[0][1],
         *droppers,
         ropes=() if stitched is None else stitched.shapes(above),
+        second=lower[-1][0] if lower[1:] else None,
+        second_arm_force=lower[-1][1],
     )
 
 
@@ -226,15 +236,17 @@ class RestingDropper(NamedTuple):
     static_force: float  # at the contact wire, clamp and half its own weight included (N)
     stretch: float  # under the static force (m)
     span: int = 1  # number of its span, from 1; 1 where all are alike
+    wire: int = 1  # contact wire that it holds, of two
 
 
 def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str] = str) -> Table:
     """The droppers as a table to print, with sag and stretch in millimetres; name: of a span's number."""
-    differ = any(each.span > 1 for each in droppers)
+    differ, both = any(each.span > 1 for each in droppers), any(each.wire > 1 for each in droppers)
     rows = [
         (
             *([name(each.span)] if differ else []),
             str(each.number),
+            *([str(each.wire)] if both else []),
             f"{each.position:g}" if not differ else f"{each.position:.3f}",
             f"{1e3 * each.sag:.1f}",
             f"{each.length:.4f}",
@@ -244,18 +256,22 @@ def dropper_table(droppers: Sequence[RestingDropper], name: Callable[[int], str]
         for each in droppers
     ]
     in_mm = HEADINGS | {"sag": "sag (mm)", "stretch": "stretch at rest (mm)"}
-    headings = (*(["span"] if differ else []), "dropper", *in_mm.values())
+    headings = (*(["span"] if differ else []), "dropper", *(["wire"] if both else []), *in_mm.values())
     title = f"Droppers of {'all spans' if differ else 'a span'} at rest, as designed"
     last = [k for k, each in enumerate(droppers[1:]) if each.span != droppers[k].span]
     return Table(title, headings, rows, text_columns=0, section_ends=tuple(last))
 
 
 def as_rows(droppers: Sequence[RestingDropper]) -> list[dict[str, Any]]:
-    """The droppers as rows of a table to write; numbers of spans are among them only where spans differ."""
+    """The droppers as rows of a table to write.
+
+    Numbers of spans are among them only where spans differ, those of contact wires where there are two.
+    """
     rows = [each._asdict() for each in droppers]
-    if not any(each.span > 1 for each in droppers):
-        for row in rows:
-            del row["span"]
+    for key in ("span", "wire"):
+        if not any(row[key] > 1 for row in rows):
+            for row in rows:
+                del row[key]
     return rows
 
 
@@ -267,10 +283,10 @@ def droppers_at_rest(line: Any) -> list[RestingDropper]:
     line = getattr(line, "line", line)  # of a rig
     if not isinstance(line, FlexibleCatenaryData):
         return []
-    shape = hang(line)
+    shape, layout = hang(line), line.layout(1)
     stretch = shape.dropper_tension / shape.dropper_stiffness
     values = zip(shape.dropper_length.tolist(), shape.dropper_tension.tolist(), stretch.tolist(), strict=True)
     return [
-        RestingDropper(own.number, own.place, own.sag, *of_own, own.span)
-        for own, of_own in zip(line.layout(1).droppers, values, strict=True)
+        RestingDropper(own.number, own.place, own.sag, *of_own, own.span, 1 + held)
+        for own, of_own, held in zip(layout.droppers, values, layout.held.tolist(), strict=True)
     ]

@@ -24,7 +24,8 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
     """The line of a lane from begin to end (m), as far as it is computed there.
 
     The contact wire's height is the one that the pantograph feels. The messenger's is without the static
-    effect of defective droppers and supports. In overlaps both are those of the wires in use.
+    effect of defective droppers and supports. In overlaps both are those of the wires in use. Of two contact
+    wires side by side it is the first, and the second is one of the further wires.
     """
     line, wire, data = model.line, model.wire, model.data
     moved = along(wire.displacement[lane] + 0.5 * wire.increment[lane])[:, PAD:-PAD]
@@ -39,7 +40,10 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
         of_shape = np.linspace(0.0, line.shape_length, tables.shape.shape[1])
         rest = np.interp(place, of_shape, tables.shape[min(lane, len(tables.shape) - 1)])
         contacts.append(rest + _rise(line, tables, lane, x) + moved[2 * pair + CONTACT])
-        messengers.append(_messenger(model, shape, pair, x, place) + moved[2 * pair + MESSENGER])
+        if pair == 0 or data.overlaps:
+            messengers.append(_messenger(model, shape, pair, x, place) + moved[2 * pair + MESSENGER])
+        else:
+            messengers.append(messengers[0])
     used = np.zeros(len(x), dtype=int)
     for part in model.layout.tension_lengths if line.pairs > 1 else ():
         used[(x >= part.in_use[0]) & (x <= part.in_use[1])] = part.pair
@@ -53,12 +57,13 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
     further = [rope for rope in ropes.values() if rope[0][0] >= begin and rope[0][-1] <= end]
     for pair in range(line.pairs) if line.pairs > 1 else ():
         idle = (used != pair) & (contacts[pair] < FAR / 2)
-        further += [(x[idle], height[pair][idle]) for height in (contacts, messengers)]
+        wires = (contacts, messengers) if data.overlaps else (contacts,) * pair  # the first is no further one
+        further += [(x[idle], height[pair][idle]) for height in wires]
     return LineView(
         x=x,
         contact=np.array(contacts)[used, here] if len(x) else NONE,
         messenger=np.array(messengers)[used, here] if len(x) else NONE,
-        supports=model.supports[(model.supports >= begin) & (model.supports <= end)],
+        supports=np.unique(model.supports[(model.supports >= begin) & (model.supports <= end)]),
         droppers=droppers,
         tops=tops,
         bottoms=bottoms,

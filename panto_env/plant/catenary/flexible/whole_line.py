@@ -215,10 +215,16 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
 
     at_supports = (*spans, spans[-1])
     holding = np.flatnonzero([span.steady_arm.holds_wire for span in at_supports])
-    held = np.concatenate([hung, masts[holding]])
     lower_heights = np.interp(x, supports, heights) - [dropper.sag for dropper in layout.droppers]
-    lower = LongWire(line.contact_wire, breaks, _end_slopes(supports, heights), np.zeros(len(breaks)))
-    contact, lifts = lower.hang(held, np.append(lower_heights, heights[holding]), np.zeros(len(breaks)))
+    hanging = LongWire(line.contact_wire, breaks, _end_slopes(supports, heights), np.zeros(len(breaks)))
+    lifts, lower = np.zeros(len(x)), list[tuple[Profile, Array]]()
+    for wire in range(line.contact_wires):
+        own = np.flatnonzero(layout.held == wire)
+        held = np.concatenate([hung[own], masts[holding]])
+        wanted = np.append(lower_heights[own], heights[holding])
+        contact, forces = hanging.hang(held, wanted, np.zeros(len(breaks)))
+        lifts[own] = forces[: len(own)]
+        lower.append((hanging.profile(contact), forces[len(own) :]))
 
     springs = np.zeros(len(breaks))
     springs[masts] = [span.support.stiffness for span in at_supports]
@@ -244,14 +250,16 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
         above, _ = upper.hang(no_nodes, np.zeros(0), forces)
         return above, above[2 * hung]
 
-    above, droppers = cut_droppers(layout, lifts[: len(x)], lower_heights, hang)
+    above, droppers = cut_droppers(layout, lifts, lower_heights, hang)
     return StaticShape(
-        lower.profile(contact),
+        lower[0][0],
         upper.profile(above) if stitched is None else stitched.profile(above, repeats=False),
-        lifts[len(x) :],
+        lower[0][1],
         *droppers,
         spans=len(spans),
         ropes=() if stitched is None else stitched.shapes(above),
+        second=lower[-1][0] if lower[1:] else None,
+        second_arm_force=lower[-1][1],
     )
 
 

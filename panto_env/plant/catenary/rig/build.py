@@ -192,6 +192,11 @@ class Rig:
                 "No wind blows on a rig, nor is it in a tunnel; leave out both, or use another line than "
                 f"'{data.name}'."
             )
+        if data.line.wires_touched > 1:
+            raise InputError(
+                f"The cylinder of rig '{data.name}' follows one contact wire, and its line has two side by "
+                "side; take one equivalent wire of both."
+            )
         if getattr(data.line, "overlaps", ()):
             raise InputError(
                 f"The cylinder of rig '{data.name}' follows one contact wire, and its line has overlaps of "
