@@ -31,7 +31,7 @@ def test_the_names_of_an_entry_are_all_its_numbers():
         *(f"p.{key}.{k}" for key in ("masses", "stiffnesses", "dampings") for k in (1, 2, 3)),
         *("p.static_force", "p.aerodynamic_coefficient", "p.aerodynamic_linear"),
         *("p.contact_stiffness", "p.contact_damping"),
-        "p.frame_friction",
+        *("p.roll_inertia", "p.spring_distance", "p.frame_friction"),
     ]
     names = parameter_names(load_catenary("re250"), "c")
     assert {"c.contact_wire.tension", "c.droppers.stiffness", "c.droppers.positions.1", "c.spans"} <= set(

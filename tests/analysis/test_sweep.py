@@ -44,7 +44,8 @@ def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path)
     """The same value written into a copy of the TOML file and simulated directly."""
     family, key, *place = parameter.split(".")
     name = PAPER_3[family]
-    entry = (load_catenary if family == "catenary" else load_pantograph)(name).model_dump(exclude={"sources"})
+    loaded = (load_catenary if family == "catenary" else load_pantograph)(name)
+    entry = loaded.model_dump(exclude={"sources"}, exclude_none=True)
     if place:
         entry[key] = list(entry[key])
         entry[key][int(place[0]) - 1] = value

@@ -157,5 +157,5 @@ def test_trains_that_cannot_be_are_refused_in_a_sentence():
     with pytest.raises(InputError, match=f"1 to {MOST_COLLECTORS} pantographs, not 5"):
         Train.of(*[ONE] * 5, distances=[10, 20, 30, 40])
     massless = load_catenary("periodic-stiffness")
-    with pytest.raises(InputError, match=r"need a flexible catenary.*'periodic-stiffness' is not one"):
+    with pytest.raises(InputError, match=r"need a flexible catenary.*'periodic-stiffness' is neither"):
         Plant(massless, Train.of(ONE, ONE, distances=[50.0]))
