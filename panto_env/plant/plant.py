@@ -92,7 +92,7 @@ class Plant:
         waves = max(condition.waves for condition in runs.conditions)
         tables = [own.pantograph.force_over_height for own in train.collectors]
         knots = sorted({0.0, *(height for table in tables for height, _ in table)})
-        lateral = np.zeros(0)
+        lateral: Array = np.zeros(0)
         if any(own.pantograph.rolls for own in train.collectors):
             places = np.arange(0.0, self.alignment.length + LATERAL_EVERY, LATERAL_EVERY)
             lateral = catenary.lateral(places, self.spans, runs.conditions)
