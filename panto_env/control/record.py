@@ -89,6 +89,7 @@ def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int,
         row = np.array([lane * task.agents])
         if diverged(task, row, deviation[None], highest[None])[0]:
             raise InputError(divergence(task, lane))
+    second = task.samples.second[lane, 1 : steps + 1, collector]
     uplift = task.samples.uplift[lane, :, 1 : steps + 1][:, on_line].T
     tension = task.samples.tension[lane, 1 : steps + 1][on_line]
     controlled, several = collector in task.episode.controlled, task.settings.pantographs
@@ -126,6 +127,7 @@ def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int,
         line=LineFacts.of(plant.catenary, plant.model.wave_speed, float(task.speed[lane])),
         design=design,
         reached=float(plant.position(lane, steps, collector)[0]) if collector else math.nan,
+        second_force=second[on_line].copy() if len(second) else np.zeros(0),
     )
 
 

@@ -291,6 +291,7 @@ class Passes:
             rows=np.zeros((plant.lanes, self.steps + 1, 1, SAMPLE_ROWS)),
             uplift=np.zeros((plant.lanes, 0, self.steps + 1)),
             tension=np.zeros((plant.lanes, self.steps + 1, 0), dtype=np.float32),
+            second=np.zeros((plant.lanes, 0, 1)),
         )
 
 

@@ -21,7 +21,7 @@ from .by_span import by_span, by_speed, by_stretch, moving_droppers
 from .compliance import Criterion
 from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
-from .trajectory import SERIES, Trajectory, follower_columns
+from .trajectory import Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"
 RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")
@@ -39,7 +39,9 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     for number, own in enumerate(run.train, start=1):
         behind = number > 1
         series = (
-            follower_columns(own, number, len(run.time)) if behind else {n: getattr(run, n) for n in SERIES}
+            follower_columns(own, number, len(run.time))
+            if behind
+            else {n: getattr(run, n) for n in run.series}
         )
         whose = f" of pantograph {number}" if behind else ""
         force = low_pass(own.contact_force, own.time_step)
@@ -47,7 +49,8 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
         last = f"{FILTERED}@{number}" if behind else FILTERED
         columns |= series | {last: filtered}
         headings |= {
-            key: f"{name}{whose} ({unit})" for key, (name, unit) in zip(series, SERIES.items(), strict=True)
+            key: f"{name}{whose} ({unit})"
+            for key, (name, unit) in zip(series, own.series.items(), strict=True)
         }
         headings[last] = f"{FILTERED}{whose} to 20 Hz (N)"
     measured = [("uplift", run.support_position, "m")]

@@ -24,7 +24,7 @@ from ..base.settings import Between, Settings, explain
 from ..plant.alignment import Alignment
 from ..plant.catenary.schema import PowerSystem
 from .compliance import LineFacts
-from .trajectory import OUTPUTS, SERIES, Trajectory, follower_columns
+from .trajectory import OF_TWO_WIRES, OUTPUTS, SERIES, Trajectory, follower_columns
 
 FORMAT = 3
 OF_FOLLOWERS = ("pantograph", "nominal_force", "target_mean", "policy", "design", "reached")
@@ -90,7 +90,7 @@ def write(run: Trajectory, path: str | Path) -> None:
     import pyarrow as pa
     from pyarrow.parquet import write_table
 
-    columns = {name: getattr(run, name) for name in SERIES}
+    columns = {name: getattr(run, name) for name in run.series}
     for number, follower in enumerate(run.followers, start=2):
         columns |= follower_columns(follower, number, len(run.time))
     for name in OF_PLACES:
@@ -99,7 +99,7 @@ def write(run: Trajectory, path: str | Path) -> None:
     facts = {"format": FORMAT} | {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in vars(run).items()
-        if name not in {*SERIES, *OF_PLACES, "followers"}
+        if name not in {*SERIES, *OF_TWO_WIRES, *OF_PLACES, "followers"}
     }
     masts = [run.alignment.masts] * bool(run.alignment.masts)
     facts |= {"line": vars(run.line), "alignment": (run.alignment.supports, run.alignment.pitch, *masts)}
@@ -133,7 +133,8 @@ def read(path: str | Path) -> Trajectory:
         facts["line"] = LineFacts(**facts["line"], contact_heights=heights)
         supports, pitch, *masts = facts["alignment"]
         facts["alignment"] = Alignment(tuple(supports), pitch, tuple(map(tuple, *masts)) if masts else ())
-        series = {name: columns[name] for name in SERIES}
+        more = [name for name in OF_TWO_WIRES if name in columns]
+        series = {name: columns[name] for name in (*SERIES, *more)}
         for name, places in OF_PLACES.items():
             count = sum(column.startswith(f"{name}_") for column in columns)
             own = [columns[f"{name}_{k}"] for k in range(count)]
@@ -155,7 +156,7 @@ def read(path: str | Path) -> Trajectory:
 def _follower_of(first: Trajectory, columns: Mapping[str, Array], number: int, facts: Any) -> Trajectory:
     """The inverse: the record from a file's columns, and what it has of its own."""
     on_line = ~np.isnan(columns[f"time@{number}"])
-    series = {name: columns[f"{name}@{number}"][on_line] for name in SERIES}
+    series = {name: columns[f"{name}@{number}"][on_line] for name in first.series}
     shared = {name: getattr(first, name)[on_line] for name in OF_PLACES}
     own: dict[str, Any] = {**series, **shared, **facts}
     return dataclasses.replace(first, **own)

@@ -40,6 +40,8 @@ SERIES = {
     "head_force": "N",
 }
 """Units of the series of a run, in the order of a file's columns."""
+OF_TWO_WIRES = {"second_force": "N"}
+"""The same of what only runs on two contact wires have."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,14 @@ class Trajectory:
     design: Mapping[str, Any] = field(default_factory=dict)  # as ``designed`` reads it, plain data
     # Of a collector behind the first: where it came to (m). The first came as far as its samples show.
     reached: float = math.nan
+    # (n,): share of contact_force on the second of two contact wires (N); (0,) where there is one
+    second_force: Array = field(default_factory=lambda: np.zeros(0))
     followers: tuple[Trajectory, ...] = ()  # records of the collectors behind this one, from the front
+
+    @property
+    def series(self) -> dict[str, str]:
+        """Names and units of the series that it has."""
+        return SERIES | (OF_TWO_WIRES if self.second_force.size else {})
 
     @property
     def identity(self) -> Identity:
@@ -323,4 +332,4 @@ def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, 
     number: of the collector, counted from 1.
     """
     before = np.full(rows - len(follower.time), math.nan)
-    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in SERIES}
+    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in follower.series}

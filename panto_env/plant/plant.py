@@ -290,11 +290,12 @@ class Plant:
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
         """Arrays in which kernels record; rows: number of steps to keep, plus one for the start."""
-        droppers = len(self.model.droppers) if tension else 0
+        droppers, two = len(self.model.droppers) if tension else 0, self.catenary.wires_touched > 1
         return Samples(
             rows=np.zeros((self.lanes, rows, len(self.train.collectors), SAMPLE_ROWS)),
             uplift=sparse_zeros((self.lanes, len(self.model.supports), rows)),
             tension=np.zeros((self.lanes, rows, droppers), dtype=np.float32),
+            second=np.zeros((self.lanes, rows if two else 0, len(self.train.collectors))),
         )
 
     def clear(self, samples: Samples, lanes: Array) -> None:

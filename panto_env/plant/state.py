@@ -148,6 +148,7 @@ class Samples(NamedTuple):
     # supports have while the train is far from them takes no memory: on thirty kilometres nearly all.
     uplift: Array
     tension: Array  # (lanes, steps, droppers): mean over the step (N)
+    second: Array  # (lanes, steps, collectors): contact force on the second wire (N); no steps without one
 
 
 @inlined

@@ -243,6 +243,8 @@ def record_lane(line, wire, run, samples, lane):
             own = run.table[c, lane]
             for k in range(SAMPLE_ROWS):
                 rows[lane, n, c, k] = own[k]
+            if samples.second.shape[1] > 1:
+                samples.second[lane, n, c] = own[ROW.SECOND_FORCE]
     if uplift.shape[1] > 0 or tension.shape[2] > 0:
         n = min(n, tension.shape[1] - 1)
         record_wire(line, wire, lane, uplift[lane, :, n], tension[lane, n])

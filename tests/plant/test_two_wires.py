@@ -225,6 +225,13 @@ def test_records_and_pictures_show_both_wires(tmp_path):
     again = Trajectory.load(tmp_path / "run.parquet")
     np.testing.assert_array_equal(again.uplift, run.uplift)
     np.testing.assert_array_equal(again.support_position, run.support_position)
+    np.testing.assert_array_equal(again.second_force, run.second_force)
+    late = run.position > 120.0
+    first = run.contact_force - run.second_force
+    assert first[late].mean() == pytest.approx(run.second_force[late].mean(), rel=0.1)
+    assert (run.second_force >= 0).all()
+    assert (first >= -1e-9).all()
+    assert abs(first - run.second_force).max() > 10
     found = {number: uplift for number, _, uplift in Findings(run, "run.parquet").uplifts}
     assert found[12] == both.max()
     near = (run.support_position >= 600.0) & (run.support_position <= 720.0)
@@ -232,7 +239,12 @@ def test_records_and_pictures_show_both_wires(tmp_path):
     assert run.summary((11, 12)).max_uplift == run.uplift[:, near].max()
     headings = table_of(run).headings
     assert headings["uplift_0"] == "uplift at 60 m (m)"
+    assert headings["second_force"] == "second_force (N)"
     assert headings[f"uplift_{run.alignment.spans - 1}"] == "uplift of wire 2 at 60 m (m)"
+
+    one = simulate("en50318-2002", DSA, 160.0, distance=700.0)
+    assert one.second_force.size == 0
+    assert "second_force" not in table_of(one).headings
 
     plant = Plant(CA, Train.of(DSA), runs=Runs((44.0, 44.0)))
     plant.start(0, 44.0)
@@ -315,3 +327,13 @@ def test_defects_of_the_contact_wire_itself_are_refused():
             InputError, match=r"'ca-160' has two contact wires, on which hard_spots and worn_"
         ):
             simulate("ca-160", DSA, 160.0, line_condition=own)
+
+
+def test_a_train_s_record_has_the_force_on_each_wire_of_each_pantograph(tmp_path):
+    run = simulate(CA, pantographs=[DSA, DSA], distances=[60.0], speed_kmh=160.0, distance=700.0)
+    run.save(tmp_path / "run.parquet")
+    for own, again in zip(run.train, Trajectory.load(tmp_path / "run.parquet").train, strict=True):
+        assert len(own.second_force) == len(own.time)
+        np.testing.assert_array_equal(again.second_force, own.second_force)
+    headings = table_of(run).headings
+    assert headings["second_force@2"] == "second_force of pantograph 2 (N)"
