@@ -210,6 +210,11 @@ class Trajectory:
             return math.nan
         return float(self.nominal_force - known.aerodynamic_uplift(self.speed))
 
+    def uplift_at(self, place: float) -> Array:
+        """Uplift (m), (n,), at the support at a place (m), of two contact wires that of the higher."""
+        places = self.support_position[: self.uplift.shape[1]]
+        return np.asarray(self.uplift[:, places == place].max(axis=1))
+
     def mechanical_power(self, spans: SpanChoice = None) -> float:
         """Mechanical power (W) of the actuators, mean of its magnitude over the spans.
 
@@ -243,8 +248,8 @@ class Trajectory:
     @property
     def lift(self) -> Array:
         """Static force and aerodynamic uplift in each step, (n,) (N), in still air: wind adds to it."""
-        known = self.designed.known_pantograph
-        more = known.uplift_change(self.speeds, self.speed) if known and self.identity.drifts else 0.0
+        known = self.designed.known_pantograph if self.identity.drifts else None
+        more = known.uplift_change(self.speeds, self.speed) if known else 0.0
         return np.asarray(np.full(len(self.time), self.nominal_force) + more)
 
     @property

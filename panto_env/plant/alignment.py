@@ -41,11 +41,16 @@ class Alignment:
     masts: tuple[tuple[str, float | None], ...] = field(default=(), compare=False)
 
     @classmethod
-    def of_spans(cls, lengths: Sequence[float]) -> Self:
-        """The alignment of spans with these lengths (m), in the order of travel."""
-        if len(set(lengths)) == 1:
-            return cls.equal(lengths[0], len(lengths))
-        return cls((0.0, *np.cumsum(lengths).tolist()))
+    def of_spans(cls, lengths: Sequence[float], spans: int | None = None) -> Self:
+        """The alignment of spans with these lengths (m), in the order of travel.
+
+        spans: their number, by default as many as lengths; beyond these, spans are as long as the last one.
+        """
+        count = len(lengths) if spans is None else spans
+        every = [*lengths[:count], *[lengths[-1]] * (count - len(lengths))]
+        if len(set(every)) == 1:
+            return cls.equal(every[0], count)
+        return cls((0.0, *np.cumsum(every).tolist()))
 
     @classmethod
     def equal(cls, length: float, spans: int) -> Self:

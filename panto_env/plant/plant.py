@@ -263,7 +263,6 @@ class Plant:
         rolled = aside**2 / own.pantograph.roll_stiffness if own.pantograph.rolls else 0.0
         compliance += rolled
         rest = partial(rest_state, pantographs or own.pantograph, lifts + by_wind + by_height)
-        state = rest(heights, compliance)
         if self.catenary.wires_touched > 1:  # the lower wire alone is touched, or both
             above = heights + max(start.apart, 0.0)
             lower, middle = heights + min(start.apart, 0.0), heights + start.apart / 2
@@ -272,6 +271,8 @@ class Plant:
             state = np.where(touched[:, None], both, one)
             heights = np.where(touched, middle, lower)
             compliance = strip = np.where(touched, strip / 2, strip)
+        else:
+            state = rest(heights, compliance)
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         table = np.zeros((len(lanes), run.table.shape[2]))

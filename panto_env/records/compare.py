@@ -218,7 +218,7 @@ def _uplift(samples: Samples, run: Trajectory, begin: float, end: float) -> tupl
     place = float(run.support_position[nearest])
     if not begin - 1e-6 <= place <= end + 1e-6:
         return math.nan, f"it was measured at {place:.6g} m, outside the run's evaluated spans"
-    measured, simulated = float(rise[at]), float(run.uplift[:, run.support_position == place].max())
+    measured, simulated = float(rise[at]), float(run.uplift_at(place).max())
     words = (
         f"{1e3 * measured:.1f} mm were measured when the train was at {best.position[at]:.1f} m, "
         f"and {1e3 * simulated:.1f} mm simulated at the support at {place:.6g} m"

@@ -197,8 +197,7 @@ def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) 
     speed = from_kmh(round(to_kmh(part.speed), 1))
     facts = LineFacts(system_source="own choice, as no line is given")
     if line is not None:
-        wave = line.contact_wire.wave_speed if isinstance(line, FlexibleCatenaryData) else math.inf
-        wave = line.wave_speed if isinstance(line, SingleData) else wave
+        wave = line.wave_speed if isinstance(line, FlexibleCatenaryData | SingleData) else math.inf
         facts = LineFacts.of(line, wave, speed)
     figures, none = replace(part.figures, max_uplift=uplift), np.zeros(0)
     found = compliance(figures, part.arcing, facts, speed, none, none)

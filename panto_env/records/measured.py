@@ -41,10 +41,9 @@ def measured(
         return np.asarray((end - begin) / step)
 
     uplift = None
-    if run.uplift.size:  # of the support in the middle of the run, of two wires that of the higher one
+    if run.uplift.size:  # of the support in the middle of the run
         middle = run.support_position[np.argmin(np.abs(run.support_position - run.distance / 2))]
-        highest = run.uplift[:, run.support_position == middle].max(axis=1)
-        uplift = np.asarray(np.interp(time, run.time + 0.5 * run.time_step, highest))
+        uplift = np.asarray(np.interp(time, run.time + 0.5 * run.time_step, run.uplift_at(middle)))
     noise = force_noise * np.random.default_rng(seed).standard_normal(count)
     piece = Piece(
         run="",

@@ -173,7 +173,7 @@ class Findings:
         begin, end = run.position[self.inside][[0, -1]]
         stride, places = 1.5 * run.stride, run.support_position[: run.uplift.shape[1]]
         return [
-            (round(run.alignment.in_spans(place)), float(place), float(run.uplift[:, places == place].max()))
+            (round(run.alignment.in_spans(place)), float(place), float(run.uplift_at(place).max()))
             for place in np.unique(places)
             if begin - stride <= place <= end + stride
         ]

@@ -182,7 +182,7 @@ class FlexibleCatenary:
         for each in runs.conditions:
             check_condition(designed, each)
         own = locate(designed.layout(spans), condition)
-        self.wave_speed = data.contact_wire.wave_speed
+        self.wave_speed = data.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
         check_speeds(data.name, np.sqrt(1 - error) * self.wave_speed, runs.speeds)
         tightest = with_tension_left(designed, condition, ((1 + error) * contact, (1 + error) * messenger))

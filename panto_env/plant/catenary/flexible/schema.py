@@ -136,9 +136,6 @@ class FlexibleCatenaryData(CatenaryData):
         given = end.get("stitch_wire") if isinstance(end, Mapping) else None
         if isinstance(end, Mapping) and isinstance(given, Mapping) and isinstance(own, Mapping):
             table["end_support"] = {**end, "stitch_wire": {**own, **given}}
-        sources = table.get("sources") or {}
-        if "damping.ratio" in sources:  # alpha and beta follow from it
-            table["sources"] = {"damping": f"from damping.ratio: {sources['damping.ratio']}", **sources}
         line = handler(table)
         check_contact_wires(line)
         if not line.sequence:
@@ -198,9 +195,7 @@ class FlexibleCatenaryData(CatenaryData):
         if not self.sequence:
             return replace(super().alignment(spans), masts=named)
         lengths = [span.span_length for span in self.layout().spans]
-        count = len(lengths) if spans is None else spans
-        every = (lengths + lengths[-1:] * (count - len(lengths)))[:count]
-        return replace(Alignment.of_spans(every), masts=named)
+        return replace(Alignment.of_spans(lengths, spans), masts=named)
 
     @property
     def contact_heights(self) -> tuple[float, ...]:
@@ -242,6 +237,11 @@ class FlexibleCatenaryData(CatenaryData):
     def stride(self) -> float:
         """Length of a span (m), the mean where spans differ: by this a window travels."""
         return self.alignment().mean_length
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of waves along the contact wire (m/s), which no train may reach."""
+        return self.contact_wire.wave_speed
 
     @property
     def wires(self) -> tuple[Conductor, Conductor]:

@@ -110,9 +110,7 @@ class SingleData(CatenaryData):
         """
         if not self.span_lengths:
             return super().alignment(spans)
-        count = len(self.span_lengths) if spans is None else spans
-        more = self.span_lengths[-1:] * max(count - len(self.span_lengths), 0)
-        return Alignment.of_spans((*self.span_lengths, *more)[:count])
+        return Alignment.of_spans(self.span_lengths, spans)
 
     @property
     def wave_speed(self) -> float:
