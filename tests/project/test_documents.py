@@ -37,6 +37,7 @@ RULES = (
     Rule("panto app", "serves its page until it is stopped; tests/app/ has a browser look at it"),
     Rule("panto benchmark", "all speeds and seeds", "--speed 300 --seeds 1 --workers 1"),
     Rule("panto benchmark passive pd runs", "all seeds", "--seeds 1 --workers 1"),
+    Rule("panto benchmark passive pd:washout=1 fb+ff", "all seeds", "--seeds 1 --workers 1"),
     Rule("panto benchmark ppo-0", "wants five trainings of a minute each, which README's snippet makes"),
     Rule("panto returns", "20 episodes of each policy", "--episodes 2"),
     Rule("panto dataset episodes dataset-known-line", "a thousand", "--episodes 1 --workers 1"),
