@@ -24,7 +24,7 @@ from ..catalog import load_catenary, load_pantograph
 from ..rig import report
 from ..rig.computer import compare, load_rig
 from ..rig.report import plot_pairs
-from ..studies.en50318 import study
+from ..studies.en50318 import own_standard, study
 from ..studies.en50318.reference import plot_reference
 from ..studies.throughput import study as measured
 from ..studies.throughput import tables as shown
@@ -74,10 +74,22 @@ def validate(
         bool,
         Option("--brief", help="Print one line: whether all figures of the standard's table are inside."),
     ] = False,
+    standard: Annotated[
+        Path | None,
+        Option(
+            help="TOML file with lines, tests and accepted ranges of a standard that you own, to be compared "
+            "instead; docs/own-standard.md."
+        ),
+    ] = None,
     plot: Plot = None,
     json: Json = False,
 ) -> None:
     """Check the flexible catenary against EN 50318:2002; exit with 1 if any figure lies outside."""
+    if standard is not None:
+        if brief or plot is not None or any((convergence, window, wear, conditions, lines, start)):
+            raise InputError("--standard prints one table; of the other options it takes --json alone.")
+        _compare(standard, json)
+        return
     with progress_console.status("validating") as status:
         validation = study.run(
             status.update,
@@ -112,6 +124,22 @@ def validate(
             else:
                 alert("Not all figures are inside.")
     if not validation.passed:
+        raise typer.Exit(1)
+
+
+def _compare(path: Path, json: bool) -> None:
+    form = own_standard.read_standard(path)
+    with progress_console.status("comparing") as status:
+        compared = own_standard.compare(form, lambda name: status.update(f"comparing {escape(name)}"))
+    if json:
+        print_json(compared.as_dict())
+    else:
+        print_table(compared.table)
+        if compared.passed:
+            console.print("All figures inside.")
+        else:
+            alert("Not all figures are inside.")
+    if not compared.passed:
         raise typer.Exit(1)
 
 
