@@ -118,7 +118,14 @@ def folder(tmp_path, monkeypatch):
         shutil.copytree(ROOT / "docs" / name, tmp_path / "docs" / name)
     shutil.copytree(ROOT / "examples" / "submission", tmp_path / "my-policy")
     (tmp_path / "docs" / "figures").mkdir()
-    for name in ("masts.csv", "overlap.toml", "curve-masts.csv", "re250-arms.toml", "standard.toml"):
+    for name in (
+        "masts.csv",
+        "overlap.toml",
+        "curve-masts.csv",
+        "re250-arms.toml",
+        "standard.toml",
+        "droppers.toml",
+    ):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     truth = parameters_of(load_pantograph("identified-2dof"))
     write_record(
