@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from panto_env import line as line_of
 from panto_env import simulate
+from panto_env.analysis.line_check import check, elasticity_table
 from panto_env.base.table import Table
+from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.parts import index_at
@@ -130,8 +133,16 @@ def uplift(name: str, arm: bool, pantographs: int, both: bool = False) -> float:
     return 1e3 * max(own.summary((10, 19)).max_uplift for own in run.train)
 
 
+def of_the_catalogue() -> Table:
+    """Elasticity of the catalogue's flexible lines whose spans are all alike, beside what is published."""
+    lines = [load_catenary(name) for name in available("catenary")]
+    alike = [each for each in lines if isinstance(each, FlexibleCatenaryData) and not each.sequence]
+    found = elasticity_table([check(each, 100.0) for each in alike])
+    return replace(found, title="Elasticity of the catalogue's lines at 100 N, published ones in brackets")
+
+
 def tables() -> list[Table]:
-    """Both tables of the page."""
+    """All tables of the page."""
     rows, lifted = [], []
     for name, own in LINES.items():
         if own.elasticity is not None:
@@ -163,6 +174,7 @@ def tables() -> list[Table]:
             ("line", "km/h", *both),
             lifted,
         ),
+        of_the_catalogue(),
     ]  # fmt: skip
 
 
