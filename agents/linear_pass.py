@@ -8,6 +8,7 @@ sensors.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,20 +44,32 @@ class Columns(NamedTuple):
     deviate: bool  # whether readings are deviations from their slow averages
 
 
+class Judged(NamedTuple):
+    """What a pass is judged by; times are control steps."""
+
+    force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
+    counted_from: int
+    end: int
+    passive_mean: float  # of the force without control, where it counts (N)
+    passive_variance: float  # likewise (N^2)
+
+    @property
+    def ratio(self) -> float:
+        """Sigma over that without control, of the pass as it was measured."""
+        return math.sqrt(float(self.force[self.counted_from + 1 : self.end].var()) / self.passive_variance)
+
+
 class LinearPass(NamedTuple):
     """One pass of a policy; times are control steps, 0 at the start."""
 
     observations: Numbers  # (times + 1, entries)
     actions: Numbers  # (times,): of the network, after its washout
-    force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
     # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, values + 1), in units of its own: of
     # scaled readings, not of their deviations, of the action with what a base policy adds, of the force (N).
     response: NDArray[np.int16]
     unit: Numbers  # (values + 1,)
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
-    passive_mean: float  # of the force without control, where it counts (N)
-    passive_variance: float  # likewise (N^2)
-    counted_from: int  # step
+    judged: Judged
 
 
 def columns_of(layout: Layout) -> Columns:
@@ -90,13 +103,6 @@ def columns_of(layout: Layout) -> Columns:
     )
 
 
-class Base(NamedTuple):
-    """A policy that a network adds to."""
-
-    law: LanesLaw  # acts in all lanes at once
-    share: float  # part of the actuator's limit that the network may add
-
-
 class Pulsing(NamedTuple):
     """How responses are measured."""
 
@@ -125,12 +131,17 @@ def begun(settings: RunSettings, seed: int, lanes: int = 1) -> Task:
 
 
 def measure(
-    settings: RunSettings, policy: Policy, seed: int, pulsing: Pulsing, base: Base | None = None
+    settings: RunSettings,
+    policy: Policy,
+    seed: int,
+    pulsing: Pulsing,
+    law: LanesLaw | None = None,
+    share: float = 1.0,
 ) -> LinearPass:
     """The pass of a policy under a seed, on a line and at a speed drawn by it.
 
-    base: to which the policy adds; it reacts to pulses. Raises InputError where the pass ends early, or for
-    settings that do not fit.
+    law: to which the policy adds a share of its action; it reacts to pulses. Raises InputError where the pass
+    ends early, or for settings that do not fit.
     """
     task = begun(settings, seed, lanes=pulsing.lanes + 2)
     columns = columns_of(task.layout)
@@ -138,9 +149,8 @@ def measure(
     first = int(task.plant.of(0, Row.STEP, task.episode.controlled[0])) // task.length.control_steps
     context = task.context(0)
     policy.reset(context)
-    if base is not None:
-        base.law.begin(context, task.lanes)
-    share = 1.0 if base is None else base.share
+    if law is not None:
+        law.begin(context, task.lanes)
     readings, action = columns.now[0, :-1], columns.now[0, -1]
     scale = task.layout.scale[readings]
     observations, differences, places, speeds = [], [], [], []
@@ -163,8 +173,8 @@ def measure(
     while not task.results.flags[0].any():
         seen = task.results.observation.copy()
         under = np.zeros(task.lanes)
-        if base is not None:
-            under = np.clip(base.law.forces(seen) / context.force_limit, -1.0, 1.0)
+        if law is not None:
+            under = np.clip(law.forces(seen) / context.force_limit, -1.0, 1.0)
         every = np.full(task.lanes, float(policy.act(seen[0])[0]))
         if len(actions) % pulsing.spacing == 0:
             lane = 1 + len(pulses) % pulsing.lanes
@@ -177,27 +187,22 @@ def measure(
         observe()
     if task.results.terminated.any():
         raise InputError(task.ending(int(np.flatnonzero(task.results.terminated)[0])))
-    force = _filtered(task, first, first + len(actions))
+    every, collector, last = task.length.control_steps, task.episode.controlled[0], first + len(actions)
+    rows: Any = task.samples.rows[:, : last * every + 1, collector, Row.CONTACT_FORCE]
+    # As EN 50317 filters it, at each control step, (times + 1, lanes).
+    force = np.asarray(low_pass(rows, task.plant.time_step)[:, first * every :: every].T)
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
-    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps - first
+    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // every - first
     passive = force[counted + 1 :, -1]
     return LinearPass(
         np.array(observations, dtype=np.float32),
         np.array(actions, dtype=np.float32),
-        force[:, 0].astype(np.float32),
         *_responses(moved, np.array(pulses), pulsing),
         _recalled(task, np.array(places), np.array(speeds)),
-        float(passive.mean()),
-        float(passive.var()),
-        counted,
+        Judged(
+            force[:, 0].astype(np.float32), counted, len(actions), float(passive.mean()), float(passive.var())
+        ),
     )
-
-
-def _filtered(task: Task, first: int, last: int) -> NDArray[np.float64]:
-    """Contact force as EN 50317 filters it, at control steps first to last, (last - first + 1, lanes), N."""
-    every, collector = task.length.control_steps, task.episode.controlled[0]
-    rows: Any = task.samples.rows[:, : last * every + 1, collector, Row.CONTACT_FORCE]
-    return np.asarray(low_pass(rows, task.plant.time_step)[:, first * every :: every].T)
 
 
 def _responses(

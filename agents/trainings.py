@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,13 @@ class RunFolder:
         self.evaluations = self.path / "evaluations.csv"
         self.tensorboard = self.path / "tensorboard"
         self.checkpoints = self.path / "checkpoints"
+
+    def check(self, training: Training, resume: bool) -> None:
+        """Raise InputError if the folder holds anything, or, to resume, unless it holds such a run."""
+        if resume:
+            self.check_resumable(training)
+        else:
+            self.check_new()
 
     def check_new(self) -> None:
         """Raise InputError if the folder holds anything already."""
@@ -107,8 +115,8 @@ class RunFolder:
         for pair in pairs:
             row: dict[str, Any] = {"steps": steps}
             row |= {name: getattr(pair, name) for name in ("speed_kmh", "seed", "qualified")}
-            row |= {f"policy_{key}": value for key, value in pair.policy.as_dict().items()}
-            row |= {f"passive_{key}": value for key, value in pair.passive.as_dict().items()}
+            for of in ("policy", "passive"):
+                row |= {f"{of}_{key}": value for key, value in getattr(pair, of).as_dict().items()}
             rows.append({key: str(value) for key, value in row.items()})
         self._write_rows(rows)
 
@@ -152,10 +160,8 @@ def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Values of nested tables under dotted keys, such as "hyperparameters.gamma"."""
     values: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, Mapping):
-            values |= _dotted(value, f"{prefix}{key}.")
-        else:
-            values[prefix + key] = value
+        name = prefix + key
+        values |= _dotted(value, f"{name}.") if isinstance(value, Mapping) else {name: value}
     return values
 
 
@@ -187,16 +193,15 @@ def plan(
     two runs would have the same folder.
     """
     planned: dict[Path, Training] = {}
-    for config in configs:
-        for seed in seeds or (None,):
-            training = load_training(config, seed=seed, total_steps=total_steps)
-            folder = output / run_name(config, training)
-            if folder in planned:
-                raise InputError(
-                    f"Two of the trainings would go into {folder}; omit a repeated seed, or rename "
-                    "a configuration file."
-                )
-            planned[folder] = training
+    for config, seed in product(configs, seeds or (None,)):
+        training = load_training(config, seed=seed, total_steps=total_steps)
+        folder = output / run_name(config, training)
+        if folder in planned:
+            raise InputError(
+                f"Two of the trainings would go into {folder}; omit a repeated seed, or rename a "
+                "configuration file."
+            )
+        planned[folder] = training
     return planned
 
 
@@ -223,10 +228,10 @@ def train_all(
     spread(jobs, workers=workers, ray=ray, progress=progress)
     outcomes = []
     for path, training in trainings.items():
-        folder = RunFolder(path)
-        facts, _ = read_model(folder.best)
-        made = str(folder.path), training.algorithm, training.seed, training.total_steps
-        outcomes.append(Outcome(*made, str(folder.best), facts.steps, facts.ratio, facts.qualified))
+        best = RunFolder(path).best
+        facts, _ = read_model(best)
+        made = str(path), training.algorithm, training.seed, training.total_steps
+        outcomes.append(Outcome(*made, str(best), facts.steps, facts.ratio, facts.qualified))
     return outcomes
 
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import partial
+from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -26,7 +30,7 @@ from ..evaluation import NOT_OF_A_PASS
 from ..policy import TrainedPolicy
 from ..settings import arguments
 from . import acting, seeing
-from .parts import Table, new_state, parts_of, without_guard
+from .parts import Table, parts_of, without_guard
 from .translate import Translation
 
 READINGS = (
@@ -39,6 +43,7 @@ READINGS = (
     ("speed", "m/s", "of the train"),
 )
 """Name, unit and meaning of the readings of every policy, in the order of ``seeing``."""
+WRAPPER = resources.files(__package__) / "wrapper"
 WIDTH = 96
 """Letters of a line of comment."""
 
@@ -89,7 +94,7 @@ class Controller:
 
     def begin(self) -> None:
         """Begin anew, as NAME_init does."""
-        self._state = new_state(self._initial)
+        self._state = SimpleNamespace(**deepcopy(self._initial))
         acting.begin(self._constants, self._state)
 
     def step(self, readings: Sequence[float]) -> list[float]:
@@ -142,9 +147,25 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
     translation.add(acting.begin)
     translation.add(acting.step)
     card, interval = _card(words, driver, task), context.control_interval
-    source = _source(called, inputs, translation, card)
-    header = _header(called, inputs, outputs, translation, interval, card)
+    forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
+    call = (
+        f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite number, or "
+        f"above {seeing.LARGEST:g}, counts as its last good one; until each was good once, force is 0. It "
+        "stays finite and within its limit whatever is read."
+    )
+    given = {"name": called, "inputs": inputs, "translation": translation, "card": card, "call": call}
+    source, header = (rendered(name, given) for name in ("controller.c", "controller.h"))
     return Exported(called, source, header, tuple(inputs), outputs, interval, card, constants, state)
+
+
+def rendered(name: str, values: Mapping[str, Any]) -> str:
+    """A text with values, from its template in the folder ``wrapper``."""
+    from jinja2 import Environment, StrictUndefined  # slow to import
+
+    options: Any = {"undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(**options, keep_trailing_newline=True)
+    environment.filters |= {"comment": _comment, "xml": partial(escape, entities={'"': "&quot;"})}
+    return environment.from_string((WRAPPER / f"{name}.jinja").read_text()).render(values)
 
 
 def name_in_c(words: str) -> str:
@@ -199,55 +220,6 @@ def _card(name: str, driver: Any, task: Task) -> str:
         "It was trained and judged in simulation alone; nobody has run it on a train.",
     ]
     return "\n".join(lines)
-
-
-def _source(name: str, inputs: Sequence[Variable], translation: Translation, card: str) -> str:
-    """The C file."""
-    values = ",\n".join(f"        readings->{each.name}" for each in inputs)
-    parts = [
-        _comment(card),
-        f'#include <math.h>\n#include "{name}.h"',
-        translation.constant_tables(),
-        "\n".join(translation.declarations),
-        *translation.functions.values(),
-        f"void {name}_init({name}_state *state)\n{{\n    "
-        f"*state = ({name}_state){{0}};\n    begin(state);\n}}",
-        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force)\n{{\n"
-        f"    const double given[{len(inputs)}] = {{\n{values}}};\n    "
-        f"step(state, given, force);\n}}",
-    ]
-    return "\n\n".join(parts) + "\n"
-
-
-def _header(
-    name: str,
-    inputs: Sequence[Variable],
-    outputs: Sequence[Variable],
-    translation: Translation,
-    interval: float,
-    card: str,
-) -> str:
-    """The header."""
-    readings = "\n".join(f"    double {each.name}; /* {each.unit}: {each.description} */" for each in inputs)
-    forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
-    guard = f"{name.upper()}_H"
-    call = (
-        f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite "
-        f"number, or above {seeing.LARGEST:g}, counts as its last good one; until each was good once, "
-        "force is 0. It stays finite and within its limit whatever is read."
-    )
-    start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
-    return (
-        f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
-        '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
-        f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
-        "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
-        f"typedef struct {{\n{translation.state_fields()}\n}} {name}_state;\n\n"
-        f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
-        f"{_comment(call)}\n"
-        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
-        "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
-    )
 
 
 def _comment(text: str) -> str:
