@@ -146,7 +146,13 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
     translation = Translation(constants, state, f"{called}_state")
     translation.add(acting.begin)
     translation.add(acting.step)
-    card, interval = _card(words, driver, task), context.control_interval
+    inner, interval = without_guard(driver), context.control_interval
+    facts = inner.facts if isinstance(inner, TrainedPolicy) else None
+    varied = [] if facts is None else [item for each in facts.variants for item in each.items()]
+    told = {"name": words, "version": __version__, "facts": facts, "guarded": inner is not driver}
+    told |= {"kinds": sorted({f"{key} {value}" for key, value in varied if key != "faults"})}
+    told |= {"context": context, "kmh": [to_kmh(speed) for speed in task.settings.speeds]}
+    card = rendered("card.txt", told)
     forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
     call = (
         f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite number, or "
@@ -189,37 +195,6 @@ def _task(driver: Any, settings: dict[str, Any]) -> Task:
     task = Task(on_example(run_settings(given)), keep_samples=False)
     task.reset(0, np.random.default_rng(0))
     return task
-
-
-def _card(name: str, driver: Any, task: Task) -> str:
-    """Facts of a policy, in lines of plain text."""
-    inner = without_guard(driver)
-    context = task.context(0)
-    low, high, count = *map(to_kmh, task.settings.speeds), len(context.train.collectors)
-    lines = [f"Policy {name}, exported by panto-env {__version__}."]
-    if isinstance(inner, TrainedPolicy):
-        facts = inner.facts
-        lines += [
-            f"Trained by {facts.algorithm}, {facts.steps} steps, seed {facts.seed}, panto-env "
-            f"{facts.version}, commit {facts.commit or 'unknown'}, by: {facts.command or 'unknown'}.",
-            "Trained in: " + ", ".join(f"{key} = {value}" for key, value in facts.environment.items()) + ".",
-        ]
-        if facts.variants:
-            kinds = sorted(
-                {f"{key} {each[key]}" for each in facts.variants for key in each if key != "faults"}
-            )
-            lines.append("and in variants with " + ", ".join(kinds) + ".")
-    if inner is not driver:
-        lines.append("Guarded: doubtful readings are held, and a command that does harm fades to none.")
-    lines += [
-        f"Its constants are for the line {context.catenary.name}, mean length of a span "
-        f"{context.alignment.mean_length:.4g} m, pantograph {context.pantograph.name}, "
-        f"{low:.4g} to {high:.4g} km/h.",
-        *([f"It is for pantograph {context.collector + 1} of {count} of a train."] if count > 1 else ()),
-        f"A call every {context.control_interval:g} s; force limit {context.force_limit:g} N.",
-        "It was trained and judged in simulation alone; nobody has run it on a train.",
-    ]
-    return "\n".join(lines)
 
 
 def _comment(text: str) -> str:
