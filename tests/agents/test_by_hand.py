@@ -106,14 +106,12 @@ def test_a_pair_of_passes_has_the_figures_of_those_that_did_not_end_early():
     assert pair(ended, replace(passive, terminated=True)).spans == ""
 
 
-LAYERS = {"actor/weight_0": np.ones((3, 2)), "actor/bias_0": np.ones(3)}
-LAYERS |= {"actor/weight_1": np.ones((1, 3)), "actor/bias_1": np.ones(1)}
 FACTS = SimpleNamespace(needs=SimpleNamespace(channels=(0,)), inputs=2, activation="tanh", squashed=False)
 
 
-CELLS = {"weight_input": (6, 3), "weight_state": (6, 2), "bias_input": (6,), "bias_state": (6,)}
-RECURRENT = LAYERS | {f"actor/cell_{name}": np.ones(shape) for name, shape in CELLS.items()}
-RECURRENT |= {"actor/weight_1": np.ones((1, 5))}
+SHAPES = {"weight_0": (3, 2), "bias_0": (3,), "weight_1": (1, 5), "bias_1": (1,), "cell_weight_input": (6, 3)}
+SHAPES |= {"cell_weight_state": (6, 2), "cell_bias_input": (6,), "cell_bias_state": (6,)}
+RECURRENT = {f"actor/{name}": np.ones(shape) for name, shape in SHAPES.items()}
 
 
 @pytest.mark.parametrize(
@@ -291,8 +289,7 @@ def test_a_training_says_where_its_models_are_and_how_good(
     (tmp_path / "it.toml").write_text(TOML)
     names = ("path", "tensorboard", "model", "best")
     paths = SimpleNamespace(**{name: Path(name) for name in names})
-    facts = dict.fromkeys(command.REPORTED_FACTS) | {"steps": 64}
-    facts |= {"ratio": ratio, "qualified": qualified}
+    facts = {"steps": 64, "ratio": ratio, "qualified": qualified}
     monkeypatch.setattr("panto_agents.train.train", lambda *_, **__: paths)
     monkeypatch.setattr("panto_agents.model_file.read_model", lambda path: (SimpleNamespace(**facts), None))
     command.train(tmp_path / "it.toml", output=tmp_path / "out")

@@ -123,8 +123,3 @@ def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, 
     with pytest.raises(InputError, match="not a whole model file"):
         raise export(tmp_path / "damaged.safetensors", "out.safetensors").exception
     assert not (tmp_path / "out.safetensors").exists()
-
-
-def test_its_time_constant_is_positive():
-    with pytest.raises(InputError, match="washout"):
-        settings("ppo", washout={"time_constant": 0.0})
