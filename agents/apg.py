@@ -27,12 +27,12 @@ from panto_env.analysis.pool import in_threads
 from panto_env.backend import WIDTH
 from panto_env.base.errors import InputError
 from panto_env.base.machine import cores
-from panto_env.control.entries import AVERAGED
+from panto_env.control import Context
 from panto_env.control.settings import RunSettings, run_settings
 from panto_env.policies import find_policy
 
 from .device_ppo import OwnLearner
-from .linear_pass import Columns, Judged, LinearPass, Numbers, Pulsing, columns_of, measure
+from .linear_pass import Judged, LinearPass, Numbers, Pulsing, entries_of, measure
 from .model_file import Actor, Cell
 from .policy import NetworkPolicy
 from .rollout import Entries, Given, Slopes, Trace, Washout, Weights, backward, forward
@@ -87,15 +87,6 @@ class Network(nn.Module):  # type: ignore[misc]
         return Cell(*(each.detach().numpy().copy() for each in own))
 
 
-class Terms(NamedTuple):
-    """What all passes of a training have in common."""
-
-    columns: Columns
-    interval: float  # of control (s)
-    limit: float  # of the actuator's force (N)
-    washout: WashoutSettings | None  # of the action
-
-
 class Group(NamedTuple):
     """Passes that are driven abreast, at most ``WIDTH``."""
 
@@ -114,22 +105,13 @@ def grouped(passes: Sequence[LinearPass]) -> list[Group]:
 
 
 def rollout(
-    groups: Sequence[Group], terms: Terms, network: Network
+    groups: Sequence[Group], entries: Entries, washout: Washout, network: Network
 ) -> tuple[torch.Tensor, torch.Tensor, list[torch.Tensor]]:
     """What a network, in place of their own policy, makes of passes, with derivatives by its parameters.
 
     Variance of the force, where it counts, over the passive one, (passes,); shift of the mean force,
     relative to the passive one, (passes,); actions of each pass, (times,).
     """
-    columns, settings = terms.columns, terms.washout
-    average = np.zeros(columns.now.shape[1], dtype=np.float32)
-    if columns.deviate:
-        average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
-    entries = Entries(columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average)
-    washout = Washout(0.0, 1.0, 0.0, terms.interval)
-    if settings is not None:
-        share = 1.0 - math.exp(-terms.interval / settings.time_constant)
-        washout = Washout(share, settings.rate / terms.limit, float(settings.lag), terms.interval)
     given = [each.given for each in groups]
     driven = _Driving.apply(given, entries, washout, network, *network.parameters())
     ratios, shifts, taken = [], [], []
@@ -272,6 +254,15 @@ class Passes:
         """Do nothing: nothing is open."""
 
 
+def washout_of(settings: WashoutSettings | None, context: Context) -> Washout:
+    """A washout as the kernels take it."""
+    interval = context.control_interval
+    if settings is None:
+        return Washout(0.0, 1.0, 0.0, interval)
+    share = 1.0 - math.exp(-interval / settings.time_constant)
+    return Washout(share, settings.rate / context.force_limit, float(settings.lag), interval)
+
+
 class PassLanes(Passes):
     """Measures passes of a policy as linear models."""
 
@@ -279,9 +270,8 @@ class PassLanes(Passes):
         """pulsing: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
         super().__init__(training.environments, training.lanes)
         context = context_of(training.environments[0])
-        columns, interval, limit = columns_of(context.layout), context.control_interval, context.force_limit
-        self.entries = len(context.layout.entries)
-        self.terms = Terms(columns, interval, limit, training.washout)
+        self.entries, self.high_pass = len(context.layout.entries), training.washout
+        self.terms = entries_of(context), washout_of(training.washout, context)
         self._pulsing, self._law, self.share = pulsing, None, 1.0
         if training.residual_of is not None:
             self._law, self.share = find_policy(training.residual_of), training.residual_share
@@ -298,7 +288,7 @@ class PassLanes(Passes):
         """
 
         def one(settings: RunSettings, seed: int) -> LinearPass | InputError:
-            policy = NetworkPolicy(deepcopy(actor), self.terms.washout)
+            policy = NetworkPolicy(deepcopy(actor), self.high_pass)
             try:
                 return measure(settings, policy, seed, self._pulsing, deepcopy(self._law), self.share)
             except InputError as error:
@@ -354,7 +344,7 @@ class APGLearner(NetworkLearner):
         count = max(1, settings.batch_size // WIDTH)
         chosen = self._random.permutation(len(known))[:count].tolist()
         groups = [known[each] for each in chosen]
-        ratios, shifts, actions = rollout(groups, self._lanes.terms, self.network)
+        ratios, shifts, actions = rollout(groups, *self._lanes.terms, self.network)
         beyond = [
             torch.relu(self._lanes.share * each.diff().abs() - settings.rate_free).square().mean()
             for each in actions

@@ -17,31 +17,20 @@ from numpy.typing import NDArray
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.entries import DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
+from panto_env.control.entries import AVERAGED, DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
 from panto_env.control.lines import on_drawn_line
-from panto_env.control.observation import Layout
+from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings
 from panto_env.control.state import Now, TaskRow
 from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.state import Row
 from panto_env.policies import Policy
 
+from .rollout import Entries
+
 PULSE = 0.2
 """Pulse of an action: large beside rounding, small beside the actuator's limit."""
 Numbers = NDArray[np.float32]
-
-
-class Columns(NamedTuple):
-    """Where an observation's entries come from; all others do not depend on actions.
-
-    Nor is the force of a pantograph in front taken to: waves from one behind reach it late and weak.
-    """
-
-    now: NDArray[np.int64]  # (depth, values): readings and last action, now and 1, 2, .. control steps ago
-    force: NDArray[np.int64]  # (spans, times): of the remembered contact force
-    acted: NDArray[np.int64]  # (spans, times): likewise of actions
-    of_force: int  # place of the contact force among the values; the action's is the last one
-    deviate: bool  # whether readings are deviations from their slow averages
 
 
 class Judged(NamedTuple):
@@ -72,8 +61,12 @@ class LinearPass(NamedTuple):
     judged: Judged
 
 
-def columns_of(layout: Layout) -> Columns:
-    """Where the entries of an observation come from. Raises InputError for one that it does not know."""
+def entries_of(context: Context) -> Entries:
+    """Which entries of an observation actions move. Raises InputError for an observation of another kind.
+
+    The force of a pantograph in front is not taken to: waves from one behind reach it late and weak.
+    """
+    layout = context.layout
     names = [entry.name for entry in layout.entries]
     actions = [name for name in names if name.startswith("last ") and "," not in name]
     if layout.kind not in (MEASURED, DEVIATIONS) or len(actions) != 1:
@@ -87,20 +80,18 @@ def columns_of(layout: Layout) -> Columns:
 
     def remembered(kind: str) -> NDArray[np.int64]:
         begin = [f"remembered {kind}, {span} span{'s' if span > 1 else ''} ago" for span in spans]
-        each = [[layout.index(f"{words}, {time:g} s ahead") for time in layout.memory] for words in begin]
-        return np.array(each, dtype=np.int64).reshape(len(spans), len(layout.memory))
+        places = [layout.index(f"{words}, {time:g} s ahead") for words in begin for time in layout.memory]
+        return np.array(places, dtype=np.int64)
 
     now = [
         [layout.index(earlier(name, ago) if ago else name) for name in (*readings, *actions)]
         for ago in range(layout.history + 1)
     ]
-    return Columns(
-        np.array(now),
-        remembered("force" + ending),
-        remembered(f"{actions[0].split()[1]} action"),
-        readings.index("contact force" + ending),
-        layout.kind == DEVIATIONS,
-    )
+    average = np.zeros(len(readings) + 1, dtype=np.float32)
+    if layout.kind == DEVIATIONS:
+        average[:-1] = 1.0 - math.exp(-context.control_interval / AVERAGED)  # the action has no average
+    force, acted = remembered("force" + ending), remembered(f"{actions[0].split()[1]} action")
+    return Entries(np.array(now), force, acted, readings.index("contact force" + ending), average)
 
 
 class Pulsing(NamedTuple):
@@ -144,14 +135,14 @@ def measure(
     ends early, or for settings that do not fit.
     """
     task = begun(settings, seed, lanes=pulsing.lanes + 2)
-    columns = columns_of(task.layout)
     # A pantograph behind another one comes onto the line later.
     first = int(task.plant.of(0, Row.STEP, task.episode.controlled[0])) // task.length.control_steps
     context = task.context(0)
+    now = entries_of(context).now[0]
     policy.reset(context)
     if law is not None:
         law.begin(context, task.lanes)
-    readings, action = columns.now[0, :-1], columns.now[0, -1]
+    readings, action, deviate = now[:-1], now[-1], task.layout.kind == DEVIATIONS
     scale = task.layout.scale[readings]
     observations, differences, places, speeds = [], [], [], []
     actions: list[float] = []
@@ -161,7 +152,7 @@ def measure(
         seen = task.results.observation
         observations.append(seen[0].copy())
         values = seen[:, readings].astype(float)
-        if columns.deviate:  # their averages forget more slowly than responses are kept
+        if deviate:  # their averages forget more slowly than responses are kept
             values += task.episode.averages / scale
         values = np.column_stack([values, seen[:, action]])
         differences.append(values[1:-1] - values[0])

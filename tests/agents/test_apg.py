@@ -30,32 +30,16 @@ FEW = {"updates": 2, "batch_size": 2, "net_arch": [16, 8], "response_steps": 9}
 MEMORY = {"history": 2, "memory": [0.0, 0.05, 0.1], "memory_spans": 2, "harmonics": 2}
 
 
+PASS = {"id": "Pantograph-v0", "accuracy": "fast", "washout": 0, "settle": 2, "distance": 150.0}
+PASS |= {"line_condition": "as-built"}
+
+
 def settings(**changes: Any) -> Training:
-    environment = {
-        "id": "Pantograph-v0",
-        "accuracy": "fast",
-        "washout": 0,
-        "settle": 2,
-        "distance": 150.0,
-        "speed_kmh": 300,
-        "line_condition": "as-built",
-        "actuator": "realistic",
-        "sensors": "realistic",
-        "observation": "measured",
-        "normalise": 300,
-        **MEMORY,
-        **changes.pop("environment", {}),
-    }
-    table = {
-        "algorithm": "apg",
-        "total_steps": 80_000,
-        "lanes": 2,
-        "checkpoint_steps": 40_000,
-        "washout": {},
-        "environment": environment,
-        "evaluation": {"interval_steps": 80_000},
-        "hyperparameters": {"updates": 2, "batch_size": 2, "net_arch": [16], "learning_rate": 1e-2},
-    }
+    environment = PASS | {"speed_kmh": 300, "observation": "measured", "normalise": 300} | MEMORY
+    environment |= {"actuator": "realistic", "sensors": "realistic"} | changes.pop("environment", {})
+    table = {"algorithm": "apg", "total_steps": 80_000, "lanes": 2, "checkpoint_steps": 40_000, "washout": {}}
+    table |= {"environment": environment, "evaluation": {"interval_steps": 80_000}}
+    table["hyperparameters"] = {"updates": 2, "batch_size": 2, "net_arch": [16], "learning_rate": 1e-2}
     return parse_training(table | changes, "the test")
 
 
@@ -111,7 +95,7 @@ def test_a_network_repeats_its_own_pass(case):
     """Actions and variance of the pass in torch are those of the environment, washout and memory included."""
     _, made, _, own = case
     with torch.no_grad():
-        ratios, _, actions = rollout(grouped([own]), made.get_env().terms, made.network)
+        ratios, _, actions = rollout(grouped([own]), *made.get_env().terms, made.network)
     assert np.sqrt(np.mean(own.actions**2)) > 0.05
     np.testing.assert_allclose(actions[0].numpy(), own.actions, atol=1e-5)
     assert float(ratios[0]) == pytest.approx(own.judged.ratio**2, rel=1e-4)
@@ -122,7 +106,7 @@ def test_the_gradient_is_that_of_the_plant(case):
     """Beside differences of whole passes in the plant, along the gradient and along a random direction."""
     training, made, seed, own = case
     parameters = list(made.network.parameters())
-    ratios, _, _ = rollout(grouped([own]), made.get_env().terms, made.network)
+    ratios, _, _ = rollout(grouped([own]), *made.get_env().terms, made.network)
     slopes = torch.autograd.grad(ratios[0], parameters)
     torch.manual_seed(3)
     for direction in (slopes, [torch.randn_like(each) for each in parameters]):
@@ -139,7 +123,7 @@ def test_the_gradient_is_that_of_the_plant(case):
 
 def test_a_pass_is_that_of_simulate():
     """The force, filtered along the whole record, and the passive variance where an episode counts."""
-    training = settings(environment={"settle": 2, "distance": 150.0})
+    training = settings()
     lanes = PassLanes(training, ALONE)
     own = measure(lanes._settings[0], _Script({60: 0.5}), TRAINING[0], ALONE).judged
     given = {"accuracy": "fast", "speed_kmh": 300, "line_condition": "as-built", "distance": 150.0 + 120}

@@ -21,6 +21,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.policies import find_policy
 
+from .test_apg import PASS
 from .test_rollout import stepped
 
 torch.set_num_threads(1)
@@ -30,35 +31,12 @@ SEEN = {"harmonics": 2, "history": 1, "memory": [0, 0.04, 0.1], "memory_spans": 
 
 
 def settings(**changes: Any) -> Training:
-    environment = {
-        "id": "Pantograph-v0",
-        "accuracy": "fast",
-        "washout": 0,
-        "settle": 2,
-        "distance": 150.0,
-        "catenary": "re330",
-        "pantograph": "dsa380",
-        "speed_kmh": [260, 300],
-        "line_condition": "as-built",
-        "observation": "deviations",
-        **SEEN,
-        **changes.pop("environment", {}),
-    }
-    table = {
-        "algorithm": "dagger",
-        "total_steps": 6_000,
-        "lanes": 6,
-        "checkpoint_steps": 10_000,
-        "washout": {},
-        "environment": environment,
-        "evaluation": {"interval_steps": 10_000, "speeds_kmh": [280]},
-        "hyperparameters": {
-            "teacher": TEACHER,
-            "learning_rate": [1e-2, 1e-3],
-            "net_arch": [8],
-            "recurrent_units": 4,
-        },
-    }
+    environment = PASS | {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": [260, 300]} | SEEN
+    environment |= {"observation": "deviations"} | changes.pop("environment", {})
+    table = {"algorithm": "dagger", "total_steps": 6000, "lanes": 6, "checkpoint_steps": 9000, "washout": {}}
+    table |= {"environment": environment, "evaluation": {"interval_steps": 9000, "speeds_kmh": [280]}}
+    hyperparameters = {"teacher": TEACHER, "learning_rate": [1e-2, 1e-3], "net_arch": [8]}
+    table["hyperparameters"] = hyperparameters | {"recurrent_units": 4}
     return parse_training(table | changes, "the test")
 
 
