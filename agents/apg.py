@@ -343,8 +343,8 @@ class APGLearner(NetworkLearner):
         settings = self._settings
         count = max(1, settings.batch_size // WIDTH)
         chosen = self._random.permutation(len(known))[:count].tolist()
-        groups = [known[each] for each in chosen]
-        ratios, shifts, actions = rollout(groups, *self._lanes.terms, self.network)
+        groups, (entries, washout) = [known[each] for each in chosen], self._lanes.terms
+        ratios, shifts, actions = rollout(groups, entries, washout, self.network)
         beyond = [
             torch.relu(self._lanes.share * each.diff().abs() - settings.rate_free).square().mean()
             for each in actions

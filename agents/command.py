@@ -47,8 +47,6 @@ def check_packages() -> None:
 
 ROWS = ["mean", "std", "max", "min", "cost_function", "contact_loss", "max_uplift", "effort", "effort_rate"]
 """Figures that `panto evaluate` prints."""
-REPORTED_FACTS = ("steps", "ratio", "qualified")
-"""Facts of a model file that `panto train` prints."""
 
 
 def train(
@@ -88,7 +86,8 @@ def train(
     for name, label in (("model", "final model"), ("best", "best at an evaluation")):
         path = getattr(paths, name)
         facts, _ = read_model(path)
-        report |= {name: str(path)} | {f"{name}_{key}": getattr(facts, key) for key in REPORTED_FACTS}
+        report |= {name: str(path), f"{name}_steps": facts.steps}
+        report |= {f"{name}_ratio": facts.ratio, f"{name}_qualified": facts.qualified}
         ratio = facts.ratio
         change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
         note = "" if facts.qualified else ", F_m out of range: disqualified"
@@ -314,12 +313,13 @@ def trainings(
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({output}).")
         raise typer.Exit(130) from error
     if json:
-        print_json([asdict(each) for each in outcomes])
+        print_json(outcomes)
         return
     rows = []
     for each in outcomes:
-        change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"
-        rows.append((each.best, str(each.best_steps), change, "" if each.qualified else "F_m out of range"))
+        change = "ended early" if each["ratio"] is None else f"{100 * (each['ratio'] - 1):+.1f} %"
+        told = "" if each["qualified"] else "F_m out of range"
+        rows.append((each["best"], str(each["best_steps"]), change, told))
     headings = ("model file", "step", "σ to passive", "disqualified")
     print_table(Table("best models", headings, tuple(rows)))
 

@@ -164,7 +164,7 @@ class ActorCritic(nn.Module):  # type: ignore[misc]
 
     def values(self, observations: torch.Tensor) -> torch.Tensor:
         """Expected discounted rewards, (...,)."""
-        return self.critic(observations).squeeze(-1)  # type: ignore[no-any-return]
+        return self.critic(observations).squeeze(-1)
 
 
 class DevicePPO(OwnLearner):

@@ -266,7 +266,8 @@ def make_lanes(training: Training) -> Any:
     arguments are not valid.
     """
     if isinstance(settings := training.hyperparameters, APG):
-        from .apg import PassLanes, Pulsing
+        from .apg import PassLanes
+        from .linear_pass import Pulsing
 
         return PassLanes(training, Pulsing(settings.response_steps, settings.pulse_spacing))
     if isinstance(settings, DAgger):
@@ -297,4 +298,5 @@ def make_lanes(training: Training) -> Any:
 def lane_seeds(training: Training, steps: int = 0) -> range:
     """Seeds of the lanes, within those for training, by the training's seed and the steps done."""
     first = (training.seed * training.lanes + steps) % (len(TRAINING) - training.lanes + 1)
-    return TRAINING[first : first + training.lanes]
+    seeds: range = TRAINING[first : first + training.lanes]
+    return seeds

@@ -178,12 +178,12 @@ def measure(
         observe()
     if task.results.terminated.any():
         raise InputError(task.ending(int(np.flatnonzero(task.results.terminated)[0])))
-    every, collector, last = task.length.control_steps, task.episode.controlled[0], first + len(actions)
-    rows: Any = task.samples.rows[:, : last * every + 1, collector, Row.CONTACT_FORCE]
+    ratio, collector, last = task.length.control_steps, task.episode.controlled[0], first + len(actions)
+    rows: Any = task.samples.rows[:, : last * ratio + 1, collector, Row.CONTACT_FORCE]
     # As EN 50317 filters it, at each control step, (times + 1, lanes).
-    force = np.asarray(low_pass(rows, task.plant.time_step)[:, first * every :: every].T)
+    force = np.asarray(low_pass(rows, task.plant.time_step)[:, first * ratio :: ratio].T)
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
-    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // every - first
+    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // ratio - first
     passive = force[counted + 1 :, -1]
     return LinearPass(
         np.array(observations, dtype=np.float32),

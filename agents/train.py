@@ -24,7 +24,7 @@ from .algorithm import APG
 from .cloning import demonstrate
 from .evaluation import Comparison, Pair, in_words, verdict
 from .lanes import PolicyLanes, lane_seeds, make_lanes
-from .model_file import Facts, Needs, read_model, restore, write_model
+from .model_file import Actor, Facts, Needs, read_model, restore, write_model
 from .policy import policy_of
 from .settings import Training, context_of
 from .trainings import RunFolder
@@ -233,8 +233,7 @@ class Run:
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        actor = self.training.hyperparameters.actor(self.model)
-        policy = policy_of(actor, self._facts(actor))  # in the form of its model file
+        policy = policy_of(*self._policy())  # in the form of its model file
         self.pairs = [pair for each in self._comparisons for pair in each.run(policy)]
         self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
@@ -255,13 +254,13 @@ class Run:
         self.folder.drop_old_checkpoints()
 
     def _save(self, path: Path, replay: bool = False) -> None:
-        actor = self.training.hyperparameters.actor(self.model)
-        write_model(path, self.model, actor, self._facts(actor), replay)
+        write_model(path, self.model, *self._policy(), replay)
 
-    def _facts(self, actor: Any) -> Facts:
-        ratio, qualified = self._verdict
+    def _policy(self) -> tuple[Actor, Facts]:
+        """Network and facts of the present policy."""
+        actor, (ratio, qualified) = self.training.hyperparameters.actor(self.model), self._verdict
         shared = "algorithm", "seed", "environment", "variants", "residual_of", "residual_share", "washout"
-        return Facts(
+        facts = Facts(
             commit=commit(),
             command=self._command,
             steps=self.model.num_timesteps,
@@ -273,3 +272,4 @@ class Run:
             squashed=actor.squashed,
             **{name: getattr(self.training, name) for name in shared},
         )
+        return actor, facts

@@ -7,7 +7,6 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -165,20 +164,6 @@ def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return values
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Outcome of a finished run: its best model."""
-
-    folder: str
-    algorithm: str
-    seed: int
-    steps: int  # of the whole training
-    best: str  # model file of the best evaluation
-    best_steps: int  # steps trained by then
-    ratio: float | None  # mean of sigma over that of the passive pantograph; None: a run ended early
-    qualified: bool  # whether every mean force was within its range
-
-
 def run_name(config: Path, training: Training) -> str:
     """Default name of a run's folder."""
     return f"{config.stem}-{training.algorithm}-seed{training.seed}"
@@ -213,8 +198,8 @@ def train_all(
     ray: str | None = None,
     progress: Progress | None = None,
     command: str | None = None,
-) -> list[Outcome]:
-    """Train each into its folder; outcomes in the order of the trainings.
+) -> list[dict[str, Any]]:
+    """Train each into its folder; a table of each one's best model, in the order of the trainings.
 
     resume: continue runs that have begun, begin the others. workers, ray: see ``spread``; on a cluster all
     machines must see the folders, and a run whose worker died continues from its newest checkpoint. command:
@@ -230,8 +215,9 @@ def train_all(
     for path, training in trainings.items():
         best = RunFolder(path).best
         facts, _ = read_model(best)
-        made = str(path), training.algorithm, training.seed, training.total_steps
-        outcomes.append(Outcome(*made, str(best), facts.steps, facts.ratio, facts.qualified))
+        outcome = {"folder": str(path), "algorithm": training.algorithm, "seed": training.seed}
+        outcome |= {"steps": training.total_steps, "best": str(best), "best_steps": facts.steps}
+        outcomes.append(outcome | {"ratio": facts.ratio, "qualified": facts.qualified})
     return outcomes
 
 

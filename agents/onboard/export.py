@@ -27,6 +27,7 @@ from panto_env.plant.state import Place
 from panto_env.policies import find_policy, wishes
 
 from ..evaluation import NOT_OF_A_PASS
+from ..model_file import Facts
 from ..policy import TrainedPolicy
 from ..settings import arguments
 from . import acting, seeing
@@ -123,22 +124,19 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
         raise InputError(
             f"'{called}' is not a name in C; give one of letters, digits and _, such as controller."
         )
-    task = _task(driver, settings)
+    inner = without_guard(driver)
+    facts = inner.facts if isinstance(inner, TrainedPolicy) else None
+    task = _task(driver, facts, settings)
     context = task.context(0)
     driver.reset(context)  # refuses a task that it was not trained for
     constants, state = parts_of(driver, words, task)
     inputs = [Variable(*each) for each in READINGS]
-    inputs += [
-        Variable(
-            f"front_force_{k}", "N", f"contact force that the pantograph in front felt {place:g} m ahead"
-        )
-        for k, place in enumerate(context.layout.front)
-    ]
-    reported = constants["inputs"] - len(inputs)
+    felt = "contact force that the pantograph in front felt"
+    for k, place in enumerate(context.layout.front):
+        inputs.append(Variable(f"front_force_{k}", "N", f"{felt} {place:g} m ahead"))
     places = [Place(channel).name.lower() for channel in context.channels]
-    inputs += [
-        Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}") for k in range(reported)
-    ]
+    for k in range(constants["inputs"] - len(inputs)):
+        inputs.append(Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}"))
     limit = f"within {context.force_limit:g} N either way, positive upwards"
     outputs = tuple(
         Variable(f"{each}_force", "N", f"of the actuator on the {each}, {limit}") for each in places
@@ -146,13 +144,12 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
     translation = Translation(constants, state, f"{called}_state")
     translation.add(acting.begin)
     translation.add(acting.step)
-    inner, interval = without_guard(driver), context.control_interval
-    facts = inner.facts if isinstance(inner, TrainedPolicy) else None
+    interval = context.control_interval
     varied = [] if facts is None else [item for each in facts.variants for item in each.items()]
-    told = {"name": words, "version": __version__, "facts": facts, "guarded": inner is not driver}
-    told |= {"kinds": sorted({f"{key} {value}" for key, value in varied if key != "faults"})}
-    told |= {"context": context, "kmh": [to_kmh(speed) for speed in task.settings.speeds]}
-    card = rendered("card.txt", told)
+    kinds = sorted({f"{key} {value}" for key, value in varied if key != "faults"})
+    told: dict[str, Any] = {"name": words, "version": __version__, "facts": facts, "kinds": kinds}
+    told |= {"guarded": inner is not driver, "kmh": [to_kmh(speed) for speed in task.settings.speeds]}
+    card = rendered("card.txt", told | {"context": context})
     forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
     call = (
         f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite number, or "
@@ -180,11 +177,9 @@ def name_in_c(words: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
 
 
-def _task(driver: Any, settings: dict[str, Any]) -> Task:
+def _task(driver: Any, facts: Facts | None, settings: dict[str, Any]) -> Task:
     """A task that has been reset, with the settings of the policy's training where others are not given."""
-    inner = without_guard(driver)
-    trained = inner.facts.environment if isinstance(inner, TrainedPolicy) else {}
-    variants = inner.facts.variants if isinstance(inner, TrainedPolicy) else ()
+    trained, variants = ({}, ()) if facts is None else (facts.environment, facts.variants)
     environment = arguments({"id": "Pantograph-v0"} | trained)
     given = {key: value for key, value in environment.items() if key not in NOT_OF_A_PASS[1:]}
     low, high = (np.ravel(given["speed_kmh"])[end] for end in (0, -1))

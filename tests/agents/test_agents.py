@@ -34,7 +34,6 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.envs import IDS
 
-from ..marks import some_at_once
 from ..plugin import install
 
 torch.set_num_threads(1)  # as a training does: more of them wait for each other
@@ -394,7 +393,7 @@ def linear(tmp_path, monkeypatch):
 
 
 class TestStart:
-    @pytest.mark.parametrize("kind", some_at_once(["ppo", "sac"], ["ppo"]))
+    @pytest.mark.parametrize("kind", ["ppo", "sac"])
     def test_an_agent_does_what_it_has_cloned(self, kind, linear, tmp_path):
         training = settings(
             kind,
@@ -411,7 +410,7 @@ class TestStart:
         assert told["error"] < 0.1 * told["rms"]
         assert rows(folder)[0]["steps"] == "0"  # what it begins as is judged, and kept if it stays the best
         (taught,) = Comparison(training.arguments, (300.0,), (1000,)).run(linear)
-        assert float(rows(folder)[0]["policy_std"]) == pytest.approx(taught.policy.std, rel=0.02)
+        assert float(rows(folder)[0]["policy_std"]) == pytest.approx(taught.policy.std, rel=0.05)
 
 
 def test_a_residual_with_a_network_of_zeros_is_its_base_bit_for_bit(tmp_path):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -68,6 +71,23 @@ def test_it_learns_to_do_most_of_what_its_teacher_does(tmp_path):
     assert facts.qualified
     assert facts.ratio < 0.8
     assert sum(each.size for each in (*actor.weights, *actor.biases)) < 500
+
+
+def test_round_by_round_it_comes_nearer_to_its_teacher():
+    hyperparameters = {"teacher": TEACHER, "learning_rate": 1e-2, "net_arch": [8], "updates": 40}
+    training, told, ends = settings(lanes=2, hyperparameters=hyperparameters | {"recurrent_units": 4}), [], []
+    lanes = TaughtLanes(training)
+    lanes.seed(0)
+    learner = training.hyperparameters.make_learner(lanes, 0)
+    learner.set_logger(SimpleNamespace(record=lambda *each: told.append(each), dump=ends.append))
+    steps = [len(each.wanted) for each in deepcopy(lanes).teach(None)]
+    for _ in range(3):
+        learner.learn(1, MagicMock())
+    errors = [value for name, value in told if name == "train/relative_error"]
+    assert len(errors) == 3
+    assert errors[2] < 0.85 * errors[0]
+    assert ends[0] == sum(steps)
+    assert learner.num_timesteps == ends[2] > 2.5 * ends[0]
 
 
 def test_a_sequence_goes_through_the_network_as_step_by_step():

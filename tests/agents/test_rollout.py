@@ -44,8 +44,8 @@ def driven(network: Any, own: Any, entries: Any, settings: Any) -> tuple[torch.T
             when = float(own.recalled[t].ravel()[place])
             if when >= 0:
                 part = torch.lerp(now[int(when)], now[int(when) + 1], when - int(when))
-                moved = torch.tensor([entries.force[place], entries.acted[place]])
-                seen = seen.index_add(0, moved, part[[entries.of_force, -1]])
+                places = torch.tensor([entries.force[place], entries.acted[place]])
+                seen = seen.index_add(0, places, part[[entries.of_force, -1]])
         action, state = stepped(network, seen, state)
         actions.append(washout(action))
         changes.append(actions[-1] - float(own.actions[t]))

@@ -118,20 +118,20 @@ def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
 
 
 class TestTrainings:
-    @pytest.mark.slow
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
-        planned = {tmp_path / "one": settings(), tmp_path / "other": settings(seed=2)}
-        train.train(settings(), tmp_path / "one", progress=False)
+        one, other = (settings(seed=seed, total_steps=128) for seed in (1, 2))
+        planned = {tmp_path / "one": one, tmp_path / "other": other}
+        train.train(one, tmp_path / "one", progress=False)
         before = (tmp_path / "one" / "model.safetensors").read_bytes()
         with pytest.raises(InputError, match="exists already"):
             train_all(planned, workers=1)
         assert not (tmp_path / "other").exists()
         outcomes = train_all(planned, resume=True, workers=1)
         assert (tmp_path / "one" / "model.safetensors").read_bytes() == before
-        assert [outcome.seed for outcome in outcomes] == [1, 2]
-        alone = train.train(settings(seed=2), tmp_path / "alone", progress=False)
+        assert [outcome["seed"] for outcome in outcomes] == [1, 2]
+        alone = train.train(other, tmp_path / "alone", progress=False)
         assert same_weights(alone.model, tmp_path / "other" / "model.safetensors")
-        assert outcomes[1].ratio == read_model(alone.best)[0].ratio
+        assert outcomes[1]["ratio"] == read_model(alone.best)[0].ratio
 
     def test_configurations_times_seeds(self, tmp_path):
         for name in ("one", "other"):
