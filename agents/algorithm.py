@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -93,8 +92,8 @@ class Algorithm(Settings, ABC):
         activation = {"tanh": nn.Tanh, "relu": nn.ReLU}[self.activation]
         return {"net_arch": list(self.net_arch), "activation_fn": activation}
 
-    def actor_from_layers(self, *modules: Any) -> Actor:
-        """Actor made of the linear layers in ``modules`` (torch), in their order."""
+    def actor_from_layers(self, *modules: Any, **more: Any) -> Actor:
+        """Actor made of the linear layers in ``modules`` (torch), in their order; more: of its fields."""
         from torch import nn
 
         layers = [part for module in modules for part in module.modules() if isinstance(part, nn.Linear)]
@@ -102,6 +101,7 @@ class Algorithm(Settings, ABC):
             weights=tuple(layer.weight.detach().cpu().numpy().copy() for layer in layers),
             biases=tuple(layer.bias.detach().cpu().numpy().copy() for layer in layers),
             activation=self.activation,
+            **more,
         )
 
 
@@ -219,7 +219,7 @@ class SAC(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mode of the action, squashed by tanh."""
-        return replace(self.actor_from_layers(model.actor.latent_pi, model.actor.mu), squashed=True)
+        return self.actor_from_layers(model.actor.latent_pi, model.actor.mu, squashed=True)
 
 
 class InRounds(Algorithm):
@@ -240,8 +240,8 @@ class InRounds(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""
-        actor = self.actor_from_layers(model.network.first, model.network.rest)
-        return replace(actor, squashed=True, cell=model.network.arrays())
+        network = model.network
+        return self.actor_from_layers(network.first, network.rest, squashed=True, cell=network.arrays())
 
 
 class APG(InRounds):

@@ -47,23 +47,19 @@ TABLED = [[100.0, 12.0], [240.0, 60.0], [350.0, 80.0]]  # of the uplift, by spee
 PRESSED = HIGH_SPEED | {"pantograph": pantograph({"uplift_over_speed": TABLED}, like="dsa380")}
 OF_A_PASS = ("distance", "speed_kmh", "speed_profile", "line_condition", "faults")
 CASES = {
-    "any-pantograph": ("agent-any-pantograph", HIGH_SPEED),
     "robust": ("agent-robust", HIGH_SPEED),
     "any-line": ("agent-any-line", HIGH_SPEED | {"distance": 400.0}),
     "unlike-spans": ("agent-any-pantograph", FAST_LINE),
     "high-speed": ("agent-high-speed", SHINKANSEN),
     "head": ("agent-head", IN_HEAD),
     "trailing": ("agent-trailing", BEHIND),
-    "guarded": ("guarded:agent-any-pantograph", HIGH_SPEED),
     "guarded-silent": ("guarded:agent-any-pantograph", FAULTY),
     "guarded-frozen": ("guarded:agent-any-pantograph", FROZEN),
     "guarded-pd": ("guarded:pd", FROZEN),
     "guarded-harm": ("guarded:p:gain=2.5", HIGH_SPEED | {"distance": 2500.0}),
-    "pd": ("pd", HIGH_SPEED),
     "pd-uplift-by-table": ("pd", PRESSED),
     "forward": ("fb+ff:dead_zone=10,gain=0.3", HIGH_SPEED),
     "centred": ("pd", HIGH_SPEED | {"observation": "centred"}),
-    "repetitive": ("repetitive", HIGH_SPEED),
     "repetitive-counted": ("repetitive:place='counted'", HIGH_SPEED),
     "guarded-repetitive": ("guarded:repetitive", HIGH_SPEED | {"distance": 1500.0}),
     "added": ("agent-train", BEHIND),

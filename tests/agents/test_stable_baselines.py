@@ -115,7 +115,6 @@ CHAINS = {
     "VecNormalize on stacks": lambda: VecNormalize(
         VecFrameStack(DummyVecEnv([bare] * 2), 3), clip_obs=0.7, norm_reward=True
     ),
-    "stacks on VecNormalize": lambda: VecFrameStack(VecNormalize(DummyVecEnv([bare] * 2), clip_obs=0.7), 3),
     "many that change nothing": lambda: VecNormalize(VecCheckNan(VecMonitor(unchanged())), norm_obs=False),
     "vector": lambda: PantographVecEnv(several.RescaleAction(several.NormalizeObservation(native()), 0, 1)),
 }

@@ -118,6 +118,7 @@ def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
 
 
 class TestTrainings:
+    @pytest.mark.slow
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
         one, other = (settings(seed=seed, total_steps=128) for seed in (1, 2))
         planned = {tmp_path / "one": one, tmp_path / "other": other}
