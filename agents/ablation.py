@@ -124,31 +124,28 @@ class Variant:
 
 def variants(models: Mapping[tuple[str, int], Path], outcome: Benchmark) -> tuple[Variant, ...]:
     """Variants, the unchanged training first."""
-    by_policy: dict[str, list[float]] = {}
-    disqualified = {cell.policy for cell in outcome.cells if cell.disqualified}
+    cells: dict[str, list[Any]] = {}  # by the path of a model
     for cell in outcome.cells:
-        by_policy.setdefault(cell.policy, []).append(cell.change)
-    paths: dict[str, list[str]] = {}
+        cells.setdefault(cell.policy, []).append(cell)
+    runs: dict[str, list[list[Any]]] = {}  # cells of each run, by the variant's name
     for (name, _), path in models.items():
-        paths.setdefault(name, []).append(str(path))
-    changes = {name: np.array([np.mean(by_policy[path]) for path in own]) for name, own in paths.items()}
-    return tuple(
-        _variant(name, changes[name], changes[REFERENCE], [path in disqualified for path in own])
-        for name, own in paths.items()
-    )
-
-
-def _variant(name: str, changes: Array, base: Array, disqualified: Sequence[bool]) -> Variant:
-    is_base = name == REFERENCE
-    return Variant(
-        name=name,
-        changes=tuple(changes.tolist()),
-        change=interquartile_mean(changes),
-        interval=interval_of_mean(changes, Clusters.of_one_line(len(changes))),
-        lost=None if is_base else _difference(changes, base),
-        worse=None if is_base else float(np.mean(changes[:, None] > base)),
-        qualified=1.0 - float(np.mean(disqualified)),
-    )
+        runs.setdefault(name, []).append(cells[str(path)])
+    found, base = [], None
+    for name, own in runs.items():
+        changes = np.array([np.mean([cell.change for cell in run]) for run in own])
+        base = changes if base is None else base
+        found.append(
+            Variant(
+                name=name,
+                changes=tuple(changes.tolist()),
+                change=interquartile_mean(changes),
+                interval=interval_of_mean(changes, Clusters.of_one_line(len(changes))),
+                lost=None if changes is base else _difference(changes, base),
+                worse=None if changes is base else float(np.mean(changes[:, None] > base)),
+                qualified=1.0 - float(np.mean([any(cell.disqualified for cell in run) for run in own])),
+            )
+        )
+    return tuple(found)
 
 
 def _difference(changes: Array, base: Array) -> Interval:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -12,7 +12,7 @@ from panto_env.base.errors import InputError
 from panto_env.base.settings import NonNegative, Positive, Settings
 from panto_env.policies import check_named, find_policy
 
-from .model_file import Actor, RecurrentActor
+from .model_file import Actor
 
 if TYPE_CHECKING:
     from .cloning import Demonstrations
@@ -45,17 +45,8 @@ class Cloning(Settings):
     learning_rate: Positive = Field(1e-3, description="initial learning rate; it falls to a tenth")
 
 
-class CloningError(Settings):
-    """Error of an agent's actions on steps that it was not fitted to."""
-
-    error: float  # rms difference of the actions (-)
-    rms: float  # of the policy's actions (-)
-
-
 class Algorithm(Settings, ABC):
     """Hyperparameters, named as in Stable-Baselines3; a subclass is an algorithm."""
-
-    takes_over: ClassVar[bool] = False  # whether a new learner begins as the network that it starts from
 
     learning_rate: Positive | tuple[Positive, Positive] = Field(
         3e-4, description="step of the optimiser; two numbers: linearly from the first to the second"
@@ -79,12 +70,8 @@ class Algorithm(Settings, ABC):
     def actor(self, model: Any) -> Actor:
         """The learner's deterministic policy."""
 
-    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
-        """Fit a new learner to a policy's demonstrations, unless it takes over the network."""
-        raise NotImplementedError
-
-    def begin_as(self, model: Any, agent: str) -> None:
-        """Give a new learner the network of an agent, of which ``check`` made sure that it fits."""
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> dict[str, float]:
+        """Fit a new learner to a policy's demonstrations; its error, see ``clone``."""
         raise NotImplementedError
 
     def check(self, training: Training) -> None:
@@ -105,8 +92,8 @@ class Algorithm(Settings, ABC):
         activation = {"tanh": nn.Tanh, "relu": nn.ReLU}[self.activation]
         return {"net_arch": list(self.net_arch), "activation_fn": activation}
 
-    def actor_from_layers(self, *modules: Any) -> Actor:
-        """Actor made of the linear layers in ``modules`` (torch), in their order."""
+    def actor_from_layers(self, *modules: Any, **more: Any) -> Actor:
+        """Actor made of the linear layers in ``modules`` (torch), in their order; more: of its fields."""
         from torch import nn
 
         layers = [part for module in modules for part in module.modules() if isinstance(part, nn.Linear)]
@@ -114,6 +101,7 @@ class Algorithm(Settings, ABC):
             weights=tuple(layer.weight.detach().cpu().numpy().copy() for layer in layers),
             biases=tuple(layer.bias.detach().cpu().numpy().copy() for layer in layers),
             activation=self.activation,
+            **more,
         )
 
 
@@ -156,7 +144,7 @@ class PPO(Algorithm):
         """Arguments that shape the networks, named as in Stable-Baselines3."""
         return super().policy_kwargs() | {"log_std_init": self.log_std_init}
 
-    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> dict[str, float]:
         """Fit a new learner's actor to a policy's actions, and its critic to the rewards that followed."""
         from .cloning import clone, regress, returns
 
@@ -211,7 +199,7 @@ class SAC(Algorithm):
                 f"{training.total_steps}"
             )
 
-    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> CloningError:
+    def begin_with(self, model: Any, examples: Demonstrations, cloning: Cloning) -> dict[str, float]:
         """Fit a new learner's actor to a policy's actions, and fill the replay buffer with them.
 
         They take the place of random actions; the critics learn from the buffer as usual.
@@ -231,7 +219,7 @@ class SAC(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the mode of the action, squashed by tanh."""
-        return self.actor_from_layers(model.actor.latent_pi, model.actor.mu).squash()
+        return self.actor_from_layers(model.actor.latent_pi, model.actor.mu, squashed=True)
 
 
 class InRounds(Algorithm):
@@ -252,9 +240,8 @@ class InRounds(Algorithm):
 
     def actor(self, model: Any) -> Actor:
         """Deterministic policy: the network's output, squashed by tanh."""
-        plain = self.actor_from_layers(model.network.first, model.network.rest).squash()
-        cell = model.network.arrays()
-        return plain if cell is None else RecurrentActor(**vars(plain), cell=cell)
+        network = model.network
+        return self.actor_from_layers(network.first, network.rest, squashed=True, cell=network.arrays())
 
 
 class APG(InRounds):
@@ -265,8 +252,6 @@ class APG(InRounds):
     through the passes of the latest rounds. It takes lines, speeds and the observation from the environment,
     not the reward. (Brax calls policy gradients through a simulator so: Freeman et al., NeurIPS 2021.)
     """
-
-    takes_over: ClassVar[bool] = True
 
     rounds_kept: Count = Field(4, description="rounds whose passes are learnt from")
     rate_weight: NonNegative = Field(
@@ -296,27 +281,21 @@ class APG(InRounds):
     def check(self, training: Training) -> None:
         """Raise InputError for parts of a training that passes have no use for."""
         super().check(training)
-        if training.start_from is not None:
-            self._check_shape(training.start_from)
-
-    def _check_shape(self, agent: str) -> None:
-        """Raise InputError unless an agent's network has the shape of a learner's."""
-        actor = agent_alone(agent, "apg").actor
-        cell = actor.cell if isinstance(actor, RecurrentActor) else None
-        units = 0 if cell is None else cell.weight_state.shape[1]
+        if training.start_from is None:
+            return
+        actor = agent_alone(training.start_from, "apg").actor
         widths = tuple(len(each) for each in actor.biases[:-1])
-        if (widths, units, actor.activation) != (self.net_arch, self.recurrent_units, self.activation):
+        if (widths, actor.units, actor.activation) != (self.net_arch, self.recurrent_units, self.activation):
             raise InputError(
-                f"the network of '{agent}' has another shape; set net_arch = {list(widths)}, "
-                f'recurrent_units = {units} and activation = "{actor.activation}"'
+                f"the network of '{training.start_from}' has another shape; set net_arch = {list(widths)}, "
+                f'recurrent_units = {actor.units} and activation = "{actor.activation}"'
             )
 
     def begin_as(self, model: Any, agent: str) -> None:
-        """Give a new learner the network of an agent."""
+        """Give a new learner the network of an agent, of which ``check`` made sure that it fits."""
         actor = agent_alone(agent, "apg").actor
         pairs = [each for pair in zip(actor.weights, actor.biases, strict=True) for each in pair]
-        cell = actor.cell if isinstance(actor, RecurrentActor) else ()
-        model.network.take([*pairs[:2], *cell, *pairs[2:]])
+        model.network.take([*pairs[:2], *(actor.cell or ()), *pairs[2:]])
 
 
 class DAgger(InRounds):

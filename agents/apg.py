@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -27,22 +27,21 @@ from panto_env.analysis.pool import in_threads
 from panto_env.backend import WIDTH
 from panto_env.base.errors import InputError
 from panto_env.base.machine import cores
-from panto_env.control import Task
-from panto_env.control.entries import AVERAGED
-from panto_env.control.lines import on_example
-from panto_env.control.settings import run_settings
-from panto_env.policies import Policy, find_policy
+from panto_env.control import Context
+from panto_env.control.settings import RunSettings, run_settings
+from panto_env.policies import find_policy
 
-from .device_ppo import L, OwnLearner
-from .linear_pass import Base, Columns, LinearPass, Numbers, Pulsing, columns_of, measure
+from .device_ppo import OwnLearner
+from .linear_pass import Judged, LinearPass, Numbers, Pulsing, entries_of, measure
 from .model_file import Actor, Cell
-from .policy import WashedOut
+from .policy import NetworkPolicy
 from .rollout import Entries, Given, Slopes, Trace, Washout, Weights, backward, forward
-from .settings import Training
+from .settings import Training, context_of
 
 if TYPE_CHECKING:
     from .algorithm import APG, InRounds
 
+T = TypeVar("T")
 FIRST = 0.01
 """Factor on the last layer's initial weights: the first passes are nearly passive."""
 
@@ -88,30 +87,6 @@ class Network(nn.Module):  # type: ignore[misc]
         return Cell(*(each.detach().numpy().copy() for each in own))
 
 
-class Terms(NamedTuple):
-    """What all passes of a training have in common."""
-
-    columns: Columns
-    interval: float  # of control (s)
-    limit: float  # of the actuator's force (N)
-    washout: WashoutSettings | None  # of the action
-
-
-class Judged(NamedTuple):
-    """What a pass is judged by; times are control steps."""
-
-    force: Numbers  # (times + 1,): without a change, as EN 50317 filters it (N)
-    counted_from: int
-    end: int
-    passive_mean: float  # N
-    passive_variance: float  # N^2
-
-    @property
-    def ratio(self) -> float:
-        """Sigma over that without control, of the pass as it was measured."""
-        return math.sqrt(float(self.force[self.counted_from + 1 : self.end].var()) / self.passive_variance)
-
-
 class Group(NamedTuple):
     """Passes that are driven abreast, at most ``WIDTH``."""
 
@@ -124,100 +99,73 @@ def grouped(passes: Sequence[LinearPass]) -> list[Group]:
     ordered, groups = sorted(passes, key=lambda each: len(each.actions)), []
     for first in range(0, len(ordered), WIDTH):
         some = ordered[first : first + WIDTH]
-        judged = [
-            Judged(each.force, each.counted_from, len(each.actions), each.passive_mean, each.passive_variance)
-            for each in some
-        ]
-        groups.append(Group(_given([*some, *[some[0]] * (WIDTH - len(some))]), judged))
+        given = _given([*some, *[some[0]] * (WIDTH - len(some))])
+        groups.append(Group(given, [each.judged for each in some]))
     return groups
 
 
-class Rollout:
-    """Groups of passes side by side; a network drives them in place of their own policy."""
+def rollout(
+    groups: Sequence[Group], entries: Entries, washout: Washout, network: Network
+) -> tuple[torch.Tensor, torch.Tensor, list[torch.Tensor]]:
+    """What a network, in place of their own policy, makes of passes, with derivatives by its parameters.
 
-    def __init__(self, groups: Sequence[Group], terms: Terms) -> None:
-        """terms: of all passes."""
-        columns, settings = terms.columns, terms.washout
-        average = np.zeros(columns.now.shape[1], dtype=np.float32)
-        if columns.deviate:
-            average[:-1] = 1.0 - math.exp(-terms.interval / AVERAGED)  # the action has no average
-        self._groups, self._given = groups, [each.given for each in groups]
-        self._entries = Entries(
-            columns.now, columns.force.ravel(), columns.acted.ravel(), columns.of_force, average
-        )
-        self._washout = Washout(0.0, 1.0, 0.0, terms.interval)
-        if settings is not None:
-            share = 1.0 - math.exp(-terms.interval / settings.time_constant)
-            rate = settings.rate / terms.limit
-            self._washout = Washout(share, rate, float(settings.lag), terms.interval)
-
-    def __call__(self, network: Network) -> tuple[torch.Tensor, torch.Tensor, list[torch.Tensor]]:
-        """What the network makes of the passes, with derivatives by its parameters.
-
-        Variance of the force, where it counts, over the passive one, (passes,); shift of the mean force,
-        relative to the passive one, (passes,); actions of each pass, (times,).
-        """
-        driven = _Driving.apply(self, network, *network.parameters())  # force and actions of each group
-        ratios, shifts, taken = [], [], []
-        for number, group in enumerate(self._groups):
-            moved, actions = driven[2 * number : 2 * number + 2]
-            for p, own in enumerate(group.judged):
-                counted = slice(own.counted_from + 1, own.end)
-                force = torch.from_numpy(own.force[counted]) + moved[counted, p]
-                ratios.append(force.var(correction=0) / own.passive_variance)
-                shifts.append(force.mean() / own.passive_mean - 1.0)
-                taken.append(actions[: own.end, p])
-        return torch.stack(ratios), torch.stack(shifts), taken
-
-    def forward(self, weights: Weights) -> list[Trace]:
-        """Drive all groups."""
-
-        def drive(given: Given) -> Trace:
-            times, seen, _ = given.observations.shape
-            units, values = weights.state.shape[1], len(self._entries.average)
-            widths = (values + 1,), (values,), (seen,), (units + len(weights.first),), (4 * units,)
-            rest = _zeros(*((times, len(each)) for each in weights.rest))
-            scalars = _zeros((times,), (times,), (times,))
-            trace = Trace(*[*_zeros(*((times, *each) for each in widths)), rest, *scalars])
-            work = _zeros((2, 3 * units), (values,), (2,))
-            forward(given, self._entries, weights, self._washout, trace, *work)
-            return trace
-
-        return _side_by_side(drive, self._given)
-
-    def backward(
-        self, weights: Weights, traces: list[Trace], by_force: list[Numbers], by_action: list[Numbers]
-    ) -> list[Numbers]:
-        """Derivatives by each array of the weights, from those by force and action, (times, WIDTH)."""
-
-        def differentiate(given: Given, trace: Trace, force: Numbers, action: Numbers) -> list[Numbers]:
-            shapes = ((len(action), len(each)) for each in (weights.first, weights.cell, weights.state))
-            layers = Slopes(*[*_zeros(*shapes), tuple(np.zeros_like(each) for each in trace.rest)])
-            units, values = weights.state.shape[1], len(self._entries.average)
-            work = _zeros((weights.first.shape[1],), (trace.joined.shape[1],), (units,), (values,), (2,))
-            rest = self._entries, weights, self._washout, trace, force, action, layers
-            backward(given, *rest, np.zeros_like(trace.now), work)
-            return _by_weights(trace, layers, units)
-
-        every = _side_by_side(differentiate, self._given, traces, by_force, by_action)
-        return [np.sum(own, axis=0, dtype=np.float32) for own in zip(*every, strict=True)]
+    Variance of the force, where it counts, over the passive one, (passes,); shift of the mean force,
+    relative to the passive one, (passes,); actions of each pass, (times,).
+    """
+    given = [each.given for each in groups]
+    driven = _Driving.apply(given, entries, washout, network, *network.parameters())
+    ratios, shifts, taken = [], [], []
+    for group, moved, actions in zip(groups, driven[::2], driven[1::2], strict=True):
+        for p, own in enumerate(group.judged):
+            counted = slice(own.counted_from + 1, own.end)
+            force = torch.from_numpy(own.force[counted]) + moved[counted, p]
+            ratios.append(force.var(correction=0) / own.passive_variance)
+            shifts.append(force.mean() / own.passive_mean - 1.0)
+            taken.append(actions[: own.end, p])
+    return torch.stack(ratios), torch.stack(shifts), taken
 
 
 class _Driving(torch.autograd.Function):  # type: ignore[misc]
     """Changes of the force, and actions, of each group by turns, (times, WIDTH), by the parameters."""
 
     @staticmethod
-    def forward(ctx: Any, rollout: Rollout, network: Network, *_: torch.Tensor) -> Any:
-        ctx.rollout, ctx.weights = rollout, network.weights()
-        ctx.traces = rollout.forward(ctx.weights)
-        pairs = [(np.ascontiguousarray(each.moved[:, -1]), each.taken) for each in ctx.traces]
+    def forward(
+        ctx: Any, groups: list[Given], entries: Entries, washout: Washout, network: Network, *_: torch.Tensor
+    ) -> Any:
+        weights = network.weights()
+        units, values = weights.state.shape[1], len(entries.average)
+
+        def drive(given: Given) -> Trace:
+            times, seen, _ = given.observations.shape
+            widths = (values + 1,), (values,), (seen,), (units + len(weights.first),), (4 * units,)
+            rest = _zeros(*((times, len(each)) for each in weights.rest))
+            scalars = _zeros((times,), (times,), (times,))
+            trace = Trace(*[*_zeros(*((times, *each) for each in widths)), rest, *scalars])
+            forward(given, entries, weights, washout, trace, *_zeros((2, 3 * units), (values,), (2,)))
+            return trace
+
+        traces = _side_by_side(drive, groups)
+        ctx.known = groups, entries, washout, weights, traces
+        pairs = [(np.ascontiguousarray(each.moved[:, -1]), each.taken) for each in traces]
         return tuple(torch.from_numpy(each) for pair in pairs for each in pair)
 
     @staticmethod
     def backward(ctx: Any, *slopes: torch.Tensor) -> Any:
+        groups, entries, washout, weights, traces = ctx.known
+        units, values = weights.state.shape[1], len(entries.average)
+
+        def differentiate(given: Given, trace: Trace, force: Numbers, action: Numbers) -> list[Numbers]:
+            shapes = ((len(action), len(each)) for each in (weights.first, weights.cell, weights.state))
+            layers = Slopes(*[*_zeros(*shapes), tuple(np.zeros_like(each) for each in trace.rest)])
+            work = _zeros((weights.first.shape[1],), (trace.joined.shape[1],), (units,), (values,), (2,))
+            rest = entries, weights, washout, trace, force, action, layers
+            backward(given, *rest, np.zeros_like(trace.now), work)
+            return _by_weights(trace, layers, units)
+
         by = [np.ascontiguousarray(each.numpy()) for each in slopes]
-        found = ctx.rollout.backward(ctx.weights, ctx.traces, by[::2], by[1::2])
-        return None, None, *map(torch.from_numpy, found)
+        every = _side_by_side(differentiate, groups, traces, by[::2], by[1::2])
+        found = [np.sum(own, axis=0, dtype=np.float32) for own in zip(*every, strict=True)]
+        return None, None, None, None, *map(torch.from_numpy, found)
 
 
 def _side_by_side(work: Any, *groups: Any) -> list[Any]:
@@ -275,93 +223,107 @@ SHIFT_FREE = MOVED / 3
 """Relative shift of the mean force that costs nothing: a third of what a benchmark allows."""
 
 
-class PassLanes:
-    """Measures passes of a policy in a training's environments, by turns."""
+class Passes:
+    """Passes in a training's environments, by turns, in the place of a ``VecEnv``."""
 
-    def __init__(self, training: Training, pulsing: Pulsing) -> None:
-        """pulsing: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
-        self._settings = [run_settings(given) for given in training.environments]
-        context = Task(on_example(self._settings[0])).context(0)
-        self.entries, self.count = len(context.layout.entries), training.lanes
-        columns, interval, limit = columns_of(context.layout), context.control_interval, context.force_limit
-        self.terms = Terms(columns, interval, limit, training.washout)
-        self._pulsing, self._base, self.share = pulsing, None, 1.0
-        if training.residual_of is not None:
-            law = find_policy(training.residual_of)
-            if not isinstance(law, LanesLaw):
-                raise InputError(
-                    "apg adds to policies that act in many lanes at once, such as repetitive, not to "
-                    f"'{training.residual_of}'."
-                )
-            self.share = training.residual_share  # of the force limit, of an action of 1
-            self._base = Base(law, self.share)
-        self.seconds, self.unwrapped = 0.0, self  # spent in the plant so far
+    entries: int  # of an observation of whoever learns
+
+    def __init__(self, environments: Sequence[Mapping[str, Any]], count: int) -> None:
+        """environments: arguments of each. count: passes of a round."""
+        self._settings = [run_settings(given) for given in environments]
+        self.count, self.seconds, self.unwrapped = count, 0.0, self  # seconds: spent in passes so far
 
     def seed(self, seed: int) -> None:
         """Draw the passes' seeds, which are for training, from this one on."""
         self._random = np.random.default_rng(seed)
 
+    def _run(self, run: Callable[[RunSettings, int], T], numbers: Sequence[int]) -> list[T]:
+        """What a function makes of the passes of these numbers, each with its environment and a seed.
+
+        They run side by side: what each does in Python takes no time of the others' kernels.
+        """
+        start, jobs = time.perf_counter(), []
+        for number in numbers:
+            seed = int(TRAINING[int(self._random.integers(len(TRAINING)))])
+            jobs.append(partial(run, self._settings[number % len(self._settings)], seed))
+        found = in_threads(jobs)
+        self.seconds += time.perf_counter() - start
+        return list(found)
+
+    def close(self) -> None:
+        """Do nothing: nothing is open."""
+
+
+def washout_of(settings: WashoutSettings | None, context: Context) -> Washout:
+    """A washout as the kernels take it."""
+    interval = context.control_interval
+    if settings is None:
+        return Washout(0.0, 1.0, 0.0, interval)
+    share = 1.0 - math.exp(-interval / settings.time_constant)
+    return Washout(share, settings.rate / context.force_limit, float(settings.lag), interval)
+
+
+class PassLanes(Passes):
+    """Measures passes of a policy as linear models."""
+
+    def __init__(self, training: Training, pulsing: Pulsing) -> None:
+        """pulsing: see ``measure``. Raises InputError for an observation that cannot be learnt from."""
+        super().__init__(training.environments, training.lanes)
+        context = context_of(training.environments[0])
+        self.entries, self.high_pass = len(context.layout.entries), training.washout
+        self.terms = entries_of(context), washout_of(training.washout, context)
+        self._pulsing, self._law, self.share = pulsing, None, 1.0
+        if training.residual_of is not None:
+            self._law, self.share = find_policy(training.residual_of), training.residual_share
+            if not isinstance(self._law, LanesLaw):
+                raise InputError(
+                    "apg adds to policies that act in many lanes at once, such as repetitive, not to "
+                    f"'{training.residual_of}'."
+                )
+
     def measure(self, actor: Actor) -> tuple[list[Group], int]:
         """One round of passes under a network, and the environment steps that they took.
 
-        Passes run side by side: what each does in Python takes no time of the others' kernels. Raises
-        InputError where pass after pass ends early.
+        Raises InputError where pass after pass ends early.
         """
-        washout = self.terms.washout
-        policy: Policy = actor if washout is None else WashedOut(actor, washout)
-        start, passes, failures = time.perf_counter(), dict[int, LinearPass](), 0
+
+        def one(settings: RunSettings, seed: int) -> LinearPass | InputError:
+            policy = NetworkPolicy(deepcopy(actor), self.high_pass)
+            try:
+                return measure(settings, policy, seed, self._pulsing, deepcopy(self._law), self.share)
+            except InputError as error:
+                return error
+
+        passes, failures = dict[int, LinearPass](), 0
         while missing := [number for number in range(self.count) if number not in passes]:
-            drawn = [int(TRAINING[int(self._random.integers(len(TRAINING)))]) for _ in missing]
-            jobs = [
-                partial(self._pass, number, deepcopy(policy), seed)
-                for number, seed in zip(missing, drawn, strict=True)
-            ]
-            for number, found in zip(missing, in_threads(jobs), strict=True):
+            for number, found in zip(missing, self._run(one, missing), strict=True):
                 if isinstance(found, LinearPass):
                     passes[number], failures = found, 0
                     continue
                 failures += 1
                 if failures == MOST_FAILURES:
                     raise found
-        self.seconds += time.perf_counter() - start
         ordered = [passes[number] for number in range(self.count)]
         return grouped(ordered), (self._pulsing.lanes + 2) * sum(len(each.actions) for each in ordered)
 
-    def _pass(self, number: int, policy: Policy, seed: int) -> LinearPass | InputError:
-        """Pass of a number, in the environment whose turn it is; the error where it ends early."""
-        settings = self._settings[number % len(self._settings)]
-        try:
-            return measure(settings, policy, seed, self._pulsing, deepcopy(self._base))
-        except InputError as error:
-            return error
 
-    def close(self) -> None:
-        """Do nothing: nothing is open."""
-
-
-class NetworkLearner(OwnLearner[L]):
+class NetworkLearner(OwnLearner):
     """Learns a ``Network`` from whole passes."""
 
-    def __init__(self, settings: InRounds, lanes: L, entries: int, seed: int) -> None:
-        """lanes: where passes are run. entries: of an observation. seed: of network and minibatches."""
-        super().__init__(lanes, seed)
-        self._settings = settings
-        kwargs = settings.policy_kwargs()
-        shape = tuple(kwargs["net_arch"]), kwargs["activation_fn"]
-        self.network = Network(entries, *shape, settings.recurrent_units)
+    def __init__(self, settings: InRounds, lanes: Passes, seed: int) -> None:
+        """lanes: where passes are run. seed: of network and minibatches."""
+        super().__init__(settings, lanes, seed)
+        activation = settings.policy_kwargs()["activation_fn"]
+        self.network = Network(lanes.entries, settings.net_arch, activation, settings.recurrent_units)
         self._optimiser = torch.optim.Adam(self.network.parameters())
 
-    def set_random_seed(self, seed: int) -> None:
-        """Seed of the minibatches."""
-        self._random = np.random.default_rng(seed)
 
-
-class APGLearner(NetworkLearner[PassLanes]):
+class APGLearner(NetworkLearner):
     """Measures passes in rounds, and descends the variance of the contact force through the latest ones."""
 
     def __init__(self, settings: APG, lanes: PassLanes, seed: int) -> None:
         """lanes: where passes are measured. seed: of network and minibatches."""
-        super().__init__(settings, lanes, lanes.entries, seed)
+        super().__init__(settings, lanes, seed)
         self._rounds: deque[list[Group]] = deque(maxlen=settings.rounds_kept)
 
     def _collect(self) -> list[Group]:
@@ -381,8 +343,8 @@ class APGLearner(NetworkLearner[PassLanes]):
         settings = self._settings
         count = max(1, settings.batch_size // WIDTH)
         chosen = self._random.permutation(len(known))[:count].tolist()
-        rollout = Rollout([known[each] for each in chosen], self._lanes.terms)
-        ratios, shifts, actions = rollout(self.network)
+        groups, (entries, washout) = [known[each] for each in chosen], self._lanes.terms
+        ratios, shifts, actions = rollout(groups, entries, washout, self.network)
         beyond = [
             torch.relu(self._lanes.share * each.diff().abs() - settings.rate_free).square().mean()
             for each in actions

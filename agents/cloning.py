@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from panto_env.envs import PantographVectorEnv
 
-from .algorithm import Cloning, CloningError
+from .algorithm import Cloning
 from .lanes import PolicyLanes
 
 Array = NDArray[np.float32]
@@ -53,10 +53,8 @@ def demonstrate(
             policy.begin(np.flatnonzero(ended))
         made.append((observations, intended, taken, rewards, terminated, ended, following))
         observations = after
-    found = Demonstrations(*(np.array(each) for each in zip(*made, strict=True)))
-    return found._replace(
-        intended=found.intended.astype(np.float32), rewards=found.rewards.astype(np.float32)
-    )
+    kinds = (None, np.float32, None, np.float32, None, None, None)
+    return Demonstrations(*map(np.array, zip(*made, strict=True), kinds))
 
 
 def returns(examples: Demonstrations, gamma: float) -> tuple[Array, NDArray[np.bool_]]:
@@ -79,8 +77,8 @@ HELD_OUT = 0.125
 """Share of the steps, the last ones, that are held out of the fit; the error is computed on them."""
 
 
-def clone(actor: Any, parameters: list[Any], examples: Demonstrations, cloning: Cloning) -> CloningError:
-    """Fit an actor to a policy's actions.
+def clone(actor: Any, parameters: list[Any], examples: Demonstrations, cloning: Cloning) -> dict[str, float]:
+    """Fit an actor to a policy's actions; on steps that are held out rms of its error and of these actions.
 
     actor: actions, (n, actions), as a differentiable function of observations, (n, entries). parameters:
     torch parameters of the actor.
@@ -94,7 +92,8 @@ def clone(actor: Any, parameters: list[Any], examples: Demonstrations, cloning: 
     regress(actor, parameters, seen, intended, cloning)
     with torch.no_grad():
         difference = actor(torch.as_tensor(unseen)).numpy() - unseen_intended
-    return CloningError(error=_rms(difference), rms=_rms(unseen_intended))
+    rms = [float(np.sqrt(np.mean(each.astype(float) ** 2))) for each in (difference, unseen_intended)]
+    return dict(zip(("error", "rms"), rms, strict=True))
 
 
 def regress(
@@ -116,7 +115,3 @@ def regress(
             loss.backward()
             optimiser.step()
             decay.step()
-
-
-def _rms(values: NDArray[np.float32]) -> float:
-    return float(np.sqrt(np.mean(values.astype(float) ** 2)))

@@ -35,7 +35,6 @@ from panto_env.terminal import (
 
 if TYPE_CHECKING:
     from .evaluation import Pair
-    from .onboard import Exported
 
 
 Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.")]
@@ -48,8 +47,6 @@ def check_packages() -> None:
 
 ROWS = ["mean", "std", "max", "min", "cost_function", "contact_loss", "max_uplift", "effort", "effort_rate"]
 """Figures that `panto evaluate` prints."""
-REPORTED_FACTS = ("steps", "ratio", "qualified")
-"""Facts of a model file that `panto train` prints."""
 
 
 def train(
@@ -74,10 +71,7 @@ def train(
 
     training = load_training(config, seed=seed, total_steps=steps, device=device)
     folder = output or Path("runs") / run_name(config, training)
-    if resume:
-        RunFolder(folder).check_resumable(training)
-    else:
-        RunFolder(folder).check_new()
+    RunFolder(folder).check(training, resume)
     make_folder(folder)  # now: torch takes its time to load
     with progress_console.status("loading torch"):
         from .model_file import read_model
@@ -92,7 +86,8 @@ def train(
     for name, label in (("model", "final model"), ("best", "best at an evaluation")):
         path = getattr(paths, name)
         facts, _ = read_model(path)
-        report |= {name: str(path)} | {f"{name}_{key}": getattr(facts, key) for key in REPORTED_FACTS}
+        report |= {name: str(path), f"{name}_steps": facts.steps}
+        report |= {f"{name}_ratio": facts.ratio, f"{name}_qualified": facts.qualified}
         ratio = facts.ratio
         change = "a run ended early" if ratio is None else f"σ {100 * (ratio - 1):+.1f} % of passive"
         note = "" if facts.qualified else ", F_m out of range: disqualified"
@@ -131,6 +126,9 @@ def export(
     actuator the constants of the last two are for, by default those of its training: of several pantographs
     of a train those of the first that is controlled.
     """
+    from panto_env.policies import find_policy
+
+    from .model_file import write_policy
     from .onboard import exported, write_fmu, write_onnx
     from .onboard.export import name_in_c
     from .policy import TrainedPolicy
@@ -138,10 +136,6 @@ def export(
     kind = _format(output, format)
     path = Path(output or f"{name_in_c(policy)}{EXPORTS[kind]}")
     if kind in ("safetensors", "onnx"):
-        from panto_env.policies import find_policy
-
-        from .model_file import write_policy
-
         driver = find_policy(policy)
         if settings:
             raise InputError(
@@ -156,26 +150,17 @@ def export(
             )
         write_policy(_announced(path, output), driver.facts, driver.actor)
         return
-    name = name_in_c(path.stem)
-    if kind == "fmu":
-        _announced(path, output)
-        made = exported(policy, name, **settings)
-        write_fmu(made, path)
-        console.print(f"{path}: a step every {made.interval:g} s", soft_wrap=True)
-        _print_variables(made)
-        return
-    header = path.with_name(f"{name}.h")
-    for each, given in ((path, output), (header, None)):
-        _announced(each, given)
+    name = name_in_c(_announced(path, output).stem)
+    if kind == "c":
+        header = _announced(path.with_name(f"{name}.h"), None)
     made = exported(policy, name, **settings)
-    made.write(path)
-    console.print(
-        f"{path}, {header}: {made.name}_init, {made.name}_step every {made.interval:g} s", soft_wrap=True
-    )
-    _print_variables(made)
-
-
-def _print_variables(made: Exported) -> None:
+    if kind == "c":
+        made.write(path)
+        words = f"{path}, {header}: {name}_init, {name}_step"
+    else:
+        write_fmu(made, path)
+        words = f"{path}: a step"
+    console.print(f"{words} every {made.interval:g} s", soft_wrap=True)
     rows = [("reading", *asdict(each).values()) for each in made.inputs]
     rows += [("force", *asdict(each).values()) for each in made.outputs]
     print_table(Table("inputs and outputs", ("", "name", "unit", "meaning"), tuple(rows)))
@@ -183,18 +168,15 @@ def _print_variables(made: Exported) -> None:
 
 def _format(output: str | None, given: str | None) -> str:
     """Format of an export. Raises InputError where none is given, or file and format differ."""
-    if given is not None and given not in EXPORTS:
+    if given not in (None, *EXPORTS):
         raise InputError(f"--format must be one of {', '.join(EXPORTS)}, not '{given}'.")
-    if output is None:
-        if given is None:
-            raise InputError(f"Name a file to write, or a --format: {', '.join(EXPORTS)}.")
-        return given
-    of_file = next(name for name, suffix in EXPORTS.items() if Path(output).suffix.lower() == suffix)
-    if given not in (None, of_file):
-        raise InputError(
-            f"A file for --format {given} must end in {EXPORTS[given or of_file]}, not {output}."
-        )
-    return of_file
+    suffix = Path(output).suffix.lower() if output else None
+    kind = given or next((name for name, own in EXPORTS.items() if own == suffix), None)
+    if kind is None:
+        raise InputError(f"Name a file to write, or a --format: {', '.join(EXPORTS)}.")
+    if suffix not in (None, EXPORTS[kind]):
+        raise InputError(f"A file for --format {kind} must end in {EXPORTS[kind]}, not {output}.")
+    return kind
 
 
 def _announced(path: Path, given: str | None) -> Path:
@@ -250,9 +232,8 @@ def evaluate(
             picture = plots.plot_forces(runs, (policy, "passive"), (FIRST_SETTLED, FIRST_SETTLED + 1), title)
             later(plots.save, picture, plot)
         if json:
-            ratio, qualified = verdict(pairs)
             run = {"policy": policy, "environment": environment, "settings": comparison.settings}
-            found = {"ratio": ratio, "qualified": qualified}
+            found = dict(zip(("ratio", "qualified"), verdict(pairs), strict=True))
             print_json(run | {"passes": [pair.as_dict() for pair in pairs], "verdict": found})
             return
         console.print(f"mean of all: {in_words(pairs)}", style="bold")
@@ -332,12 +313,13 @@ def trainings(
         progress_console.print(f"Stopped. To continue, repeat the command with --resume ({output}).")
         raise typer.Exit(130) from error
     if json:
-        print_json([asdict(each) for each in outcomes])
+        print_json(outcomes)
         return
     rows = []
     for each in outcomes:
-        change = "ended early" if each.ratio is None else f"{100 * (each.ratio - 1):+.1f} %"
-        rows.append((each.best, str(each.best_steps), change, "" if each.qualified else "F_m out of range"))
+        change = "ended early" if each["ratio"] is None else f"{100 * (each['ratio'] - 1):+.1f} %"
+        told = "" if each["qualified"] else "F_m out of range"
+        rows.append((each["best"], str(each["best_steps"]), change, told))
     headings = ("model file", "step", "σ to passive", "disqualified")
     print_table(Table("best models", headings, tuple(rows)))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from copy import deepcopy
 from functools import partial
 from typing import NamedTuple
@@ -11,20 +10,16 @@ import numpy as np
 import torch
 from torch import nn
 
-from panto_baselines.benchmark.settings import TRAINING
-from panto_env.analysis.pool import in_threads
 from panto_env.base.errors import InputError
-from panto_env.control import Task
-from panto_env.control.lines import on_example
 from panto_env.control.observation import OBSERVATION_SETTINGS
-from panto_env.control.settings import run_settings
+from panto_env.control.settings import RunSettings
 
 from .algorithm import DAgger, agent_alone
-from .apg import Network, NetworkLearner
+from .apg import Network, NetworkLearner, Passes
 from .linear_pass import Numbers, begun
 from .model_file import Actor, Needs
-from .policy import WashedOut
-from .settings import Training
+from .policy import NetworkPolicy
+from .settings import Training, context_of
 
 PART, LED_IN = 64, 24
 """Control steps of a part of a pass that is learnt from, and the first of them, which do not count, since a
@@ -38,8 +33,8 @@ class Lesson(NamedTuple):
     wanted: Numbers  # (times,): the teacher's actions, before its washout
 
 
-class TaughtLanes:
-    """Passes in a training's environments, by turns, in which a teacher says what it would do."""
+class TaughtLanes(Passes):
+    """Passes in which a teacher says what it would do."""
 
     def __init__(self, training: Training) -> None:
         """Raises InputError where the teacher does not fit the environment, or sees less than the agent."""
@@ -47,9 +42,10 @@ class TaughtLanes:
         assert isinstance(settings, DAgger)
         teacher = agent_alone(settings.teacher, "dagger")
         asked = {name: getattr(teacher.facts.needs, name) for name in OBSERVATION_SETTINGS}
-        self._settings = [run_settings(each | asked) for each in training.environments]
-        teacher.reset(Task(on_example(self._settings[0])).context(0))
-        own = Needs.of(Task(on_example(run_settings(training.arguments))).context(0)).entries
+        environments = [each | asked for each in training.environments]
+        super().__init__(environments, training.lanes)
+        teacher.reset(context_of(environments[0]))
+        own = Needs.of(context_of(training.arguments)).entries
         shown = {entry: place for place, entry in enumerate(teacher.facts.needs.entries)}
         if unseen := [entry[0] for entry in own if entry not in shown]:
             raise InputError(
@@ -58,26 +54,16 @@ class TaughtLanes:
             )
         self._places = np.array([shown[entry] for entry in own])
         self._teacher, self._washout = teacher.actor, training.washout
-        self.entries, self.count = len(own), training.lanes
-        self.seconds, self.unwrapped = 0.0, self  # spent in passes so far
-
-    def seed(self, seed: int) -> None:
-        """Draw the passes' seeds, which are for training, from this one on."""
-        self._random = np.random.default_rng(seed)
+        self.entries = len(own)
 
     def teach(self, leader: Actor | None) -> list[Lesson]:
         """One round of passes under a network, or under the teacher. One that ends early is shorter."""
-        start = time.perf_counter()
-        seeds = [int(TRAINING[int(self._random.integers(len(TRAINING)))]) for _ in range(self.count)]
-        lessons = in_threads([partial(self._pass, number, leader, seed) for number, seed in enumerate(seeds)])
-        self.seconds += time.perf_counter() - start
-        return list(lessons)
+        return self._run(partial(self._pass, leader), range(self.count))
 
-    def _pass(self, number: int, leader: Actor | None, seed: int) -> Lesson:
-        task = begun(self._settings[number % len(self._settings)], seed)
+    def _pass(self, leader: Actor | None, settings: RunSettings, seed: int) -> Lesson:
+        task = begun(settings, seed)
         context, teacher = task.context(0), deepcopy(self._teacher)
-        network = deepcopy(self._teacher if leader is None else leader)
-        policy = network if self._washout is None else WashedOut(network, self._washout)
+        policy = NetworkPolicy(deepcopy(self._teacher if leader is None else leader), self._washout)
         for each in (teacher, policy):
             each.reset(context)
         observations, wanted = [], []
@@ -89,16 +75,13 @@ class TaughtLanes:
             task.step(policy.act(seen if leader is None else own)[None])
         return Lesson(np.array(observations, dtype=np.float32), np.array(wanted, dtype=np.float32))
 
-    def close(self) -> None:
-        """Do nothing: nothing is open."""
 
-
-class DAggerLearner(NetworkLearner[TaughtLanes]):
+class DAggerLearner(NetworkLearner):
     """Lets its network act in rounds of passes, and fits it to what the teacher would have done."""
 
     def __init__(self, settings: DAgger, lanes: TaughtLanes, seed: int) -> None:
         """lanes: where passes are run. seed: of network and minibatches."""
-        super().__init__(settings, lanes, lanes.entries, seed)
+        super().__init__(settings, lanes, seed)
         self._lessons: list[Lesson] = []
 
     def _collect(self) -> list[Lesson]:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
+import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
 from torch import nn
@@ -24,26 +25,23 @@ if TYPE_CHECKING:
     from .algorithm import PPO
     from .settings import Training
 
-L = TypeVar("L")
 
-
-class OwnLearner(ABC, Generic[L]):
+class OwnLearner(ABC):
     """A learner with one network and one optimiser, which learns in rounds."""
 
     ep_info_buffer = None  # there are no episodes to average
     network: Any
-    _settings: Any
     _optimiser: torch.optim.Optimizer
     logger: Logger
 
-    def __init__(self, lanes: L, seed: int) -> None:
+    def __init__(self, settings: Any, lanes: Any, seed: int) -> None:
         """lanes: where it learns. seed: of the network, and of all else that is random."""
-        self._lanes = lanes
+        self._settings, self._lanes = settings, lanes
         self.num_timesteps, self._n_updates = 0, 0
         self.set_random_seed(seed)
         torch.manual_seed(seed)
 
-    def get_env(self) -> L:
+    def get_env(self) -> Any:
         """Where it learns."""
         return self._lanes
 
@@ -51,9 +49,9 @@ class OwnLearner(ABC, Generic[L]):
         """Where figures of the training go."""
         self.logger = logger
 
-    @abstractmethod
     def set_random_seed(self, seed: int) -> None:
         """Seed of what is random but the network."""
+        self._random: Any = np.random.default_rng(seed)
 
     def get_parameters(self) -> dict[str, Any]:
         """State of network and optimiser."""
@@ -166,19 +164,18 @@ class ActorCritic(nn.Module):  # type: ignore[misc]
 
     def values(self, observations: torch.Tensor) -> torch.Tensor:
         """Expected discounted rewards, (...,)."""
-        values: torch.Tensor = self.critic(observations).squeeze(-1)
-        return values
+        return self.critic(observations).squeeze(-1)
 
 
-class DevicePPO(OwnLearner[DeviceLanes]):
+class DevicePPO(OwnLearner):
     """The learner. It logs no episodes: their figures would have to leave the device."""
 
     def __init__(self, settings: PPO, lanes: DeviceLanes, seed: int) -> None:
         """lanes: where it learns. seed: of network, exploration and minibatches."""
         self._device = lanes.env.device
         self._random = torch.Generator(self._device)
-        super().__init__(lanes, seed)
-        self._settings, self._observation = settings, None
+        super().__init__(settings, lanes, seed)
+        self._observation = None
         spaces = lanes.env.single_observation_space, lanes.env.single_action_space
         entries, actions = (space.shape or (1,) for space in spaces)
         self.network = ActorCritic(settings, entries[0], actions[0]).to(self._device)

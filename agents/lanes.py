@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from threading import get_ident
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from panto_baselines.benchmark.settings import TRAINING, check_seeds
+from panto_baselines.benchmark.settings import TRAINING
 from panto_baselines.policies.repetitive import Washout
 from panto_env.base.errors import InputError
 from panto_env.envs import IDS, PantographVectorEnv
@@ -51,17 +51,16 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
 
     def reset(self) -> NDArray[np.float32]:
         """Start episodes in all lanes; after ``seed(number)``, lane i is seeded with number + i."""
-        seeded = any(seed is not None for seed in self._seeds)
-        options = self._options[0]
+        seeds, options = list(self._seeds), self._options[0]
         if any(each != options for each in self._options):
             raise InputError("The lanes share one environment; give set_options the same options for all.")
-        observation, info = self.env.reset(seed=list(self._seeds) if seeded else None, options=options)
+        seeded = any(seed is not None for seed in seeds)
+        observation, info = self.env.reset(seed=seeds if seeded else None, options=options)
         self._returns[:], self._lengths[:] = 0.0, 0
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [{"speed_kmh": float(speed)} for speed in info["speed_kmh"]]
-        first: NDArray[np.float32] = observation
-        return first
+        return observation  # type: ignore[no-any-return]
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions, (lanes, actions), for ``step_wait``."""
@@ -83,13 +82,12 @@ class PantographVecEnv(Whole, VecEnv):  # type: ignore[misc]
             names = [name for name in figures if not name.startswith("_")]  # "_name" marks lanes with one
             for lane in np.flatnonzero(done).tolist():
                 own = float(self._returns[lane]), int(self._lengths[lane]), time.time() - self._begun
+                known = [name for name in names if figures[f"_{name}"][lane]]
                 infos[lane] = {
                     "episode": dict(zip("rlt", own, strict=True)),
                     "terminal_observation": last[lane],
                     "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
-                    "figures": {
-                        name: float(figures[name][lane]) for name in names if figures[f"_{name}"][lane]
-                    },
+                    "figures": {name: float(figures[name][lane]) for name in known},
                 }
             self._returns[done], self._lengths[done] = 0.0, 0
         self.seconds += time.perf_counter() - start
@@ -239,10 +237,14 @@ class SideBySide(VecEnv):  # type: ignore[misc]
         for part in self._parts:
             part.close()
 
+    def _of_lanes(self, indices: Any, ask: Callable[[VecEnv], Sequence[Any]]) -> list[Any]:
+        """What the parts answer, for each requested lane."""
+        every = [value for part in self._parts for value in ask(part)]
+        return [every[lane] for lane in self._get_indices(indices)]
+
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute of each requested lane."""
-        every = [value for part in self._parts for value in part.get_attr(attr_name)]
-        return [every[lane] for lane in self._get_indices(indices)]
+        return self._of_lanes(indices, lambda part: part.get_attr(attr_name))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused, as for each of them."""
@@ -250,13 +252,11 @@ class SideBySide(VecEnv):  # type: ignore[misc]
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """Call a method of all of them; the result for each requested lane."""
-        every = [value for part in self._parts for value in part.env_method(method_name, *args, **kwargs)]
-        return [every[lane] for lane in self._get_indices(indices)]
+        return self._of_lanes(indices, lambda part: part.env_method(method_name, *args, **kwargs))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """As each of them says."""
-        every = [said for part in self._parts for said in part.env_is_wrapped(wrapper_class)]
-        return [every[lane] for lane in self._get_indices(indices)]
+        return self._of_lanes(indices, lambda part: part.env_is_wrapped(wrapper_class))
 
 
 def make_lanes(training: Training) -> Any:
@@ -265,13 +265,12 @@ def make_lanes(training: Training) -> Any:
     Where the algorithm learns from whole passes they stand for lanes. Raises InputError if the environment's
     arguments are not valid.
     """
-    if isinstance(training.hyperparameters, APG):
+    if isinstance(settings := training.hyperparameters, APG):
         from .apg import PassLanes
         from .linear_pass import Pulsing
 
-        settings = training.hyperparameters
         return PassLanes(training, Pulsing(settings.response_steps, settings.pulse_spacing))
-    if isinstance(training.hyperparameters, DAgger):
+    if isinstance(settings, DAgger):
         from .dagger import TaughtLanes
 
         return TaughtLanes(training)
@@ -281,25 +280,23 @@ def make_lanes(training: Training) -> Any:
         return DeviceLanes(training)
     parts: list[Any] = []
     for changes in training.variants or ({},):
+        given = {key: value for key, value in (training.environment | changes).items() if key != "id"}
         native = gymnasium.make_vec(
             training.environment["id"],
             num_envs=training.lanes // max(1, len(training.variants)),
             lines=training.lines,
             episodes_per_line=training.episodes_per_line,
             autoreset_mode="SameStep",
-            **{key: value for key, value in (training.environment | changes).items() if key != "id"},
+            **given,
         )
-        assert isinstance(native, PantographVectorEnv)  # a training accepts no other ids
-        lanes = PantographVecEnv(native)
         alone = training.residual_of is None and training.washout is None
+        lanes = PantographVecEnv(native)
         parts.append(lanes if alone else AgentLanes(lanes, training))
     return parts[0] if len(parts) == 1 else SideBySide(parts)
 
 
 def lane_seeds(training: Training, steps: int = 0) -> range:
     """Seeds of the lanes, within those for training, by the training's seed and the steps done."""
-    places = len(TRAINING) - training.lanes + 1
-    first = TRAINING[(training.seed * training.lanes + steps) % places]
-    seeds = range(first, first + training.lanes)
-    check_seeds(seeds, "training")
+    first = (training.seed * training.lanes + steps) % (len(TRAINING) - training.lanes + 1)
+    seeds: range = TRAINING[first : first + training.lanes]
     return seeds

@@ -8,6 +8,7 @@ sensors.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,31 +17,35 @@ from numpy.typing import NDArray
 from panto_baselines.policies.lanes_law import LanesLaw
 from panto_env.base.errors import InputError
 from panto_env.control import Task
-from panto_env.control.entries import DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
+from panto_env.control.entries import AVERAGED, DEVIATION, DEVIATIONS, MEASURED, READING_ENTRIES, earlier
 from panto_env.control.lines import on_drawn_line
-from panto_env.control.observation import Layout
+from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings
 from panto_env.control.state import Now, TaskRow
 from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.state import Row
 from panto_env.policies import Policy
 
+from .rollout import Entries
+
 PULSE = 0.2
 """Pulse of an action: large beside rounding, small beside the actuator's limit."""
 Numbers = NDArray[np.float32]
 
 
-class Columns(NamedTuple):
-    """Where an observation's entries come from; all others do not depend on actions.
+class Judged(NamedTuple):
+    """What a pass is judged by; times are control steps."""
 
-    Nor is the force of a pantograph in front taken to: waves from one behind reach it late and weak.
-    """
+    force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
+    counted_from: int
+    end: int
+    passive_mean: float  # of the force without control, where it counts (N)
+    passive_variance: float  # likewise (N^2)
 
-    now: NDArray[np.int64]  # (depth, values): readings and last action, now and 1, 2, .. control steps ago
-    force: NDArray[np.int64]  # (spans, times): of the remembered contact force
-    acted: NDArray[np.int64]  # (spans, times): likewise of actions
-    of_force: int  # place of the contact force among the values; the action's is the last one
-    deviate: bool  # whether readings are deviations from their slow averages
+    @property
+    def ratio(self) -> float:
+        """Sigma over that without control, of the pass as it was measured."""
+        return math.sqrt(float(self.force[self.counted_from + 1 : self.end].var()) / self.passive_variance)
 
 
 class LinearPass(NamedTuple):
@@ -48,19 +53,20 @@ class LinearPass(NamedTuple):
 
     observations: Numbers  # (times + 1, entries)
     actions: Numbers  # (times,): of the network, after its washout
-    force: Numbers  # (times + 1,): contact force as EN 50317 filters it (N)
     # To an action of 1 taken 1, 2, .. steps ago, (times + 1, length, values + 1), in units of its own: of
     # scaled readings, not of their deviations, of the action with what a base policy adds, of the force (N).
     response: NDArray[np.int16]
     unit: Numbers  # (values + 1,)
     recalled: Numbers  # (times + 1, spans, times ahead): when the remembered places were passed; -1: never
-    passive_mean: float  # of the force without control, where it counts (N)
-    passive_variance: float  # likewise (N^2)
-    counted_from: int  # step
+    judged: Judged
 
 
-def columns_of(layout: Layout) -> Columns:
-    """Where the entries of an observation come from. Raises InputError for one that it does not know."""
+def entries_of(context: Context) -> Entries:
+    """Which entries of an observation actions move. Raises InputError for an observation of another kind.
+
+    The force of a pantograph in front is not taken to: waves from one behind reach it late and weak.
+    """
+    layout = context.layout
     names = [entry.name for entry in layout.entries]
     actions = [name for name in names if name.startswith("last ") and "," not in name]
     if layout.kind not in (MEASURED, DEVIATIONS) or len(actions) != 1:
@@ -74,27 +80,18 @@ def columns_of(layout: Layout) -> Columns:
 
     def remembered(kind: str) -> NDArray[np.int64]:
         begin = [f"remembered {kind}, {span} span{'s' if span > 1 else ''} ago" for span in spans]
-        each = [[layout.index(f"{words}, {time:g} s ahead") for time in layout.memory] for words in begin]
-        return np.array(each, dtype=np.int64).reshape(len(spans), len(layout.memory))
+        places = [layout.index(f"{words}, {time:g} s ahead") for words in begin for time in layout.memory]
+        return np.array(places, dtype=np.int64)
 
     now = [
         [layout.index(earlier(name, ago) if ago else name) for name in (*readings, *actions)]
         for ago in range(layout.history + 1)
     ]
-    return Columns(
-        np.array(now),
-        remembered("force" + ending),
-        remembered(f"{actions[0].split()[1]} action"),
-        readings.index("contact force" + ending),
-        layout.kind == DEVIATIONS,
-    )
-
-
-class Base(NamedTuple):
-    """A policy that a network adds to."""
-
-    law: LanesLaw  # acts in all lanes at once
-    share: float  # part of the actuator's limit that the network may add
+    average = np.zeros(len(readings) + 1, dtype=np.float32)
+    if layout.kind == DEVIATIONS:
+        average[:-1] = 1.0 - math.exp(-context.control_interval / AVERAGED)  # the action has no average
+    force, acted = remembered("force" + ending), remembered(f"{actions[0].split()[1]} action")
+    return Entries(np.array(now), force, acted, readings.index("contact force" + ending), average)
 
 
 class Pulsing(NamedTuple):
@@ -125,23 +122,27 @@ def begun(settings: RunSettings, seed: int, lanes: int = 1) -> Task:
 
 
 def measure(
-    settings: RunSettings, policy: Policy, seed: int, pulsing: Pulsing, base: Base | None = None
+    settings: RunSettings,
+    policy: Policy,
+    seed: int,
+    pulsing: Pulsing,
+    law: LanesLaw | None = None,
+    share: float = 1.0,
 ) -> LinearPass:
     """The pass of a policy under a seed, on a line and at a speed drawn by it.
 
-    base: to which the policy adds; it reacts to pulses. Raises InputError where the pass ends early, or for
-    settings that do not fit.
+    law: to which the policy adds a share of its action; it reacts to pulses. Raises InputError where the pass
+    ends early, or for settings that do not fit.
     """
     task = begun(settings, seed, lanes=pulsing.lanes + 2)
-    columns = columns_of(task.layout)
     # A pantograph behind another one comes onto the line later.
     first = int(task.plant.of(0, Row.STEP, task.episode.controlled[0])) // task.length.control_steps
     context = task.context(0)
+    now = entries_of(context).now[0]
     policy.reset(context)
-    if base is not None:
-        base.law.begin(context, task.lanes)
-    share = 1.0 if base is None else base.share
-    readings, action = columns.now[0, :-1], columns.now[0, -1]
+    if law is not None:
+        law.begin(context, task.lanes)
+    readings, action, deviate = now[:-1], now[-1], task.layout.kind == DEVIATIONS
     scale = task.layout.scale[readings]
     observations, differences, places, speeds = [], [], [], []
     actions: list[float] = []
@@ -151,7 +152,7 @@ def measure(
         seen = task.results.observation
         observations.append(seen[0].copy())
         values = seen[:, readings].astype(float)
-        if columns.deviate:  # their averages forget more slowly than responses are kept
+        if deviate:  # their averages forget more slowly than responses are kept
             values += task.episode.averages / scale
         values = np.column_stack([values, seen[:, action]])
         differences.append(values[1:-1] - values[0])
@@ -163,8 +164,8 @@ def measure(
     while not task.results.flags[0].any():
         seen = task.results.observation.copy()
         under = np.zeros(task.lanes)
-        if base is not None:
-            under = np.clip(base.law.forces(seen) / context.force_limit, -1.0, 1.0)
+        if law is not None:
+            under = np.clip(law.forces(seen) / context.force_limit, -1.0, 1.0)
         every = np.full(task.lanes, float(policy.act(seen[0])[0]))
         if len(actions) % pulsing.spacing == 0:
             lane = 1 + len(pulses) % pulsing.lanes
@@ -177,27 +178,22 @@ def measure(
         observe()
     if task.results.terminated.any():
         raise InputError(task.ending(int(np.flatnonzero(task.results.terminated)[0])))
-    force = _filtered(task, first, first + len(actions))
+    ratio, collector, last = task.length.control_steps, task.episode.controlled[0], first + len(actions)
+    rows: Any = task.samples.rows[:, : last * ratio + 1, collector, Row.CONTACT_FORCE]
+    # As EN 50317 filters it, at each control step, (times + 1, lanes).
+    force = np.asarray(low_pass(rows, task.plant.time_step)[:, first * ratio :: ratio].T)
     moved = np.concatenate([np.array(differences), (force[:, 1:-1] - force[:, :1])[..., None]], axis=2)
-    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // task.length.control_steps - first
+    counted = int(task.episode.table[0, TaskRow.COUNTED_FROM]) // ratio - first
     passive = force[counted + 1 :, -1]
     return LinearPass(
         np.array(observations, dtype=np.float32),
         np.array(actions, dtype=np.float32),
-        force[:, 0].astype(np.float32),
         *_responses(moved, np.array(pulses), pulsing),
         _recalled(task, np.array(places), np.array(speeds)),
-        float(passive.mean()),
-        float(passive.var()),
-        counted,
+        Judged(
+            force[:, 0].astype(np.float32), counted, len(actions), float(passive.mean()), float(passive.var())
+        ),
     )
-
-
-def _filtered(task: Task, first: int, last: int) -> NDArray[np.float64]:
-    """Contact force as EN 50317 filters it, at control steps first to last, (last - first + 1, lanes), N."""
-    every, collector = task.length.control_steps, task.episode.controlled[0]
-    rows: Any = task.samples.rows[:, : last * every + 1, collector, Row.CONTACT_FORCE]
-    return np.asarray(low_pass(rows, task.plant.time_step)[:, first * every :: every].T)
 
 
 def _responses(

@@ -6,7 +6,7 @@ and ``replay/`` let a training resume.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -31,26 +31,27 @@ REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "t
 
 @dataclass(frozen=True)
 class Actor:
-    """Deterministic policy: a multilayer perceptron from an observation to an action.
+    """Deterministic policy: a multilayer perceptron from an observation to an action, if need be recurrent.
 
-    It is a policy (``panto_env.policies.Policy``) for every context of the right shape.
+    It is a policy (``panto_env.policies.Policy``) for every context of the right shape. With a cell its state
+    is that of one episode: every policy has an actor of its own.
     """
 
     weights: tuple[Weights, ...]  # of each layer, (outputs, inputs)
     biases: tuple[Weights, ...]  # of each layer, (outputs,)
     activation: Literal["tanh", "relu"]  # of the hidden layers
     squashed: bool = False  # whether the last layer goes through tanh; otherwise it is clipped
+    cell: Cell | None = None  # after the first layer; the second sees its state, then the first one's values
+    _state: list[NDArray[np.float32]] = field(default_factory=list, compare=False, repr=False)
 
-    def squash(self) -> Actor:
-        """A copy of this actor with tanh after its last layer."""
-        return replace(self, squashed=True)
+    @property
+    def units(self) -> int:
+        """Width of the cell; 0: there is none."""
+        return 0 if self.cell is None else self.cell.weight_state.shape[1]
 
     def reset(self, context: Context) -> None:
-        """Do nothing: the actor has no memory."""
-
-    def after_first(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What the second layer sees of the values of the first."""
-        return values
+        """Forget the episode before."""
+        self._state[:] = [np.zeros(self.units, dtype=np.float32)]
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
@@ -60,8 +61,9 @@ class Actor:
             values = weight @ values + bias
             if k < last:
                 values = np.tanh(values) if self.activation == "tanh" else np.maximum(values, 0)
-            if k == 0:
-                values = self.after_first(values)
+            if k == 0 and self.cell is not None:
+                self._state[0] = self.cell.following(values, self._state[0])
+                values = np.concatenate([self._state[0], values])
         if self.squashed:
             values = np.tanh(values)
         return np.clip(values, -1.0, 1.0).astype(np.float64)
@@ -96,26 +98,6 @@ class Cell(NamedTuple):
         return following
 
 
-@dataclass(frozen=True)
-class RecurrentActor(Actor):
-    """An ``Actor`` with a recurrent cell after its first layer; the next layer sees both.
-
-    Its state is that of one episode: every policy has an actor of its own.
-    """
-
-    cell: Cell = field(kw_only=True)
-    _state: list[NDArray[np.float32]] = field(default_factory=list, compare=False, repr=False)
-
-    def reset(self, context: Context) -> None:
-        """Forget the episode before."""
-        self._state[:] = [np.zeros(self.cell.weight_state.shape[1], dtype=np.float32)]
-
-    def after_first(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The cell's state, then the values of the first layer."""
-        self._state[0] = self.cell.following(values, self._state[0])
-        return np.concatenate([self._state[0], values])
-
-
 class Needs(Settings):
     """Observation and actuator that a policy was trained with, which every task that it runs in must have."""
 
@@ -147,17 +129,15 @@ class Needs(Settings):
         # Normalised readings use each line's own centre and slope, which the policy is meant to see.
         names = (*(name for name, _, _ in READING_ENTRIES), "remembered force", "speed")
         hidden = names if layout.normalise else ()
-        fields = ("harmonics", "history", "front", "memory", "memory_spans", "line_values", "normalise")
-        of_context = ("channels", "force_limit", "control_interval", "washout")
-        return cls(
-            observation=layout.kind,
-            entries=tuple(
-                (each.name, 0.0, 1.0) if present(each) in hidden else (each.name, each.centre, each.scale)
-                for each in layout.entries
-            ),
-            **{name: getattr(layout, name) for name in fields},
-            **{name: getattr(context, name) for name in of_context},
+        entries = tuple(
+            (each.name, 0.0, 1.0) if present(each) in hidden else (each.name, each.centre, each.scale)
+            for each in layout.entries
         )
+        of_layout = ("harmonics", "history", "front", "memory", "memory_spans", "line_values", "normalise")
+        of_context = ("channels", "force_limit", "control_interval", "washout")
+        given = {name: getattr(layout, name) for name in of_layout}
+        given |= {name: getattr(context, name) for name in of_context}
+        return cls(observation=layout.kind, entries=entries, **given)
 
 
 class Step(Settings):
@@ -224,12 +204,19 @@ def write_model(path: Path, model: Any, actor: Actor, facts: Facts, replay: bool
         filled = buffer.buffer_size if buffer.full else buffer.pos
         arrays |= {f"replay/{name}": getattr(buffer, name)[:filled] for name in REPLAY}
         arrays["replay/position"] = np.array([buffer.pos, buffer.full])
-    write_arrays(path, facts.model_dump(mode="json"), _layers(actor) | arrays)
+    write_policy(path, facts, actor, arrays)
 
 
-def write_policy(path: Path, facts: Facts, actor: Actor) -> None:
-    """Write a model file without the state for further training. Raises InputError if it can't be written."""
-    write_arrays(path, facts.model_dump(mode="json"), _layers(actor))
+def write_policy(path: Path, facts: Facts, actor: Actor, others: Arrays | None = None) -> None:
+    """Write a model file, by default without a state for further training.
+
+    Raises InputError if it can't be written.
+    """
+    layers: Arrays = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
+    layers |= {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
+    if actor.cell is not None:
+        layers |= {f"{CELL}{name}": array for name, array in actor.cell._asdict().items()}
+    write_arrays(path, facts.model_dump(mode="json"), layers | (others or {}))
 
 
 def read_model(path: Path) -> tuple[Facts, Actor]:
@@ -237,8 +224,7 @@ def read_model(path: Path) -> tuple[Facts, Actor]:
 
     Raises InputError, naming the file, if it is damaged or not a model file of `panto train`.
     """
-    facts, actor, _ = _read(path)
-    return facts, actor
+    return _read(path)[:2]
 
 
 def restore(path: Path, model: Any) -> Facts:
@@ -259,14 +245,12 @@ def restore(path: Path, model: Any) -> Facts:
 def _learn_again(model: Any, arrays: Arrays) -> None:
     import torch
 
-    begin = "learner/"
-    learner = {name: array for name, array in arrays.items() if name.startswith(begin)}
-    tensors = {name.removeprefix(begin): torch.from_numpy(array) for name, array in learner.items()}
+    learner = [(name, array) for name, array in arrays.items() if name.startswith("learner/")]
+    tensors = {name.removeprefix("learner/"): torch.from_numpy(array) for name, array in learner}
     parameters = model.get_parameters()
     for name, state in parameters.items():
         if "param_groups" in state:  # of an optimiser
-            moments: dict[int, dict[str, Any]] = {}
-            state["state"] = moments
+            moments = state["state"] = dict[int, dict[str, Any]]()
             for path in (each for each in tensors if each.startswith(f"{name}/")):
                 _, k, key = path.split("/")
                 moments.setdefault(int(k), {})[key] = tensors[path]
@@ -298,15 +282,6 @@ def _read(path: Path) -> tuple[Facts, Actor, Arrays]:
         ) from error
 
 
-def _layers(actor: Actor) -> Arrays:
-    """Weights and biases of a policy's network, with their names in a model file."""
-    layers: Arrays = {f"actor/weight_{k}": weight for k, weight in enumerate(actor.weights)}
-    layers |= {f"actor/bias_{k}": bias for k, bias in enumerate(actor.biases)}
-    if isinstance(actor, RecurrentActor):
-        layers |= {f"{CELL}{name}": array for name, array in actor.cell._asdict().items()}
-    return layers
-
-
 def actor_of(arrays: Arrays, facts: Facts) -> Actor:
     """The policy's network. Raises ValueError unless its layers fit each other and what the facts say."""
     layers = {name: array for name, array in arrays.items() if name.startswith("actor/")}
@@ -330,9 +305,7 @@ def actor_of(arrays: Arrays, facts: Facts) -> Actor:
             width += cell.weight_state.shape[1]
     if width != len(facts.needs.channels):
         raise ValueError("its network differs in shape from its facts")
-    if cell is not None:
-        return RecurrentActor(weights, biases, facts.activation, facts.squashed, cell=cell)
-    return Actor(weights, biases, facts.activation, facts.squashed)
+    return Actor(weights, biases, facts.activation, facts.squashed, cell)
 
 
 def _finite(array: NDArray[Any]) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,40 +28,57 @@ def added(base: NDArray[np.float64], action: NDArray[np.floating], share: float)
     return np.clip(base + share * action.astype(np.float64), -1.0, 1.0)
 
 
-class Residual:
-    """A policy whose action is a base policy's plus a share of an agent's."""
+@dataclass(eq=False)
+class NetworkPolicy:
+    """A network as a policy, with what may be around it.
 
-    def __init__(self, base: Policy, agent: Policy, share: float) -> None:
-        """share: part of the actuator's force limit that the agent may add."""
-        self._base, self._agent, self._share = base, agent, share
+    Observations go through steps before it, a slow average is subtracted from its action, and a share of that
+    is added to a base policy's.
+    """
 
-    def reset(self, context: Context) -> None:
-        """Prepare for an episode."""
-        self._base.reset(context)
-        self._agent.reset(context)
-
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
-        base = np.clip(np.asarray(self._base.act(observation.copy()), dtype=np.float64), -1.0, 1.0)
-        return added(base, self._agent.act(observation), self._share)
-
-
-class WashedOut:
-    """A network as a policy; the slow average is subtracted from its action."""
-
-    def __init__(self, actor: Actor, settings: WashoutSettings) -> None:
-        self._actor, self._settings = actor, settings
+    network: Policy
+    high_pass: WashoutSettings | None = None  # not ``washout``, which would be a wish of the task
+    steps: tuple[Step, ...] = ()
+    base: Policy | None = None
+    share: float = 1.0  # of the actuator's force limit, that the network may add
 
     def reset(self, context: Context) -> None:
         """Prepare for an episode."""
-        self._actor.reset(context)
+        if self.base is not None:
+            self.base.reset(context)
+        self.network.reset(context)
+        self._frames: dict[int, list[NDArray[np.float32]]] = {}  # by the number of their step
         self._limit = context.force_limit
-        self._washout = Washout(self._settings, context.control_interval, self._limit, (context.actions,))
+        if self.high_pass is not None:
+            shape = (context.actions,)
+            self._filter = Washout(self.high_pass, context.control_interval, self._limit, shape)
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Action, (actions,), each in -1..1, for an observation, (entries,)."""
-        action: NDArray[np.float64] = self._washout(self._actor.act(observation) * self._limit) / self._limit
-        return action
+        if self.base is not None:
+            base = np.clip(np.asarray(self.base.act(observation.copy()), dtype=np.float64), -1.0, 1.0)
+        action = self.network.act(self._prepared(observation.copy()) if self.steps else observation)
+        if self.high_pass is not None:
+            action = self._filter(action * self._limit) / self._limit
+        return action if self.base is None else added(base, action, self.share)
+
+    def _prepared(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the network sees: scaled, or stacked with earlier values."""
+        for number, step in enumerate(self.steps):
+            if step.centre:
+                bound = step.bound or np.inf
+                values = np.clip((values - step.centre) / step.scale, -bound, bound).astype(np.float32)
+                continue
+            first = values if step.padding is None else np.array(step.padding, dtype=np.float32)
+            frames = self._frames.get(number, [first] * step.frames)
+            self._frames[number] = [*frames[1:], values]
+            values = np.concatenate(self._frames[number])
+        return values
+
+
+def _ask(policy: Any, needs: Needs) -> None:
+    """Give a policy the attributes by which it asks for the settings that it needs."""
+    vars(policy).update({name: getattr(needs, name) for name in SETTINGS})
 
 
 class TrainedPolicy:
@@ -71,8 +90,7 @@ class TrainedPolicy:
             check_named(facts.residual_of, path)
         self.path, self.facts, self.actor = path, facts, actor
         self._policy = policy_of(actor, facts)
-        for name in SETTINGS:
-            setattr(self, name, getattr(facts.needs, name))
+        _ask(self, facts.needs)
 
     def reset(self, context: Context) -> None:
         """Begin an episode. Raises InputError if its observation, actuator or control interval differs."""
@@ -87,48 +105,37 @@ class TrainedPolicy:
         return self._policy.act(observation)
 
 
-class Prepared:
-    """A network as a policy; each observation goes through the steps before it."""
-
-    def __init__(self, steps: tuple[Step, ...], network: Policy) -> None:
-        self._steps, self._network = steps, network
-        self._frames: dict[int, list[NDArray[np.float32]]] = {}  # by the number of their step
-
-    def reset(self, context: Context) -> None:
-        """Forget the episode before."""
-        self._frames.clear()
-        self._network.reset(context)
-
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Action, (actions,), each in -1..1, for an observation, (entries,)."""
-        values = observation.copy()
-        for number, step in enumerate(self._steps):
-            if step.centre:
-                bound = step.bound or np.inf
-                values = np.clip((values - step.centre) / step.scale, -bound, bound).astype(np.float32)
-                continue
-            frames = self._frames.get(number)
-            if frames is None:
-                first = values if step.padding is None else np.array(step.padding, dtype=np.float32)
-                frames = [first] * step.frames
-            self._frames[number] = [*frames[1:], values]
-            values = np.concatenate(self._frames[number])
-        return self._network.act(values)
-
-
 def policy_of(actor: Actor, facts: Facts) -> Policy:
-    """Policy from a network and its facts: with its washout, and added to a base policy, if it has these."""
-    policy: Policy = actor if facts.washout is None else WashedOut(actor, facts.washout)
-    if facts.steps_before:
-        policy = Prepared(facts.steps_before, policy)
-    if facts.residual_of is None:
-        return policy
-    return Residual(find_policy(facts.residual_of), policy, facts.residual_share)
+    """Policy from a network and its facts: with the steps, washout and base policy that it has."""
+    base = None if facts.residual_of is None else find_policy(facts.residual_of)
+    return NetworkPolicy(actor, facts.washout, facts.steps_before, base, facts.residual_share)
 
 
 def load(path: str | Path) -> TrainedPolicy:
     """Load the policy of a model file. Raises InputError, naming the file, if it is not a whole one."""
     return TrainedPolicy(Path(path), *read_model(Path(path)))
+
+
+class Ensemble:
+    """Mean action of trained policies that need the same task, so that their errors cancel in part."""
+
+    def __init__(self, members: Sequence[TrainedPolicy]) -> None:
+        """Raises ValueError unless all of them have the same needs."""
+        self.facts = members[0].facts  # of the first: needs are those of all
+        if any(member.facts.needs != self.facts.needs for member in members):
+            raise ValueError("the members of an ensemble must need the same task")
+        self._members = members
+        _ask(self, self.facts.needs)
+
+    def reset(self, context: Context) -> None:
+        """Begin an episode. Raises InputError as each of them does."""
+        for member in self._members:
+            member.reset(context)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Mean of their actions, (actions,), each in -1..1, for an observation, (entries,)."""
+        mean: NDArray[np.float64] = np.mean([member.act(observation) for member in self._members], axis=0)
+        return mean
 
 
 def _first_difference(needs: Needs, offered: Needs) -> str:
@@ -161,26 +168,3 @@ def _first_difference(needs: Needs, offered: Needs) -> str:
         f"it was trained with other observations ({counted[0]}) than this task has ({counted[1]}); use the "
         "pantograph of its training or train another model"
     )
-
-
-class Ensemble:
-    """Mean action of trained policies that need the same task, so that their errors cancel in part."""
-
-    def __init__(self, members: Sequence[TrainedPolicy]) -> None:
-        """Raises ValueError unless all of them have the same needs."""
-        self.facts = members[0].facts  # of the first: needs are those of all
-        if any(member.facts.needs != self.facts.needs for member in members):
-            raise ValueError("the members of an ensemble must need the same task")
-        self._members = members
-        for name in SETTINGS:
-            setattr(self, name, getattr(self.facts.needs, name))
-
-    def reset(self, context: Context) -> None:
-        """Begin an episode. Raises InputError as each of them does."""
-        for member in self._members:
-            member.reset(context)
-
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Mean of their actions, (actions,), each in -1..1, for an observation, (entries,)."""
-        mean: NDArray[np.float64] = np.mean([member.act(observation) for member in self._members], axis=0)
-        return mean

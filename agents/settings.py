@@ -14,7 +14,7 @@ from panto_env.base.arrays import to_kmh
 from panto_env.base.errors import InputError, shown, suggest
 from panto_env.base.files import read_toml
 from panto_env.base.settings import Positive, Settings, parse
-from panto_env.control import Task
+from panto_env.control import Context, Task
 from panto_env.control.lines import on_example
 from panto_env.control.settings import default, fields, run_settings
 from panto_env.envs import IDS
@@ -117,6 +117,11 @@ def arguments(environment: Mapping[str, Any]) -> dict[str, Any]:
     return {**IDS[name], **own}
 
 
+def context_of(arguments: Mapping[str, Any]) -> Context:
+    """What an episode offers in an environment, by its arguments. Raises InputError if these do not fit."""
+    return Task(on_example(run_settings(arguments))).context(0)
+
+
 def speeds(own: Mapping[str, Any]) -> tuple[float, ...]:
     """Minimum, middle and maximum speed of an environment, by its arguments, or its single speed (km/h)."""
     low, high = run_settings(own).speeds
@@ -130,9 +135,8 @@ def load_training(path: str | Path, **changes: Any) -> Training:
 
     Raises InputError, naming the file and the key, if it cannot be read or is not valid.
     """
-    file = find(path, "training")
     replacements = {key: value for key, value in changes.items() if value is not None}
-    return parse_training(read_toml(file) | replacements, str(path))
+    return parse_training(read_toml(find(path, "training")) | replacements, str(path))
 
 
 def parse_training(table: Mapping[str, Any], name: str) -> Training:
@@ -148,9 +152,9 @@ def parse_training(table: Mapping[str, Any], name: str) -> Training:
         training = parse(Training, {**table, "hyperparameters": hyperparameters}, "the training")
         hyperparameters.check(training)
         _check(training)
+        return training
     except InputError as error:
         raise InputError(f"{name}: {str(error).removesuffix('.')}.") from error
-    return training
 
 
 def _check(training: Training) -> None:
@@ -175,12 +179,13 @@ def _check(training: Training) -> None:
                 Task(on_example(run_settings(arguments | {"speed_kmh": speed})))
     except InputError as error:
         raise InputError(f"[environment]: {error}") from error
-    if training.start_from is not None and training.residual_of is not None:
+    start = training.start_from
+    if start is not None and training.residual_of is not None:
         raise InputError("start_from and residual_of exclude each other: an agent that adds starts from zero")
-    if training.start_from is not None and training.variants and not training.hyperparameters.takes_over:
+    if start is not None and training.variants and not isinstance(training.hyperparameters, APG):
         raise InputError("start_from and variants exclude each other: take residual_of, or one environment")
     settings = run_settings(training.arguments)
-    for name in (training.start_from, training.residual_of):
+    for name in (start, training.residual_of):
         if name is not None:
             check_named(name, "it")
             find_fitting_policy(name, settings)

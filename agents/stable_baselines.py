@@ -13,12 +13,10 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from panto_env.base.errors import InputError, shown
 from panto_env.base.files import check_output
-from panto_env.control import Task
-from panto_env.control.lines import on_example
-from panto_env.control.settings import fields, run_settings
+from panto_env.control.settings import fields
 
 from .model_file import Actor, Facts, Needs, Step, write_policy
-from .settings import ALGORITHMS, arguments
+from .settings import ALGORITHMS, arguments, context_of
 
 ACTIVATIONS = {"Tanh": "tanh", "ReLU": "relu"}
 """Activations of Stable-Baselines3's networks that a model file knows."""
@@ -63,7 +61,7 @@ def save_policy(model: Any, path: str | Path, env: Any = None) -> None:
         steps=model.num_timesteps,
         updates=model._n_updates,
         environment=environment,
-        needs=Needs.of(Task(on_example(run_settings(arguments(environment)))).context(0)),
+        needs=Needs.of(context_of(arguments(environment))),
         steps_before=steps,
         activation=actor.activation,
         squashed=actor.squashed,
@@ -112,7 +110,7 @@ def _steps(env: Any, inner: Any) -> tuple[Step, ...]:
 def _on_actuator(actor: Actor, model: Any) -> Actor:
     """The network with actions in -1..1, instead of in the space of the model's actions."""
     if model.policy.squash_output:  # what maps -1..1 to that space is undone by RescaleAction
-        return actor.squash()
+        return replace(actor, squashed=True)
     low, high = model.action_space.low, model.action_space.high
     gain = 2 / (high - low)
     last = actor.weights[-1] * gain[:, None], (actor.biases[-1] - (low + high) / 2) * gain

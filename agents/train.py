@@ -18,17 +18,15 @@ from stable_baselines3.common.logger import configure
 from panto_baselines.benchmark.settings import SELECTION, check_seeds
 from panto_env.base.checksums import commit, write_checked
 from panto_env.base.files import alone_in
-from panto_env.control import Task
-from panto_env.control.lines import on_example
-from panto_env.control.settings import run_settings
 from panto_env.terminal import progress_console
 
+from .algorithm import APG
 from .cloning import demonstrate
 from .evaluation import Comparison, Pair, in_words, verdict
 from .lanes import PolicyLanes, lane_seeds, make_lanes
-from .model_file import Facts, Needs, read_model, restore, write_model
+from .model_file import Actor, Facts, Needs, read_model, restore, write_model
 from .policy import policy_of
-from .settings import Training
+from .settings import Training, context_of
 from .trainings import RunFolder
 
 REFRESH = 0.2  # s between two updates of the progress bar
@@ -43,22 +41,19 @@ class EveryNSteps(BaseCallback):  # type: ignore[misc]
 
     def __init__(self, interval: int, function: Callable[[], None]) -> None:
         super().__init__()
-        self._interval, self._function, self._last_step = interval, function, 0
+        self._interval, self._function = interval, function
 
     def _on_training_start(self) -> None:
         self._last_step = self.num_timesteps
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps // self._interval > self._last_step // self._interval:
-            self._call()
+            self._on_training_end()
 
     def _on_training_end(self) -> None:
         if self.num_timesteps > self._last_step:
-            self._call()
-
-    def _call(self) -> None:
-        self._last_step = self.num_timesteps
-        self._function()
+            self._last_step = self.num_timesteps
+            self._function()
 
     def _on_step(self) -> bool:
         return True
@@ -90,7 +85,7 @@ class ProgressBar(BaseCallback):  # type: ignore[misc]
             console=progress_console,
         )
         self._task = self.progress.add_task("", total=total_steps, note="")
-        self._start_time, self._start_step, self._time_shown = 0.0, 0, 0.0
+        self._time_shown = 0.0
         self._pairs_shown: list[Pair] = []
 
     def _on_training_start(self) -> None:
@@ -149,10 +144,7 @@ def train(
         lanes = make_lanes(training)
         stack.callback(lanes.close)
         run = Run(training, RunFolder(output), lanes, command)
-        if resume:
-            run.folder.check_resumable(training)
-        else:
-            run.folder.check_new()
+        run.folder.check(training, resume)
         stack.enter_context(alone_in(run.folder.path, "trains into"))
         run.folder.write_settings(training)
         if resume:
@@ -171,7 +163,7 @@ class Run:
         self.model = training.hyperparameters.make_learner(lanes, training.seed)
         self.pairs: list[Pair] = []  # of the last evaluation since the run was begun or resumed
         self._verdict = (math.inf, False)  # of the last evaluation of all
-        self._needs = Needs.of(Task(on_example(run_settings(training.arguments))).context(0))
+        self._needs = Needs.of(context_of(training.arguments))
         self._best_score = (False, -math.inf)  # whether the best model qualified, and minus its ratio
         chosen_by = range(SELECTION.start, SELECTION.start + training.evaluation.seeds)
         check_seeds(chosen_by, "selection")
@@ -201,18 +193,18 @@ class Run:
 
     def begin_with_policy(self) -> None:
         """Give a new learner the network it starts from, or fit it to that policy and store the error."""
-        training, name = self.training, self.training.start_from
+        training, name, learner = self.training, self.training.start_from, self.training.hyperparameters
         if name is None or self.model.num_timesteps > 0:
             return
-        if training.hyperparameters.takes_over:
-            training.hyperparameters.begin_as(self.model, name)
+        if isinstance(learner, APG):
+            learner.begin_as(self.model, name)
             return
-        native, steps = self.model.get_env().unwrapped.env, training.cloning.steps
-        seeds = lane_seeds(training)
+        native, cloning = self.model.get_env().unwrapped.env, training.cloning
+        steps = -(-cloning.steps // training.lanes)
         policy = PolicyLanes(name, native)
-        examples = demonstrate(native, policy, seeds, -(-steps // training.lanes), training.cloning.noise)
-        error = training.hyperparameters.begin_with(self.model, examples, training.cloning)
-        write_checked(self.folder.cloning, {"policy": name} | error.model_dump(mode="json"))
+        examples = demonstrate(native, policy, lane_seeds(training), steps, cloning.noise)
+        error = learner.begin_with(self.model, examples, cloning)
+        write_checked(self.folder.cloning, {"policy": name} | error)
         self._seed_lanes()
 
     def learn(self, stack: ExitStack, progress: bool) -> None:
@@ -231,9 +223,8 @@ class Run:
             EveryNSteps(self.training.checkpoint_steps, self.checkpoint),
         ]
         if progress:
-            bar = ProgressBar(self.training.total_steps, lambda: self.pairs)
-            callbacks.append(bar)
-            stack.enter_context(bar.progress)
+            callbacks.append(ProgressBar(self.training.total_steps, lambda: self.pairs))
+            stack.enter_context(callbacks[-1].progress)
         if remaining_steps > 0:
             together = CallbackList(callbacks)
             self.model.learn(remaining_steps, together, log_interval=1, reset_num_timesteps=False)
@@ -242,8 +233,7 @@ class Run:
     def evaluate(self) -> None:
         """Compare the policy with the passive pantograph, log the figures, and keep the best model."""
         steps, logger = self.model.num_timesteps, self.model.logger
-        actor = self.training.hyperparameters.actor(self.model)
-        policy = policy_of(actor, self._facts(actor))  # in the form of its model file
+        policy = policy_of(*self._policy())  # in the form of its model file
         self.pairs = [pair for each in self._comparisons for pair in each.run(policy)]
         self._verdict = ratio, qualified = verdict(self.pairs)
         self.folder.add_evaluation(steps, self.pairs)
@@ -264,13 +254,13 @@ class Run:
         self.folder.drop_old_checkpoints()
 
     def _save(self, path: Path, replay: bool = False) -> None:
-        actor = self.training.hyperparameters.actor(self.model)
-        write_model(path, self.model, actor, self._facts(actor), replay)
+        write_model(path, self.model, *self._policy(), replay)
 
-    def _facts(self, actor: Any) -> Facts:
-        ratio, qualified = self._verdict
+    def _policy(self) -> tuple[Actor, Facts]:
+        """Network and facts of the present policy."""
+        actor, (ratio, qualified) = self.training.hyperparameters.actor(self.model), self._verdict
         shared = "algorithm", "seed", "environment", "variants", "residual_of", "residual_share", "washout"
-        return Facts(
+        facts = Facts(
             commit=commit(),
             command=self._command,
             steps=self.model.num_timesteps,
@@ -282,3 +272,4 @@ class Run:
             squashed=actor.squashed,
             **{name: getattr(self.training, name) for name in shared},
         )
+        return actor, facts

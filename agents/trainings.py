@@ -7,8 +7,8 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,13 @@ class RunFolder:
         self.evaluations = self.path / "evaluations.csv"
         self.tensorboard = self.path / "tensorboard"
         self.checkpoints = self.path / "checkpoints"
+
+    def check(self, training: Training, resume: bool) -> None:
+        """Raise InputError if the folder holds anything, or, to resume, unless it holds such a run."""
+        if resume:
+            self.check_resumable(training)
+        else:
+            self.check_new()
 
     def check_new(self) -> None:
         """Raise InputError if the folder holds anything already."""
@@ -107,8 +114,8 @@ class RunFolder:
         for pair in pairs:
             row: dict[str, Any] = {"steps": steps}
             row |= {name: getattr(pair, name) for name in ("speed_kmh", "seed", "qualified")}
-            row |= {f"policy_{key}": value for key, value in pair.policy.as_dict().items()}
-            row |= {f"passive_{key}": value for key, value in pair.passive.as_dict().items()}
+            for of in ("policy", "passive"):
+                row |= {f"{of}_{key}": value for key, value in getattr(pair, of).as_dict().items()}
             rows.append({key: str(value) for key, value in row.items()})
         self._write_rows(rows)
 
@@ -152,25 +159,9 @@ def _dotted(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Values of nested tables under dotted keys, such as "hyperparameters.gamma"."""
     values: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, Mapping):
-            values |= _dotted(value, f"{prefix}{key}.")
-        else:
-            values[prefix + key] = value
+        name = prefix + key
+        values |= _dotted(value, f"{name}.") if isinstance(value, Mapping) else {name: value}
     return values
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Outcome of a finished run: its best model."""
-
-    folder: str
-    algorithm: str
-    seed: int
-    steps: int  # of the whole training
-    best: str  # model file of the best evaluation
-    best_steps: int  # steps trained by then
-    ratio: float | None  # mean of sigma over that of the passive pantograph; None: a run ended early
-    qualified: bool  # whether every mean force was within its range
 
 
 def run_name(config: Path, training: Training) -> str:
@@ -187,16 +178,15 @@ def plan(
     two runs would have the same folder.
     """
     planned: dict[Path, Training] = {}
-    for config in configs:
-        for seed in seeds or (None,):
-            training = load_training(config, seed=seed, total_steps=total_steps)
-            folder = output / run_name(config, training)
-            if folder in planned:
-                raise InputError(
-                    f"Two of the trainings would go into {folder}; omit a repeated seed, or rename "
-                    "a configuration file."
-                )
-            planned[folder] = training
+    for config, seed in product(configs, seeds or (None,)):
+        training = load_training(config, seed=seed, total_steps=total_steps)
+        folder = output / run_name(config, training)
+        if folder in planned:
+            raise InputError(
+                f"Two of the trainings would go into {folder}; omit a repeated seed, or rename a "
+                "configuration file."
+            )
+        planned[folder] = training
     return planned
 
 
@@ -208,8 +198,8 @@ def train_all(
     ray: str | None = None,
     progress: Progress | None = None,
     command: str | None = None,
-) -> list[Outcome]:
-    """Train each into its folder; outcomes in the order of the trainings.
+) -> list[dict[str, Any]]:
+    """Train each into its folder; a table of each one's best model, in the order of the trainings.
 
     resume: continue runs that have begun, begin the others. workers, ray: see ``spread``; on a cluster all
     machines must see the folders, and a run whose worker died continues from its newest checkpoint. command:
@@ -223,10 +213,11 @@ def train_all(
     spread(jobs, workers=workers, ray=ray, progress=progress)
     outcomes = []
     for path, training in trainings.items():
-        folder = RunFolder(path)
-        facts, _ = read_model(folder.best)
-        made = str(folder.path), training.algorithm, training.seed, training.total_steps
-        outcomes.append(Outcome(*made, str(folder.best), facts.steps, facts.ratio, facts.qualified))
+        best = RunFolder(path).best
+        facts, _ = read_model(best)
+        outcome = {"folder": str(path), "algorithm": training.algorithm, "seed": training.seed}
+        outcome |= {"steps": training.total_steps, "best": str(best), "best_steps": facts.steps}
+        outcomes.append(outcome | {"ratio": facts.ratio, "qualified": facts.qualified})
     return outcomes
 
 

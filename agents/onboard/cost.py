@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,8 +81,7 @@ def cost(exported: Exported, processor: str = "cortex-m7", steps: int = 100, see
     require("A step's cost", "onboard", "unicorn")
     image, symbols, program = _program(exported, PROCESSORS[processor])
     emulator = _Emulator(image, {name: address for name, (address, _) in symbols.items()})
-    start = emulator.call("begin")
-    counts = []
+    start, counts = emulator.call("begin"), []
     for readings in drawn(exported, steps, seed):
         emulator.write("readings", readings.astype("<f8").tobytes())
         counts.append(emulator.call("step"))
@@ -156,17 +156,15 @@ class _Emulator:
         from unicorn import arm_const
 
         self._symbols, self._registers = symbols, arm_const
-        self._blocks: dict[tuple[int, int], int] = {}
+        self._blocks: Counter[tuple[int, int]] = Counter()
         self._machine: Any = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB)
         self._machine.ctl_set_cpu_model(arm_const.UC_CPU_ARM_MAX)  # it has the instructions of all of them
         self._machine.mem_map(0, MEMORY)
         self._machine.mem_write(PROGRAM, image)
         self._machine.mem_map(STACK, DEPTH)
         self._machine.mem_write(STACK, bytes([PAINT]) * DEPTH)
-        access = self._machine.reg_read(arm_const.UC_ARM_REG_C1_C0_2)
-        self._machine.reg_write(
-            arm_const.UC_ARM_REG_C1_C0_2, access | 0xF << 20
-        )  # to the floating-point unit,
+        access = self._machine.reg_read(arm_const.UC_ARM_REG_C1_C0_2) | 0xF << 20
+        self._machine.reg_write(arm_const.UC_ARM_REG_C1_C0_2, access)  # to the floating-point unit,
         self._machine.reg_write(arm_const.UC_ARM_REG_FPEXC, 1 << 30)  # which is switched on here
         self._machine.hook_add(unicorn.UC_HOOK_BLOCK, self._count)
         self._error = unicorn.UcError
@@ -195,8 +193,7 @@ class _Emulator:
         return int(DEPTH - np.argmax(touched)) if touched.any() else 0
 
     def _count(self, machine: Any, address: int, size: int, data: Any) -> None:
-        block = address, size
-        self._blocks[block] = self._blocks.get(block, 0) + 1
+        self._blocks[address, size] += 1
 
     def _length(self, address: int, size: int) -> int:
         """Instructions of a block: of four bytes where a half-word begins with the bits of 29 to 31."""

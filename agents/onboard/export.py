@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import partial
+from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -23,10 +27,11 @@ from panto_env.plant.state import Place
 from panto_env.policies import find_policy, wishes
 
 from ..evaluation import NOT_OF_A_PASS
+from ..model_file import Facts
 from ..policy import TrainedPolicy
 from ..settings import arguments
 from . import acting, seeing
-from .parts import Table, new_state, parts_of, without_guard
+from .parts import Table, parts_of, without_guard
 from .translate import Translation
 
 READINGS = (
@@ -39,6 +44,7 @@ READINGS = (
     ("speed", "m/s", "of the train"),
 )
 """Name, unit and meaning of the readings of every policy, in the order of ``seeing``."""
+WRAPPER = resources.files(__package__) / "wrapper"
 WIDTH = 96
 """Letters of a line of comment."""
 
@@ -89,7 +95,7 @@ class Controller:
 
     def begin(self) -> None:
         """Begin anew, as NAME_init does."""
-        self._state = new_state(self._initial)
+        self._state = SimpleNamespace(**deepcopy(self._initial))
         acting.begin(self._constants, self._state)
 
     def step(self, readings: Sequence[float]) -> list[float]:
@@ -118,22 +124,19 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
         raise InputError(
             f"'{called}' is not a name in C; give one of letters, digits and _, such as controller."
         )
-    task = _task(driver, settings)
+    inner = without_guard(driver)
+    facts = inner.facts if isinstance(inner, TrainedPolicy) else None
+    task = _task(driver, facts, settings)
     context = task.context(0)
     driver.reset(context)  # refuses a task that it was not trained for
     constants, state = parts_of(driver, words, task)
     inputs = [Variable(*each) for each in READINGS]
-    inputs += [
-        Variable(
-            f"front_force_{k}", "N", f"contact force that the pantograph in front felt {place:g} m ahead"
-        )
-        for k, place in enumerate(context.layout.front)
-    ]
-    reported = constants["inputs"] - len(inputs)
+    felt = "contact force that the pantograph in front felt"
+    for k, place in enumerate(context.layout.front):
+        inputs.append(Variable(f"front_force_{k}", "N", f"{felt} {place:g} m ahead"))
     places = [Place(channel).name.lower() for channel in context.channels]
-    inputs += [
-        Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}") for k in range(reported)
-    ]
+    for k in range(constants["inputs"] - len(inputs)):
+        inputs.append(Variable(f"actuator_force_{k}", "N", f"of the actuator on the {places[k]}"))
     limit = f"within {context.force_limit:g} N either way, positive upwards"
     outputs = tuple(
         Variable(f"{each}_force", "N", f"of the actuator on the {each}, {limit}") for each in places
@@ -141,10 +144,31 @@ def exported(policy: Any, name: str | None = None, **settings: Any) -> Exported:
     translation = Translation(constants, state, f"{called}_state")
     translation.add(acting.begin)
     translation.add(acting.step)
-    card, interval = _card(words, driver, task), context.control_interval
-    source = _source(called, inputs, translation, card)
-    header = _header(called, inputs, outputs, translation, interval, card)
+    interval = context.control_interval
+    varied = [] if facts is None else [item for each in facts.variants for item in each.items()]
+    kinds = sorted({f"{key} {value}" for key, value in varied if key != "faults"})
+    told: dict[str, Any] = {"name": words, "version": __version__, "facts": facts, "kinds": kinds}
+    told |= {"guarded": inner is not driver, "kmh": [to_kmh(speed) for speed in task.settings.speeds]}
+    card = rendered("card.txt", told | {"context": context})
+    forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
+    call = (
+        f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite number, or "
+        f"above {seeing.LARGEST:g}, counts as its last good one; until each was good once, force is 0. It "
+        "stays finite and within its limit whatever is read."
+    )
+    given = {"name": called, "inputs": inputs, "translation": translation, "card": card, "call": call}
+    source, header = (rendered(name, given) for name in ("controller.c", "controller.h"))
     return Exported(called, source, header, tuple(inputs), outputs, interval, card, constants, state)
+
+
+def rendered(name: str, values: Mapping[str, Any]) -> str:
+    """A text with values, from its template in the folder ``wrapper``."""
+    from jinja2 import Environment, StrictUndefined  # slow to import
+
+    options: Any = {"undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(**options, keep_trailing_newline=True)
+    environment.filters |= {"comment": _comment, "xml": partial(escape, entities={'"': "&quot;"})}
+    return environment.from_string((WRAPPER / f"{name}.jinja").read_text()).render(values)
 
 
 def name_in_c(words: str) -> str:
@@ -153,11 +177,9 @@ def name_in_c(words: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
 
 
-def _task(driver: Any, settings: dict[str, Any]) -> Task:
+def _task(driver: Any, facts: Facts | None, settings: dict[str, Any]) -> Task:
     """A task that has been reset, with the settings of the policy's training where others are not given."""
-    inner = without_guard(driver)
-    trained = inner.facts.environment if isinstance(inner, TrainedPolicy) else {}
-    variants = inner.facts.variants if isinstance(inner, TrainedPolicy) else ()
+    trained, variants = ({}, ()) if facts is None else (facts.environment, facts.variants)
     environment = arguments({"id": "Pantograph-v0"} | trained)
     given = {key: value for key, value in environment.items() if key not in NOT_OF_A_PASS[1:]}
     low, high = (np.ravel(given["speed_kmh"])[end] for end in (0, -1))
@@ -168,86 +190,6 @@ def _task(driver: Any, settings: dict[str, Any]) -> Task:
     task = Task(on_example(run_settings(given)), keep_samples=False)
     task.reset(0, np.random.default_rng(0))
     return task
-
-
-def _card(name: str, driver: Any, task: Task) -> str:
-    """Facts of a policy, in lines of plain text."""
-    inner = without_guard(driver)
-    context = task.context(0)
-    low, high, count = *map(to_kmh, task.settings.speeds), len(context.train.collectors)
-    lines = [f"Policy {name}, exported by panto-env {__version__}."]
-    if isinstance(inner, TrainedPolicy):
-        facts = inner.facts
-        lines += [
-            f"Trained by {facts.algorithm}, {facts.steps} steps, seed {facts.seed}, panto-env "
-            f"{facts.version}, commit {facts.commit or 'unknown'}, by: {facts.command or 'unknown'}.",
-            "Trained in: " + ", ".join(f"{key} = {value}" for key, value in facts.environment.items()) + ".",
-        ]
-        if facts.variants:
-            kinds = sorted(
-                {f"{key} {each[key]}" for each in facts.variants for key in each if key != "faults"}
-            )
-            lines.append("and in variants with " + ", ".join(kinds) + ".")
-    if inner is not driver:
-        lines.append("Guarded: doubtful readings are held, and a command that does harm fades to none.")
-    lines += [
-        f"Its constants are for the line {context.catenary.name}, mean length of a span "
-        f"{context.alignment.mean_length:.4g} m, pantograph {context.pantograph.name}, "
-        f"{low:.4g} to {high:.4g} km/h.",
-        *([f"It is for pantograph {context.collector + 1} of {count} of a train."] if count > 1 else ()),
-        f"A call every {context.control_interval:g} s; force limit {context.force_limit:g} N.",
-        "It was trained and judged in simulation alone; nobody has run it on a train.",
-    ]
-    return "\n".join(lines)
-
-
-def _source(name: str, inputs: Sequence[Variable], translation: Translation, card: str) -> str:
-    """The C file."""
-    values = ",\n".join(f"        readings->{each.name}" for each in inputs)
-    parts = [
-        _comment(card),
-        f'#include <math.h>\n#include "{name}.h"',
-        translation.constant_tables(),
-        "\n".join(translation.declarations),
-        *translation.functions.values(),
-        f"void {name}_init({name}_state *state)\n{{\n    "
-        f"*state = ({name}_state){{0}};\n    begin(state);\n}}",
-        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force)\n{{\n"
-        f"    const double given[{len(inputs)}] = {{\n{values}}};\n    "
-        f"step(state, given, force);\n}}",
-    ]
-    return "\n\n".join(parts) + "\n"
-
-
-def _header(
-    name: str,
-    inputs: Sequence[Variable],
-    outputs: Sequence[Variable],
-    translation: Translation,
-    interval: float,
-    card: str,
-) -> str:
-    """The header."""
-    readings = "\n".join(f"    double {each.name}; /* {each.unit}: {each.description} */" for each in inputs)
-    forces = "; ".join(f"[{k}] {each.description} ({each.unit})" for k, each in enumerate(outputs))
-    guard = f"{name.upper()}_H"
-    call = (
-        f"One control step, every {interval:g} s. force: {forces}. A reading that is no finite "
-        f"number, or above {seeing.LARGEST:g}, counts as its last good one; until each was good once, "
-        "force is 0. It stays finite and within its limit whatever is read."
-    )
-    start = "Begin anew: before the first step, at a line's start, or after any gap in the readings."
-    return (
-        f"{_comment(card)}\n\n#ifndef {guard}\n#define {guard}\n\n"
-        '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
-        f"typedef struct {{\n{readings}\n}} {name}_readings;\n\n"
-        "/* All that is kept between two steps; nothing of it is for other eyes. */\n"
-        f"typedef struct {{\n{translation.state_fields()}\n}} {name}_state;\n\n"
-        f"{_comment(start)}\nvoid {name}_init({name}_state *state);\n\n"
-        f"{_comment(call)}\n"
-        f"void {name}_step({name}_state *state, const {name}_readings *readings, double *force);\n"
-        "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
-    )
 
 
 def _comment(text: str) -> str:

@@ -19,7 +19,7 @@ from panto_env.base.extras import require
 from panto_env.base.files import write_whole
 from panto_env.policies import Policy
 
-from ..model_file import Actor, Cell, Needs, RecurrentActor, Step
+from ..model_file import Actor, Cell, Needs, Step
 from ..policy import TrainedPolicy
 
 OPSET, FORMAT = 17, 8
@@ -70,15 +70,8 @@ def _metadata(policy: TrainedPolicy) -> dict[str, str]:
     """What the policy is for, as text: names of its observation, its limits, and what trained it."""
     facts = policy.facts
     needs = facts.needs.model_dump(mode="json")
-    entries = [
-        {"name": name, "centre": centre, "scale": scale} for name, centre, scale in needs.pop("entries")
-    ]
-    told: dict[str, Any] = {
-        "algorithm": facts.algorithm,
-        "command": facts.command,
-        "commit": facts.commit,
-        "seed": facts.seed,
-    }
+    entries = [dict(zip(("name", "centre", "scale"), each, strict=True)) for each in needs.pop("entries")]
+    told: dict[str, Any] = {name: getattr(facts, name) for name in ("algorithm", "command", "commit", "seed")}
     told |= {"panto_env": facts.version, "environment steps": facts.steps, "environment": facts.environment}
     told |= {"variants": list(facts.variants), "needs": needs, "observation": entries}
     return {name: each if isinstance(each, str) else json.dumps(each) for name, each in told.items()}
@@ -134,10 +127,8 @@ class _Graph:
     def model(self, name: str, metadata: dict[str, str]) -> Any:
         """The graph as a model."""
         graph = self._helper.make_graph(self._nodes, name, self._inputs, self._outputs, self._constants)
-        operators = [self._helper.make_opsetid("", OPSET)]
-        model = self._helper.make_model(
-            graph, opset_imports=operators, ir_version=FORMAT, producer_name="panto-env"
-        )
+        given = {"opset_imports": [self._helper.make_opsetid("", OPSET)], "ir_version": FORMAT}
+        model = self._helper.make_model(graph, **given, producer_name="panto-env")
         self._helper.set_model_props(model, metadata)
         return model
 
@@ -181,7 +172,7 @@ def _network(graph: _Graph, values: str, actor: Actor) -> str:
         values = graph.node("Gemm", values, graph.constant(weight), graph.constant(bias), transB=1)
         if k < last:
             values = graph.node("Tanh" if actor.activation == "tanh" else "Relu", values)
-        if k == 0 and isinstance(actor, RecurrentActor):
+        if k == 0 and actor.cell is not None:
             values = graph.node("Concat", _cell(graph, values, actor.cell), values, axis=1)
     if actor.squashed:
         values = graph.node("Tanh", values)

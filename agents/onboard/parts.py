@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from types import SimpleNamespace
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,17 +17,10 @@ from panto_baselines.policies.repetitive import PEAKS, WASHED, Repetitive, Washo
 from panto_env.base.arrays import METRES_PER_SECOND
 from panto_env.base.errors import InputError
 from panto_env.control import Context, Task
-from panto_env.control.entries import (
-    CENTRED,
-    DEVIATIONS,
-    MEASURED,
-    READING_ENTRIES,
-    Entry,
-    present,
-)
+from panto_env.control.entries import CENTRED, DEVIATIONS, MEASURED, READING_ENTRIES, Entry, present
 from panto_env.policies import find_policy
 
-from ..model_file import Actor, Facts, RecurrentActor
+from ..model_file import Actor, Facts
 from ..policy import TrainedPolicy
 from . import acting, seeing
 from .guarding import SHOWN
@@ -53,7 +46,7 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
             "agent-any-line:seed=1."
         )
     constants, state = _seen(name, task, context)
-    constants |= {"law": acting.NONE, "layers": 0}
+    constants |= {"law": acting.NONE, "layers": 0, "guarded": isinstance(policy, Guarded)}
     if isinstance(law, Repetitive):
         law.reset(context)
         _add_repetitive(constants, state, law, task, name)
@@ -61,7 +54,6 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
         _add_feedback(constants, state, law, context, name)
     if isinstance(inner, TrainedPolicy):
         _add_network(constants, state, inner.facts, inner.actor)
-    constants["guarded"] = isinstance(policy, Guarded)
     if isinstance(policy, Guarded):
         _add_guard(constants, state, Guard(context, *policy.delays), context)
     return constants, state
@@ -70,13 +62,6 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
 def without_guard(policy: Any) -> Any:
     """The policy within a guard, or the policy itself."""
     return policy.policy if isinstance(policy, Guarded) else policy
-
-
-def new_state(state: Table) -> SimpleNamespace:
-    """A state of its own, all 0."""
-    return SimpleNamespace(
-        **{name: value.copy() if isinstance(value, np.ndarray) else value for name, value in state.items()}
-    )
 
 
 def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
@@ -124,26 +109,25 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "force_scale": force.scale,
         "force_centre": force.centre,
     }
-    state: Table = {
-        "begun": 0,
-        "known": np.zeros(constants["inputs"], dtype=np.int64),
-        "input": np.zeros(constants["inputs"]),
-        "reading": np.zeros(seeing.SENSORS),
-        "average": np.zeros(seeing.SENSORS),
-        "ahead": np.zeros(max(front + places * spans * (1 + actions), 1)),
-        "past": np.zeros(actions + layout.history * (seeing.SENSORS + actions)),
-        "kept": np.zeros((steps, 2 + actions)),
-        "time": 0,
-        "seen": np.zeros(len(layout.entries), dtype=np.float32),
-        "action": np.zeros(actions),
-        "base": np.zeros(actions),
-        "washed": np.zeros(actions),
-        "average_force": np.zeros(actions + 1),
-        "actuator_force": np.zeros(actions + 1),
+    inputs, sensors = constants["inputs"], seeing.SENSORS
+    shapes = {
+        "input": inputs,
+        "reading": sensors,
+        "average": sensors,
+        "ahead": max(front + places * spans * (1 + actions), 1),
+        "past": actions + layout.history * (sensors + actions),
+        "kept": (steps, 2 + actions),
     }
-    for each in ("lag", "rate", "average_of_force"):  # of a network's actions, and of the law's
-        constants[each] = np.zeros(actions + 1)
-    return constants, state
+    state: Table = {"begun": 0} | _zeros({"known": inputs}, np.int64) | _zeros(shapes) | {"time": 0}
+    state |= _zeros({"seen": len(layout.entries)}, np.float32)
+    state |= _zeros({"action": actions, "base": actions, "washed": actions})
+    each = actions + 1  # of a network's actions, and of the law's
+    state |= _zeros({"average_force": each, "actuator_force": each})
+    return constants | _zeros({"lag": each, "rate": each, "average_of_force": each}), state
+
+
+def _zeros(shapes: Mapping[str, int | tuple[int, ...]], kind: type = float) -> Table:
+    return {name: np.zeros(shape, dtype=kind) for name, shape in shapes.items()}
 
 
 def _source(entry: Entry, front: int, actions: int) -> tuple[int, int]:
@@ -168,8 +152,6 @@ def _source(entry: Entry, front: int, actions: int) -> tuple[int, int]:
 
 
 def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor) -> None:
-    cell = actor.cell if isinstance(actor, RecurrentActor) else None
-    units = 0 if cell is None else cell.weight_state.shape[1]
     rows = np.array([len(bias) for bias in actor.biases])
     columns = np.array([weight.shape[1] for weight in actor.weights])
     constants |= {
@@ -183,17 +165,16 @@ def _add_network(constants: Table, state: Table, facts: Facts, actor: Actor) -> 
         "bias_at": np.cumsum([0, *rows])[:-1],
         "bent_by_tanh": actor.activation == "tanh",
         "squashed": actor.squashed,
-        "units": units,
+        "units": actor.units,
         "washes_out": facts.washout is not None,
     }
-    if cell is not None:
-        constants |= cell._asdict()
+    if actor.cell is not None:
+        constants |= actor.cell._asdict()
     if facts.washout is not None:
         _add_washout(constants, facts.washout, slice(constants["actions"]))
     wide = add_steps_before(constants, state, facts)
     widest = max(wide, *rows.tolist(), *columns.tolist())
-    for each, size in (("values", widest), ("following", widest), ("hidden", max(units, 1))):
-        state[each] = np.zeros(size, dtype=np.float32)
+    state |= _zeros({"values": widest, "following": widest, "hidden": max(actor.units, 1)}, np.float32)
 
 
 def _add_washout(constants: Table, washout: WashoutSettings, which: slice) -> None:
@@ -203,39 +184,25 @@ def _add_washout(constants: Table, washout: WashoutSettings, which: slice) -> No
 
 def add_steps_before(constants: Table, state: Table, facts: Facts) -> int:
     """Add the steps before the network; the largest number of values between them."""
+    names = ["width", "stacked", "step_at", "step_bound", "padded", "step_centre", "step_scale", "padding"]
+    table: dict[str, list[Any]] = {name: [] for name in names}
     width, most, places = constants["entries"], constants["entries"], 0
-    each: dict[str, list[Any]] = {
-        name: [] for name in ("width", "stacked", "step_at", "step_bound", "padded")
-    }
-    centre: list[float] = []
-    scale: list[float] = []
-    padding: list[float] = []
     for step in facts.steps_before:
-        size = width if step.centre else width * step.frames
-        each["width"].append(width)
-        each["stacked"].append(0 if step.centre else step.frames)
-        each["step_at"].append(places)
-        each["step_bound"].append(step.bound or math.inf)
-        each["padded"].append(int(step.padding is not None))
-        centre += step.centre or [0.0] * size
-        scale += step.scale or [1.0] * size
-        padding += (step.padding or (0.0,) * width) * (size // width)
+        frames, size = (0, width) if step.centre else (step.frames, width * step.frames)
+        numbers = width, frames, places, step.bound or math.inf, int(step.padding is not None)
+        of_values = (step.centre or (0.0,) * size, step.scale or (1.0,) * size)
+        padding = (step.padding or (0.0,) * width) * (size // width)
+        for name, own in zip(names, (*((each,) for each in numbers), *of_values, padding), strict=True):
+            table[name] += own
         width, places, most = size, places + size, max(most, size)
-    constants |= {name: np.array(values) for name, values in each.items()}
+    constants |= {name: np.array(values) for name, values in table.items()}
     constants["steps_before"] = len(facts.steps_before)
-    constants |= {"step_centre": np.array(centre), "step_scale": np.array(scale)}
-    constants["padding"] = np.array(padding, dtype=np.float32)
+    constants["padding"] = constants["padding"].astype(np.float32)
     state["frames"] = np.zeros(places, dtype=np.float32)
     return int(most)
 
 
-def _add_feedback(
-    constants: Table,
-    state: Table,
-    policy: Feedback,
-    context: Context,
-    name: str,
-) -> None:
+def _add_feedback(constants: Table, state: Table, policy: Feedback, context: Context, name: str) -> None:
     velocity = next(each for each in context.layout.entries if each.name == "frame velocity")
     constants |= {
         "law": acting.FEEDBACK,
@@ -265,7 +232,7 @@ def _add_feedback(
 
 
 def _add_repetitive(constants: Table, state: Table, policy: Repetitive, task: Task, name: str) -> None:
-    context, actions = task.context(0), constants["actions"]
+    context = task.context(0)
     if not policy.counts and constants["sight"] == 0.0:
         raise InputError(
             f"The policy '{name}' cannot be exported: these sensors do not measure the place; take "
@@ -276,15 +243,11 @@ def _add_repetitive(constants: Table, state: Table, policy: Repetitive, task: Ta
     poles, modes = np.linalg.eig(model.a)
     residues = (model.c[0] @ modes) * np.linalg.solve(modes, model.b[:, 0]) / (2 * math.pi)
     poles /= 2 * math.pi  # Hz
-    learning, forgetting, response = np.abs(policy.gains)
-    slowest = task.settings.speeds[0]
-    most = len(harmonics(slowest / context.alignment.mean_length))
+    most = len(harmonics(task.settings.speeds[0] / context.alignment.mean_length))
     constants |= {
         "law": acting.REPETITIVE,
         "counts": policy.counts,
-        "learning": float(learning),
-        "forgetting": float(forgetting),
-        "response": float(response),
+        **dict(zip(("learning", "forgetting", "response"), np.abs(policy.gains).tolist(), strict=True)),
         "most_harmonics": most,
         "line_states": sampled.size,
         "line_a": sampled.a,
@@ -296,20 +259,18 @@ def _add_repetitive(constants: Table, state: Table, policy: Repetitive, task: Ta
         "line_delay": model.delay,
         "sine": np.sin(2 * np.pi * np.arange(PEAKS) / PEAKS),
     }
-    _add_washout(constants, WASHED, slice(actions, None))
-    state |= {name: np.zeros((2, most)) for name in ("turn", "towards", "learnt")}
-    state |= {name: np.zeros(sampled.size) for name in ("line", "following_line")}
-    state |= {"sums": np.zeros(4), "harmonics": 0}
+    _add_washout(constants, WASHED, slice(constants["actions"], None))
+    state |= _zeros({"turn": (2, most), "towards": (2, most), "learnt": (2, most)})
+    state |= _zeros({"line": sampled.size, "following_line": sampled.size, "sums": 4}) | {"harmonics": 0}
     numbers = "force_average force_share counted measured_speed learns_at span_share spans sum_steps"
     state |= dict.fromkeys((*numbers.split(), "first_spans", "first_count", "trust"), 0.0)
 
 
 def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -> None:
-    readings, monitor = guard.readings, guard.monitor
-    steps = constants["memory_steps"] + 8
+    readings, monitor, models = guard.readings, guard.monitor, guard.monitor.models
+    steps, states, sensors = constants["memory_steps"] + 8, models[0].size, seeing.SENSORS
     entry, spans, ahead = zip(*readings.memory, strict=True) if readings.memory else ((0,), (0,), (0.0,))
     low_pass_b, low_pass_a = monitor.low_pass
-    states = monitor.models[0].size
     constants |= {
         "present": readings.present,
         "earlier": np.array(readings.past or [[0]]),
@@ -323,29 +284,18 @@ def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -
         "unknown": readings.unknown / context.nominal_force,
         "knows_force": monitor.absolute,
         "states": states,
-        "model_a": np.array([model.a for model in monitor.models]),
-        "model_b": np.array([model.b for model in monitor.models]),
-        "model_c": np.array([model.c[0] for model in monitor.models]),
+        "model_a": np.array([model.a for model in models]),
+        "model_b": np.array([model.b for model in models]),
+        "model_c": np.array([model.c[0] for model in models]),
         "low_pass_a": low_pass_a,
         "low_pass_b": low_pass_b,
         "at_rest": monitor.at_rest,
         "shares": monitor.shares,
     }
-    sensors = seeing.SENSORS
-    state |= {
-        "shows": np.zeros(sensors),
-        "last": np.zeros(sensors),
-        "shown": np.zeros((SHOWN, sensors)),
-        "shift": np.zeros(sensors),
-        "stood": np.zeros(sensors, dtype=np.int64),
-        "faulty": np.zeros(steps, dtype=np.int64),
-        "model": np.zeros((len(monitor.models), states)),
-        "following_model": np.zeros(states),
-        "now": np.zeros(3),
-        "means": np.zeros((2, 3)),
-        "squares": np.zeros((2, 3)),
-        "filter": np.zeros((2, 3)),
-    }
+    state |= _zeros({"shows": sensors, "last": sensors, "shown": (SHOWN, sensors), "shift": sensors})
+    state |= _zeros({"stood": sensors, "faulty": steps}, np.int64)
+    state |= _zeros({"model": (len(models), states), "following_model": states, "now": 3})
+    state |= _zeros({"means": (2, 3), "squares": (2, 3), "filter": (2, 3)})
     state |= dict.fromkeys(("shown_steps", "fault_at", "sound_for", "heard_any"), 0)
     numbers = "held waits pause fade_in heard heard_at most before gate mean_added deviation passive_for"
     state |= dict.fromkeys((*numbers.split(), "listened", "acted_for"), 0.0)

@@ -70,11 +70,10 @@ class Translation:
         lines = ["enum {\n" + ",\n".join(whole) + "\n};"] if whole else []
         for name, value in self.used.items():
             kind = type_of(value)
-            if np.ndim(value):
-                initial = _braces(np.asarray(value), kind)
-                lines.append(f"static const {kind} {name}{_sizes(value)} = {initial};")
-            elif kind != INT:
-                lines.append(f"static const {kind} {name} = {literal(value, kind)};")
+            if np.ndim(value) or kind != INT:
+                lines.append(
+                    f"static const {kind} {name}{_sizes(value)} = {_initial(np.asarray(value), kind)};"
+                )
         return "\n".join(lines)
 
     def state_fields(self) -> str:
@@ -83,10 +82,12 @@ class Translation:
         return "\n".join(f"    {type_of(value)} {name}{_sizes(value)};" for name, value in entries)
 
 
-def _braces(array: Any, kind: str) -> str:
-    """Initialiser of an array, with the braces of its dimensions."""
+def _initial(array: Any, kind: str) -> str:
+    """Initialiser of a number, or of an array with the braces of its dimensions."""
+    if array.ndim == 0:
+        return literal(array[()], kind)
     if array.ndim > 1:
-        return "{" + ",\n".join(_braces(row, kind) for row in array) + "}"
+        return "{" + ",\n".join(_initial(row, kind) for row in array) + "}"
     numbers = textwrap.wrap(", ".join(literal(each, kind) for each in array), 104)
     return "{\n    " + "\n    ".join(numbers) + "}"
 
@@ -120,25 +121,22 @@ class _Body:
         self._whole, self._function, self._scope = whole, function, function.__globals__
         tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
         assert isinstance(tree, ast.FunctionDef)
-        self._tree, self._lines, self._depth = tree, [], 1  # type: ignore[var-annotated]
+        self._tree, self._lines, self._depth = tree, [], 0  # type: ignore[var-annotated]
         self._local: dict[str, str] = {}  # types of numbers in sight
         self._tables: dict[str, str] = {}  # parameters that are not numbers, by name
         self._result: str | None = ANNOTATED.get(ast.unparse(tree.returns)) if tree.returns else None
 
     def write(self) -> str:
         """Append the C to the whole; the type that the function returns."""
-        taken, name = [], self._tree.name
+        taken, name, tables = [], self._tree.name, {"State": f"{self._whole.state_type} *"} | ARRAYS
         for each in self._tree.args.args:
             kind = ast.unparse(each.annotation) if each.annotation else "float"
-            if kind in ("Constants", "State", *ARRAYS):
+            if kind == "Constants" or kind in tables:
                 self._tables[each.arg] = kind
-            if kind == "State":
-                taken.append(f"{self._whole.state_type} *{each.arg}")
-            elif kind in ARRAYS:
-                taken.append(f"{ARRAYS[kind]}{each.arg}")
-            elif kind != "Constants":
-                taken.append(f"{ANNOTATED[kind]} {each.arg}")
+            else:
                 self._local[each.arg] = ANNOTATED[kind]
+            if kind != "Constants":
+                taken.append(f"{tables.get(kind) or f'{ANNOTATED[kind]} '}{each.arg}")
         documented = ast.get_docstring(self._tree)
         self._block(self._tree.body[1:] if documented else self._tree.body)
         kind, body = self._result or VOID, "\n".join(self._lines)
@@ -159,17 +157,11 @@ class _Body:
     def _put(self, line: str) -> None:
         self._lines.append("    " * self._depth + line)
 
-    def _block(self, body: list[ast.stmt]) -> None:
-        before = dict(self._local)
+    def _block(self, body: list[ast.stmt], **counters: str) -> None:
+        before, self._local = self._local, self._local | counters
+        self._depth += 1
         for statement in body:
             self._statement(statement)
-        self._local = before
-
-    def _nested(self, body: list[ast.stmt], **counters: str) -> None:
-        before = dict(self._local)
-        self._local |= counters
-        self._depth += 1
-        self._block(body)
         self._depth -= 1
         self._local = before
 
@@ -183,7 +175,7 @@ class _Body:
                 self._if(test, body, otherwise)
             case ast.While(test=test, body=body, orelse=[]):
                 self._put(f"while ({self._bare(self._expression(test)[0])}) {{")
-                self._nested(body)
+                self._block(body)
                 self._put("}")
             case ast.For(
                 target=ast.Name(id=k), iter=ast.Call(func=ast.Name(id="range"), args=bounds), body=body
@@ -201,16 +193,14 @@ class _Body:
 
     def _assign(self, target: ast.expr, text: str, kind: str) -> None:
         text = self._bare(text)
-        if isinstance(target, ast.Name):
-            if target.id in self._local:
-                self._put(f"{target.id} = {text};")
-                return
-            own = DOUBLE if kind == LITERAL else kind
-            self._local[target.id] = own
+        if not isinstance(target, ast.Name):
+            place, own = self._expression(target)
+            self._put(f"{place} = {f'({own})({text})' if {own, kind} == {SINGLE, DOUBLE} else text};")
+        elif target.id in self._local:
+            self._put(f"{target.id} = {text};")
+        else:
+            own = self._local[target.id] = DOUBLE if kind == LITERAL else kind
             self._put(f"{own} {target.id} = {text};")
-            return
-        place, own = self._expression(target)
-        self._put(f"{place} = {f'({own})({text})' if {own, kind} == {SINGLE, DOUBLE} else text};")
 
     def _if(self, test: ast.expr, body: list[ast.stmt], otherwise: list[ast.stmt]) -> None:
         known = self._known(test)
@@ -219,10 +209,10 @@ class _Body:
                 self._statement(statement)
             return
         self._put(f"if ({self._bare(self._expression(test)[0])}) {{")
-        self._nested(body)
+        self._block(body)
         if otherwise:
             self._put("} else {")
-            self._nested(otherwise)
+            self._block(otherwise)
         self._put("}")
 
     def _known(self, test: ast.expr) -> bool | None:
@@ -241,13 +231,12 @@ class _Body:
 
     def _for(self, k: str, bounds: list[ast.expr], body: list[ast.stmt]) -> None:
         texts = [self._expression(each)[0] for each in bounds]
-        first, end = (["0", *texts] if len(texts) == 1 else texts)[:2]
-        down = len(texts) == 3
-        if down and texts[2] != "-1":
+        first, end, *step = ["0", *texts] if len(texts) == 1 else texts
+        if step and step != ["-1"]:
             self._refuse(bounds[2])
-        go_on, last = (f"{k}--", f"{k} > {end}") if down else (f"{k}++", f"{k} < {end}")
+        last, go_on = (f"{k} > {end}", f"{k}--") if step else (f"{k} < {end}", f"{k}++")
         self._put(f"for (int {k} = {self._bare(first)}; {last}; {go_on}) {{")
-        self._nested(body, **{k: INT})
+        self._block(body, **{k: INT})
         self._put("}")
 
     def _bare(self, text: str) -> str:
@@ -286,21 +275,16 @@ class _Body:
                 text, kind = self._expression(operand)
                 return f"{OPERATORS[type(operator)]}{text}", kind
             case ast.BoolOp(op=operator, values=values):
-                return (
-                    f"({f' {OPERATORS[type(operator)]} '.join(self._expression(v)[0] for v in values)})",
-                    INT,
-                )
+                texts = [self._expression(each)[0] for each in values]
+                return f"({f' {OPERATORS[type(operator)]} '.join(texts)})", INT
             case ast.Compare(left=left, ops=[operator], comparators=[right]):
                 one, other, _ = self._joined(self._expression(left), self._expression(right))
                 return f"({one} {OPERATORS[type(operator)]} {other})", INT
             case ast.Call(func=function, args=arguments, keywords=[]):
-                return self._call(
-                    function, [self._expression(each) for each in arguments if not self._is_constants(each)]
-                )
+                tables = [name for name, kind in self._tables.items() if kind == "Constants"]
+                passed = [each for each in arguments if ast.unparse(each) not in tables]
+                return self._call(function, [self._expression(each) for each in passed])
         self._refuse(node)
-
-    def _is_constants(self, node: ast.expr) -> bool:
-        return isinstance(node, ast.Name) and self._tables.get(node.id) == "Constants"
 
     def _entry(self, table: str, name: str, node: ast.expr) -> Expression:
         """An entry of the constants or of the state."""
@@ -354,11 +338,8 @@ class _Body:
                 one, other, kind = self._joined(*given)
                 if kind == INT:
                     return f"({one} {'<' if name == 'min' else '>'} {other} ? {one} : {other})", INT
-                one, other = self._bare(one), self._bare(other)
-                return (
-                    f"f{name}{'f' if kind == SINGLE else ''}({one}, {other})",
-                    DOUBLE if kind == LITERAL else kind,
-                )
+                call = f"f{name}{'f' if kind == SINGLE else ''}({self._bare(one)}, {self._bare(other)})"
+                return call, DOUBLE if kind == LITERAL else kind
             case ast.Name(id="abs"):
                 return f"fabs{'f' if given[0][1] == SINGLE else ''}({texts[0]})", given[0][1]
             case ast.Name(id="int" | "float" as name):

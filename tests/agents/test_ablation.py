@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,19 +15,12 @@ from typer.testing import CliRunner
 
 from panto_agents.ablation import REFERENCE, _difference, load_ablation, variants
 from panto_agents.trainings import RunFolder
-from panto_configs import find, names
+from panto_configs import names
 from panto_env import InputError
 from panto_env.cli import make_app
 
-TRAINING = """
-algorithm = "ppo"
-total_steps = 512
-lanes = 2
-checkpoint_steps = 128
-environment = { id = "PantographStiffness-v0", distance = 80.0, harmonics = 3 }
-evaluation = { interval_steps = 128 }
-hyperparameters = { n_steps = 64, batch_size = 64, n_epochs = 1, net_arch = [8] }
-"""
+from .test_agents import TOML
+
 BENCHMARK = """
 lines = [{ catenary = "periodic-stiffness", pantograph = "three-mass", speeds_kmh = [300], spans = [3, 5] }]
 """
@@ -35,7 +28,7 @@ lines = [{ catenary = "periodic-stiffness", pantograph = "three-mass", speeds_km
 
 @pytest.fixture
 def config(tmp_path) -> Path:
-    (tmp_path / "training.toml").write_text(TRAINING)
+    (tmp_path / "training.toml").write_text(TOML)
     (tmp_path / "judge.toml").write_text(BENCHMARK)
     path = tmp_path / "parts.toml"
     path.write_text(f"""
@@ -50,6 +43,7 @@ harmonics = "default"
     return path
 
 
+@pytest.mark.slow
 def test_ours_is_valid():
     assert "ablation" in names("ablation")
     trainings = load_ablation("ablation").trainings()
@@ -88,19 +82,14 @@ def test_runs_are_kept_and_compared(config, tmp_path, monkeypatch):
 
 
 def test_figures_of_variants():
-    class Cell:
-        def __init__(self, policy, change, disqualified=""):
-            self.policy, self.change, self.disqualified = policy, change, disqualified
+    def cell(policy, change, disqualified=""):
+        return SimpleNamespace(policy=policy, change=change, disqualified=disqualified)
 
-    class Outcome:
-        cells = (
-            *(Cell(f"a{seed}", change) for seed in range(3) for change in (-20.0 - seed, -30.0 - seed)),
-            *(Cell(f"b{seed}", -20.0, "moves" if seed == 0 else "") for seed in range(3)),
-        )
-
-    models = {(REFERENCE, seed): Path(f"a{seed}") for seed in range(3)}
-    models |= {("less", seed): Path(f"b{seed}") for seed in range(3)}
-    whole, less = variants(models, Outcome)
+    cells = [cell(f"a{seed}", change) for seed in range(3) for change in (-20.0 - seed, -30.0 - seed)]
+    cells += [cell(f"b{seed}", -20.0, "moves" if seed == 0 else "") for seed in range(3)]
+    names = {REFERENCE: "a", "less": "b"}
+    models = {(name, seed): Path(f"{path}{seed}") for name, path in names.items() for seed in range(3)}
+    whole, less = variants(models, SimpleNamespace(cells=cells))
     assert whole.changes == (-25.0, -26.0, -27.0)
     assert whole.change == -26.0
     assert less.worse == 1.0
@@ -130,19 +119,19 @@ def test_the_interval_of_a_difference_is_that_of_its_normal_law():
 def test_what_is_wrong_is_said_of_the_variant(config, change, message):
     config.write_text(config.read_text().replace('harmonics = "default"', change))
     if message is None:
-        load_ablation(config)
+        trainings = load_ablation(config).trainings()
+        assert list(trainings) == [(name, seed) for name in (REFERENCE, "one harmonic") for seed in (3, 4)]
+        assert [each.seed for each in trainings.values()] == [3, 4, 3, 4]
+        assert "harmonics" in trainings[REFERENCE, 3].environment
+        assert "harmonics" not in trainings["one harmonic", 3].environment
         return
     with pytest.raises(InputError, match=message):
         load_ablation(config)
 
 
-def test_an_unknown_one_is_refused():
+def test_an_unknown_one_and_one_seed_are_refused(config):
     with pytest.raises(InputError, match="The ablation file nothing does not exist"):
-        find("nothing", "ablation")
-
-
-def test_one_seed_is_too_few(config):
-    """The list is not empty, as the sentence had said."""
-    config.write_text(re.sub(r"^seeds = .*$", "seeds = [5]", config.read_text(), flags=re.MULTILINE))
+        load_ablation("nothing")
+    config.write_text(config.read_text().replace("seeds = [3, 4]", "seeds = [5]"))
     with pytest.raises(InputError, match=r"key 'seeds' must hold at least 2 values \(given: \[5\]\)"):
         load_ablation(config)

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 import typer
@@ -19,7 +18,7 @@ from typer.testing import CliRunner
 pytest.importorskip("stable_baselines3")
 
 import torch
-from safetensors.numpy import load_file, save_file
+from safetensors.numpy import load_file
 
 from panto_agents import command, train
 from panto_agents.evaluation import NOT_OF_A_PASS, Comparison
@@ -38,6 +37,15 @@ from panto_env.envs import IDS
 from ..plugin import install
 
 torch.set_num_threads(1)  # as a training does: more of them wait for each other
+TOML = """
+algorithm = "ppo"
+total_steps = 512
+lanes = 2
+checkpoint_steps = 128
+environment = { id = "PantographStiffness-v0", distance = 80.0, harmonics = 3 }
+evaluation = { interval_steps = 128 }
+hyperparameters = { n_steps = 64, batch_size = 64, n_epochs = 1, net_arch = [8] }
+"""
 LINE = {"id": "PantographStiffness-v0", "distance": 80.0}  # 96 control steps at 300 km/h
 SMALL = {
     "ppo": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
@@ -46,31 +54,28 @@ SMALL = {
 
 
 def settings(kind: str, **changes: Any) -> Training:
-    table = {
-        "algorithm": kind,
-        "seed": 1,
-        "total_steps": 256,
-        "lanes": 2,
-        "checkpoint_steps": 128,
-        "environment": LINE,
-        "evaluation": {"interval_steps": 128},
-        "hyperparameters": SMALL[kind],
-    }
-    return parse_training(table | changes, "test")
+    usual = {"environment": LINE, "evaluation": {"interval_steps": 128}, "hyperparameters": SMALL[kind]}
+    usual |= {"seed": 1, "total_steps": 256, "lanes": 2, "checkpoint_steps": 128}
+    return parse_training({"algorithm": kind} | usual | changes, "test")
 
 
-@pytest.fixture(scope="session", params=["ppo", "sac"])
-def finished(request, tmp_path_factory) -> RunFolder:
-    """A tiny finished run; read only."""
-    folder = tmp_path_factory.mktemp("runs") / request.param
-    return train.train(settings(request.param), folder, progress=False)
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory) -> dict[str, RunFolder]:
+    """Tiny finished runs; read only."""
+    folder = tmp_path_factory.mktemp("runs")
+    return {kind: train.train(settings(kind), folder / kind, progress=False) for kind in SMALL}
+
+
+@pytest.fixture(params=["ppo", "sac"])
+def finished(request, runs) -> RunFolder:
+    return runs[request.param]
 
 
 @pytest.fixture
-def copied(finished, tmp_path) -> RunFolder:
-    """The same, to be changed."""
-    shutil.copytree(finished.path, tmp_path / finished.path.name)
-    return RunFolder(tmp_path / finished.path.name)
+def copied(runs, tmp_path) -> RunFolder:
+    """One of them, to be changed."""
+    shutil.copytree(runs["ppo"].path, tmp_path / "ppo")
+    return RunFolder(tmp_path / "ppo")
 
 
 def algorithm_of(folder: RunFolder) -> str:
@@ -91,7 +96,6 @@ def learner(training, folder):
     return train.Run(training, folder, train.make_lanes(training))
 
 
-@pytest.mark.slow
 def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -116,14 +120,13 @@ def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     assert facts.ratio == pytest.approx(-max(scores)[1])
 
 
-def test_same_seed_same_weights(finished, tmp_path):
-    kind = algorithm_of(finished)
-    again = train.train(settings(kind), tmp_path / "again", progress=False)
-    for one, other in zip(weights(finished.model), weights(again.model), strict=True):
+def test_same_seed_same_weights(runs, tmp_path):
+    again = train.train(settings("ppo"), tmp_path / "again", progress=False)
+    for one, other in zip(weights(runs["ppo"].model), weights(again.model), strict=True):
         np.testing.assert_array_equal(one, other)
     one, other = (
         training.hyperparameters.actor(learner(training, RunFolder(tmp_path)).model).weights[0]
-        for training in (settings(kind), settings(kind, seed=2))
+        for training in (settings("ppo"), settings("ppo", seed=2))
     )
     assert not np.array_equal(one, other)
 
@@ -173,19 +176,20 @@ class TestResume:
             assert np.abs(buffer.observations[:128]).max(axis=(1, 2)).min() > 0
             np.testing.assert_array_equal(buffer.rewards[:128], saved["replay/rewards"])
 
-    def test_a_finished_run_stays_as_it_is(self, finished):
-        kind, before = algorithm_of(finished), finished.model.read_bytes()
-        train.train(settings(kind), finished.path, resume=True, progress=False)
-        other = settings(kind, hyperparameters=SMALL[kind] | {"gamma": 0.5})
+    def test_a_finished_run_stays_as_it_is(self, runs):
+        folder = runs["ppo"]
+        before, same = folder.model.read_bytes(), settings("ppo")
+        train.train(same, folder.path, resume=True, progress=False)
+        other = settings("ppo", hyperparameters=SMALL["ppo"] | {"gamma": 0.5})
         for training, path, resume, message in (
-            (settings(kind), finished.path, False, r"exists already.*--resume"),
-            (other, finished.path, True, "hyperparameters.gamma is 0.5, was 0.97"),
-            (settings(kind, total_steps=128), finished.path, True, "not fewer"),
-            (settings(kind), finished.path / "none", True, "no run to resume"),
+            (same, folder.path, False, r"exists already.*--resume"),
+            (other, folder.path, True, "hyperparameters.gamma is 0.5, was 0.97"),
+            (settings("ppo", total_steps=128), folder.path, True, "not fewer"),
+            (same, folder.path / "none", True, "no run to resume"),
         ):
             with pytest.raises(InputError, match=message):
                 train.train(training, path, resume=resume, progress=False)
-        assert finished.model.read_bytes() == before
+        assert folder.model.read_bytes() == before
 
 
 class TestPolicy:
@@ -214,20 +218,11 @@ class TestPolicy:
             ({"control_interval": 0.02}, "control_interval of 0.01 s"),
         ],
     )
-    def test_refuses_another_task(self, finished, change, message):
-        line = settings(algorithm_of(finished)).arguments | change
+    def test_refuses_another_task(self, runs, change, message):
         with pytest.raises(InputError, match="does not fit") as caught:
-            simulate(**line, policy=str(finished.model))
+            simulate(**settings("ppo").arguments | change, policy=str(runs["ppo"].model))
         assert message in str(caught.value)
-        assert finished.model.name in str(caught.value)
-
-    def test_no_model_files(self, tmp_path):
-        other = tmp_path / "other.safetensors"
-        save_file({"notes": np.zeros(3)}, other)
-        with pytest.raises(InputError, match="it was not written by panto-env"):
-            simulate(policy=str(other))
-        with pytest.raises(InputError, match=r"none.safetensors does not exist"):
-            load(tmp_path / "none.safetensors")
+        assert "model.safetensors" in str(caught.value)
 
 
 class TestSettings:
@@ -258,6 +253,11 @@ class TestSettings:
             ({"environment": LINE | {"caternary": "x"}}, "did you mean 'catenary'?"),
             ({"environment": LINE | {"catenary": "nowhere"}}, "Unknown catenary 'nowhere'"),
             ({"environment": LINE | {"reward": {"calm": 1.0}}}, "key 'calm'"),
+            ({"residual_of": "agent-head"}, "the policy 'agent-head' needs harmonics = "),
+            ({"start_from": "fb+fff"}, "did you mean 'fb"),
+            ({"start_from": "pd", "residual_of": "pd"}, "start_from and residual_of exclude each other"),
+            ({"start_from": "pd", "cloning": {"epoch": 3}}, "key 'cloning.epoch' is not known"),
+            ({"washout": {"time_constant": 0.0}}, "key 'washout.time_constant'"),
         ],
     )
     def test_errors_name_the_key(self, change, message):
@@ -271,12 +271,11 @@ class TestSettings:
         path = tmp_path / "bad.toml"
         with pytest.raises(InputError, match=r"bad.toml does not exist"):
             load_training(path)
-        path.write_text("algorithm = ")
-        with pytest.raises(InputError, match=r"bad\.toml is not valid TOML"):
-            load_training(path)
-        path.write_text('algorithm = "ppo"')
-        with pytest.raises(InputError, match=r"bad\.toml: .*total_steps"):
-            load_training(path)
+        messages = {"algorithm = ": " is not valid TOML", 'algorithm = "ppo"': ": .*total_steps"}
+        for text, said in messages.items():
+            path.write_text(text)
+            with pytest.raises(InputError, match=rf"bad\.toml{said}"):
+                load_training(path)
 
 
 class TestCommand:
@@ -291,19 +290,10 @@ class TestCommand:
 
         return run
 
-    @pytest.fixture
-    def config(self, tmp_path):
-        path = tmp_path / "tiny.toml"
-        path.write_text(
-            'algorithm = "ppo"\ntotal_steps = 1\nlanes = 2\ncheckpoint_steps = 128\n'
-            '[environment]\nid = "PantographStiffness-v0"\ndistance = 120\nspeed_kmh = [250, 300]\n'
-            "[evaluation]\ninterval_steps = 128\n"
-            "[hyperparameters]\nn_steps = 64\nbatch_size = 64\nn_epochs = 1\nnet_arch = [8]\n"
-        )
-        return path
-
-    def test_train_and_evaluate(self, panto, config, tmp_path, monkeypatch):
+    def test_train_and_evaluate(self, panto, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
+        config = tmp_path / "tiny.toml"
+        config.write_text(TOML.replace("distance = 80.0", "distance = 120.0, speed_kmh = 290"))
         result = panto("train", config, "--seed", 3, "--steps", 128, "--json")
         assert result.exit_code == 0, result.stderr
         report = json.loads(result.stdout)
@@ -314,10 +304,8 @@ class TestCommand:
         result = panto("evaluate", report["best"], "--plot", "forces.png", "--json")
         assert result.exit_code == 0, result.output
         passes = json.loads(result.stdout)["passes"]
-        assert [entry["speed_kmh"] for entry in passes] == [250, 275, 300]
-        assert np.mean([1 + entry["std_change_percent"] / 100 for entry in passes]) == pytest.approx(
-            report["best_ratio"]
-        )
+        assert [entry["speed_kmh"] for entry in passes] == [290]
+        assert 1 + passes[0]["std_change_percent"] / 100 == pytest.approx(report["best_ratio"])
         assert Path("forces.png").read_bytes().startswith(b"\x89PNG")
 
         table = panto("evaluate", report["best"], "--speed", 280, "--seeds", 2)
@@ -347,21 +335,10 @@ class TestCommand:
         assert isinstance(unknown.exception, InputError)
 
     def test_a_stored_agent_is_evaluated_as_in_its_training(self, panto):
-        result = panto("evaluate", "agent-any-line-five", "--speed", 275, "--json")
+        result = panto("evaluate", "agent-any-line-five", "--speed", 275, "--distance", 900, "--json")
         assert result.exit_code == 0, result.output
         (entry,) = json.loads(result.stdout)["passes"]
         assert entry["std_change_percent"] < -35
-
-
-def test_lanes_are_seeded_one_by_one():
-    training = settings("ppo", environment=LINE | {"speed_kmh": [250, 300]})
-    lanes = train.make_lanes(training)
-    lanes.seed(7)
-    lanes.reset()
-    env = gymnasium.make("PantographStiffness-v0", distance=120.0, speed_kmh=[250, 300])
-    speeds = [env.reset(seed=7 + lane)[1]["speed_kmh"] for lane in range(2)]
-    assert [info["speed_kmh"] for info in lanes.unwrapped.reset_infos] == speeds
-    lanes.close()
 
 
 class TestSeeds:
@@ -376,53 +353,46 @@ class TestSeeds:
         one, other = (lane_seeds(settings("ppo", seed=seed)) for seed in (0, 1))
         assert not set(one) & set(other)
 
-    @pytest.mark.parametrize("kind", ["ppo", "sac"])
-    def test_lanes_run_under_them(self, kind, tmp_path):
-        training = settings(kind)
+    def test_lanes_run_under_them(self, tmp_path):
+        training = settings("ppo")
         run = learner(training, RunFolder(tmp_path))
         run.model._setup_learn(1)
         native = run.model.get_env().unwrapped.env
         assert native.np_random_seed == tuple(lane_seeds(training))
 
-    @pytest.mark.parametrize(
-        ("seeds", "purpose", "message"),
-        [
-            (range(999, 1001), "test", "Seeds for test are 0 to 999, not 1000"),
-            (range(5, 6), "training", "Seeds for training are 2,000 to 999,999, not 5"),
-            (range(1999, 2001), "selection", "Seeds for selection are 1,000 to 1,999"),
-        ],
-    )
-    def test_of_another_purpose_are_refused(self, seeds, purpose, message):
-        with pytest.raises(InputError, match=message):
-            check_seeds(seeds, purpose)
+    def test_of_another_purpose_are_refused(self):
+        for seeds, message in {
+            range(999, 1001): "Seeds for test are 0 to 999, not 1000",
+            range(5, 6): "Seeds for training are 2,000 to 999,999, not 5",
+            range(1999, 2001): "Seeds for selection are 1,000 to 1,999",
+        }.items():
+            with pytest.raises(InputError, match=message):
+                check_seeds(seeds, message.split()[2])
 
 
+LINEAR = """
+import numpy as np
+class Linear:
+    def reset(self, context):
+        names = [entry.name for entry in context.layout.entries]
+        self.places = [names.index(each) for each in ("sine of span position", "frame velocity")]
+    def act(self, seen):
+        sine, velocity = seen[self.places]
+        return np.array([0.3 * sine - 0.1 * velocity])
+"""
 SEEING = {"harmonics": 2, "history": 1, "normalise": 300, "reward": "agent", "actuator": "realistic"}
 
 
 @pytest.fixture
 def linear(tmp_path, monkeypatch):
     """An installed policy that is linear in what it sees."""
-    source = (
-        "import numpy as np\n"
-        "WANTED = 'sine of span position', 'frame velocity'\n"
-        "class Linear:\n"
-        "    def reset(self, context):\n"
-        "        self.context = context\n"
-        "    def act(self, seen):\n"
-        "        names = [entry.name for entry in self.context.layout.entries]\n"
-        "        sine, velocity = (seen[names.index(each)] for each in WANTED)\n"
-        "        return np.array([0.3 * sine - 0.1 * velocity])\n"
-    )
-    install(
-        tmp_path / "site", {"panto_env.policies": {"linear": "linear_law:Linear"}}, {"linear_law": source}
-    )
+    points = {"panto_env.policies": {"linear": "linear_law:Linear"}}
+    install(tmp_path / "site", points, {"linear_law": LINEAR})
     monkeypatch.syspath_prepend(tmp_path / "site")
     return "linear"
 
 
 class TestStart:
-    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["ppo", "sac"])
     def test_an_agent_does_what_it_has_cloned(self, kind, linear, tmp_path):
         training = settings(
@@ -430,7 +400,7 @@ class TestStart:
             total_steps=128,
             environment=LINE | SEEING,
             start_from=linear,
-            cloning={"steps": 4000, "batch_size": 128, "learning_rate": 3e-3},
+            cloning={"steps": 2500, "batch_size": 128, "learning_rate": 3e-3},
             hyperparameters=SMALL[kind] | {"net_arch": [32]},
         )
         folder = train.train(training, tmp_path / "run", progress=False)
@@ -439,69 +409,30 @@ class TestStart:
         assert told["rms"] > 0.1
         assert told["error"] < 0.1 * told["rms"]
         assert rows(folder)[0]["steps"] == "0"  # what it begins as is judged, and kept if it stays the best
-        if kind == "sac":
-            return
-        run = learner(training, RunFolder(tmp_path / "fresh"))
-        run.folder.path.mkdir()
-        run.begin_with_policy()
-        ours, theirs = (
-            simulate(**training.arguments | {"distance": 500.0}, policy=policy, seed=2).frame_force
-            for policy in (training.hyperparameters.actor(run.model), linear)
-        )
-        assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.15 * np.sqrt(np.mean(theirs**2))
-
-    def test_a_policy_that_asks_for_another_observation_is_refused(self, finished):
-        with pytest.raises(InputError, match="needs history = 0, but the environment has 2; set it to"):
-            settings("ppo", residual_of=str(finished.model), environment=LINE | {"history": 2})
-        with pytest.raises(InputError, match="did you mean 'fb"):
-            settings("ppo", start_from="fb+fff")
-        with pytest.raises(InputError, match="start_from and residual_of exclude each other"):
-            settings("ppo", start_from="pd", residual_of="pd")
-        with pytest.raises(InputError, match=r"key 'cloning.epoch' is not known"):
-            settings("ppo", start_from="pd", cloning={"epoch": 3})
+        (taught,) = Comparison(training.arguments, (300.0,), (1000,)).run(linear)
+        assert float(rows(folder)[0]["policy_std"]) == pytest.approx(taught.policy.std, rel=0.05)
 
 
-@pytest.fixture(scope="module")
-def added(tmp_path_factory):
-    """A finished training of an agent that adds to fb+ff; read only."""
-    training = settings("ppo", residual_of="fb+ff", environment=LINE | SEEING)
-    return train.train(training, tmp_path_factory.mktemp("runs") / "added", progress=False)
-
-
-class TestResidual:
-    def test_with_a_network_of_zeros_it_is_its_base_bit_for_bit(self, added):
-        facts, actor = read_model(added.model)
-        assert facts.residual_of == "fb+ff"
-        still = [np.zeros_like(each) for each in (actor.weights[-1], actor.biases[-1])]
-        zeros = replace(actor, weights=(*actor.weights[:-1], still[0]), biases=(*actor.biases[:-1], still[1]))
-        given = settings("ppo", environment=LINE | SEEING).arguments | {"distance": 500.0}
-        ours, theirs, trained = (
-            simulate(**given, policy=policy, seed=3).contact_force
-            for policy in (TrainedPolicy(added.model, facts, zeros), "fb+ff", str(added.model))
-        )
-        np.testing.assert_array_equal(ours, theirs)
-        assert not np.array_equal(trained, theirs)
-
-    @pytest.mark.slow
-    def test_takes_part_in_the_benchmark_and_asks_for_what_it_sees(self, added):
-        from panto_baselines.benchmark.run import run
-        from panto_baselines.benchmark.settings import BenchmarkSettings, Line
-
-        line = Line(catenary="periodic-stiffness", pantograph="three-mass", speeds_kmh=(300.0,), spans=(3, 5))
-        path = str(added.best)
-        given = {"policies": (path, f"blind of {path}"), "lines": (line,), "seeds": (0,)}
-        outcome = run(BenchmarkSettings(**given, actuator="realistic"), workers=1)
-        assert outcome.cells[1].policy == path
-        assert outcome.cells[1].figures["effort"] > 0
+def test_a_residual_with_a_network_of_zeros_is_its_base_bit_for_bit(tmp_path):
+    training = settings("ppo", total_steps=128, residual_of="fb+ff", environment=LINE | SEEING)
+    added = train.train(training, tmp_path / "added", progress=False)
+    facts, actor = read_model(added.model)
+    assert facts.residual_of == "fb+ff"
+    still = [np.zeros_like(each) for each in (actor.weights[-1], actor.biases[-1])]
+    zeros = replace(actor, weights=(*actor.weights[:-1], still[0]), biases=(*actor.biases[:-1], still[1]))
+    given = training.arguments | {"distance": 500.0}
+    ours, theirs, trained = (
+        simulate(**given, policy=policy, seed=3).contact_force
+        for policy in (TrainedPolicy(added.model, facts, zeros), "fb+ff", str(added.model))
+    )
+    np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(trained, theirs)
 
 
 def test_a_train_is_evaluated_by_the_controlled_pantograph_that_swings_most():
     train = {"pantographs": ["dsa380"] * 2, "distances": [80.0], "controlled": [1, 2], "accuracy": "fast"}
     (own,) = Comparison(train, (280.0,), (0,)).run("pd")
     active, passive = (simulate(**train, speed_kmh=280.0, policy=policy).train for policy in ("pd", None))
-    assert (
-        own.passive.std
-        == max(run.summary().std for run in passive)
-        > min(run.summary().std for run in passive)
-    )
+    smaller, larger = sorted(run.summary().std for run in passive)
+    assert own.passive.std == larger > smaller
     assert own.policy.std == max(run.summary().std for run in active)

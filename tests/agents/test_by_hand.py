@@ -9,30 +9,28 @@ pytest.importorskip("stable_baselines3")
 
 import io
 import math
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import gymnasium
 import numpy as np
-import stable_baselines3
 
 from panto_agents import command, train
 from panto_agents.ablation import Variant, table
 from panto_agents.algorithm import MOST_KEPT, PPO, SAC
 from panto_agents.cloning import Demonstrations, demonstrate, returns
 from panto_agents.evaluation import Pair, in_words, pair, verdict
-from panto_agents.model_file import Actor, RecurrentActor, actor_of, read_model
+from panto_agents.model_file import actor_of
 from panto_agents.policy import SETTINGS, _first_difference
 from panto_agents.settings import arguments, speeds
-from panto_agents.stable_baselines import save_policy
 from panto_agents.trainings import RunFolder
 from panto_env import InputError, simulate
 from panto_env.envs import IDS
 from panto_env.metrics.figures import Figures
 from panto_env.terminal import PlainConsole
 
-from .test_ablation import TRAINING
+from .test_agents import TOML
 
 FIGURES = Figures(*(float(k) for k in range(1, 1 + len(fields(Figures)))))
 PAIR = Pair(250.0, 0, "10-19", replace(FIGURES, mean=1.01, std=1.0), FIGURES, (), (), 120.0, "", "")
@@ -46,43 +44,23 @@ def test_a_learning_rate_goes_from_its_first_value_to_its_last_by_the_last_step(
 
 
 @pytest.mark.parametrize(
-    ("lanes", "n_steps", "batch_size", "message"),
+    ("kind", "given", "training", "message"),
     [
-        (2, 128, 256, None),
-        (1, 2, 2, None),
-        (1, 1, 1, "must be a multiple of batch_size = 1, and more than 1"),
-        (2, 128, 512, "lanes x n_steps = 256 must be a multiple of batch_size = 512"),
-        (3, 100, 64, "lanes x n_steps = 300 must be a multiple of batch_size = 64"),
-        (MOST_KEPT // 512, 512, 64, "multiple" if MOST_KEPT // 512 * 512 % 64 else None),
-        (MOST_KEPT // 512 + 1, 512, 64, "must be at most 50,000,000"),
+        (PPO, (128, 256), {"lanes": 2}, None),
+        (PPO, (2, 2), {"lanes": 1}, None),
+        (PPO, (1, 1), {"lanes": 1}, "must be a multiple of batch_size = 1, and more than 1"),
+        (PPO, (128, 512), {"lanes": 2}, "lanes x n_steps = 256 must be a multiple of batch_size = 512"),
+        (PPO, (1, 1), {"lanes": MOST_KEPT}, None),
+        (PPO, (1, 1), {"lanes": MOST_KEPT + 1}, "must be at most 50,000,000"),
+        (SAC, (99,), {"total_steps": 100}, None),
+        (SAC, (100,), {"total_steps": 100}, "learning_starts = 100 must be less than total_steps = 100"),
     ],
 )
-def test_minibatches_divide_the_steps_of_an_update(lanes, n_steps, batch_size, message):
-    settings = PPO(n_steps=n_steps, batch_size=batch_size)
-    if message is None:
-        settings.check(SimpleNamespace(lanes=lanes))
-        return
-    with pytest.raises(InputError, match=message):
-        settings.check(SimpleNamespace(lanes=lanes))
-
-
-def test_learning_starts_before_the_last_step():
-    SAC(learning_starts=99).check(SimpleNamespace(total_steps=100))
-    for start in (100, 101):
-        with pytest.raises(
-            InputError, match=f"learning_starts = {start} must be less than total_steps = 100"
-        ):
-            SAC(learning_starts=start).check(SimpleNamespace(total_steps=100))
-
-
-@pytest.mark.parametrize(("seed", "stored"), [(None, 0), (7, 7)])
-def test_a_model_without_a_seed_is_stored_with_seed_0(seed, stored, tmp_path):
-    env = gymnasium.make("panto_env:Pantograph-v0", distance=120.0, accuracy="fast", settle=0.0)
-    model = stable_baselines3.PPO("MlpPolicy", env, seed=seed, device="cpu", n_steps=64)
-    save_policy(model, tmp_path / "m.safetensors")
-    facts, _ = read_model(tmp_path / "m.safetensors")
-    assert (facts.seed, facts.steps, facts.updates) == (stored, 0, 0)
-    assert facts.algorithm == "ppo"
+def test_hyperparameters_fit_the_training(kind, given, training, message):
+    names = ("n_steps", "batch_size") if kind is PPO else ("learning_starts",)
+    expected = nullcontext() if message is None else pytest.raises(InputError, match=message)
+    with expected:
+        kind(**dict(zip(names, given, strict=True))).check(SimpleNamespace(**training))
 
 
 def test_evaluations_up_to_the_step_that_a_run_resumes_at_stay(tmp_path):
@@ -96,8 +74,6 @@ def test_evaluations_up_to_the_step_that_a_run_resumes_at_stay(tmp_path):
     row = folder._rows()[1]
     assert (row["seed"], row["speed_kmh"], row["qualified"]) == ("1", "250.0", str(PAIR.qualified))
     assert (row["policy_std"], row["passive_std"]) == ("1.0", "2.0")
-    folder.drop_evaluations_after(99)
-    assert [row["steps"] for row in folder._rows()] == ["0", "0"]
     folder.drop_evaluations_after(-1)
     assert folder._rows() == []
 
@@ -121,8 +97,7 @@ def test_a_pair_of_passes_has_the_figures_of_those_that_did_not_end_early():
     active, passive = simulate(**settings, policy="pd", seed=3), simulate(**settings, seed=3)
     made = pair(active, passive)
     assert (made.speed_kmh, made.seed, made.spans) == (280.0, 3, "10-19")
-    for ours, run in ((made.policy, active), (made.passive, passive)):
-        assert ours.as_dict() == pytest.approx(run.summary().as_dict(), rel=1e-12, nan_ok=True)
+    assert (made.policy.std, made.passive.std) == (active.summary().std, passive.summary().std)
     assert len(made.policy_compliance) == len(made.passive_compliance) > 3
     ended = replace(active, terminated=True, ending="It ended.")
     made = pair(ended, passive)
@@ -131,14 +106,12 @@ def test_a_pair_of_passes_has_the_figures_of_those_that_did_not_end_early():
     assert pair(ended, replace(passive, terminated=True)).spans == ""
 
 
-LAYERS = {"actor/weight_0": np.ones((3, 2)), "actor/bias_0": np.ones(3)}
-LAYERS |= {"actor/weight_1": np.ones((1, 3)), "actor/bias_1": np.ones(1)}
 FACTS = SimpleNamespace(needs=SimpleNamespace(channels=(0,)), inputs=2, activation="tanh", squashed=False)
 
 
-CELLS = {"weight_input": (6, 3), "weight_state": (6, 2), "bias_input": (6,), "bias_state": (6,)}
-RECURRENT = LAYERS | {f"actor/cell_{name}": np.ones(shape) for name, shape in CELLS.items()}
-RECURRENT |= {"actor/weight_1": np.ones((1, 5))}
+SHAPES = {"weight_0": (3, 2), "bias_0": (3,), "weight_1": (1, 5), "bias_1": (1,), "cell_weight_input": (6, 3)}
+SHAPES |= {"cell_weight_state": (6, 2), "cell_bias_input": (6,), "cell_bias_state": (6,)}
+RECURRENT = {f"actor/{name}": np.ones(shape) for name, shape in SHAPES.items()}
 
 
 @pytest.mark.parametrize(
@@ -153,22 +126,10 @@ RECURRENT |= {"actor/weight_1": np.ones((1, 5))}
     ],
 )
 def test_a_cell_that_does_not_fit_is_refused(change, message):
-    assert isinstance(actor_of(RECURRENT, FACTS), RecurrentActor)
+    assert actor_of(RECURRENT, FACTS).units == 2
     arrays = {name: array for name, array in (RECURRENT | change).items() if array is not None}
     with pytest.raises(ValueError, match=message):
         actor_of(arrays, FACTS)
-
-
-def test_layers_act_as_their_formula():
-    weights = (np.array([[1.0, -2.0], [0.5, 0.5]]), np.array([[2.0, -1.0]]))
-    biases = (np.array([0.1, -0.2]), np.array([0.3]))
-    seen = np.array([0.4, 0.9])
-    first = weights[0] @ seen + biases[0]
-    for activation, hidden in (("tanh", np.tanh(first)), ("relu", np.maximum(first, 0.0))):
-        out = weights[1] @ hidden + biases[1]
-        for squashed, expected in ((False, np.clip(out, -1, 1)), (True, np.tanh(out))):
-            actor = Actor(weights, biases, activation, squashed)
-            assert actor.act(seen) == pytest.approx(expected)
 
 
 def examples(rewards, terminated, ended):
@@ -182,8 +143,7 @@ def test_sums_of_rewards_end_with_their_episode_and_are_known_where_nothing_is_m
     sums, known = returns(ends, 0.5)
     assert sums.ravel().tolist() == [2.0, 2.0, 5.0, 4.0]
     assert known.ravel().tolist() == [True, True, False, False]
-    cut = examples([1.0, 2.0, 3.0, 4.0], [0, 0, 0, 1], [0, 1, 0, 1])
-    sums, known = returns(cut, 0.5)
+    sums, known = returns(examples([1.0, 2.0, 3.0, 4.0], [0, 0, 0, 1], [0, 1, 0, 1]), 0.5)
     assert sums.ravel().tolist() == [2.0, 2.0, 5.0, 4.0]
     assert known.ravel().tolist() == [False, False, True, True]
     sums, known = returns(examples([1.0] * 8, [0] * 8, [0] * 8), 0.5)  # 0.5^7 is below 1 %
@@ -232,18 +192,11 @@ def test_a_demonstration_keeps_what_was_seen_intended_done_and_followed():
     np.testing.assert_allclose(made[2], np.clip(0.9 + 0.5 * expected, -1, 1), rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "words"),
-    [
-        ("entries", (), "trained with other observations (1: a / 1) than this task has (0: )"),
-        ("washout", 2.0, "trained with washout=1.0, this task has 2.0; set it to match"),
-    ],
-)
-def test_a_task_that_differs_is_named_by_its_first_difference(name, value, words):
+def test_a_task_with_another_observation_is_told_of_it():
     needs = {"channels": (0,), "force_limit": 100.0, "control_interval": 0.01, "entries": (("a", 0.0, 1.0),)}
-    needs |= dict.fromkeys(SETTINGS, "same") | {"washout": 1.0}
-    told = _first_difference(SimpleNamespace(**needs), SimpleNamespace(**needs | {name: value}))
-    assert words in told
+    needs |= dict.fromkeys(SETTINGS, "same")
+    told = _first_difference(SimpleNamespace(**needs), SimpleNamespace(**needs | {"entries": ()}))
+    assert "trained with other observations (1: a / 1) than this task has (0: )" in told
 
 
 def test_an_environment_s_speeds_are_the_ends_and_the_middle_of_its_range():
@@ -327,18 +280,16 @@ def test_a_training_shows_its_speed_and_what_the_environment_takes_of_it(monkeyp
     ("ratio", "qualified", "words"),
     [
         (0.8, True, "σ -20.0 % of passive"),
-        (1.05, False, "σ +5.0 % of passive, F_m out of range: disqualified"),
         (None, False, "a run ended early, F_m out of range: disqualified"),
     ],
 )
 def test_a_training_says_where_its_models_are_and_how_good(
     ratio, qualified, words, said, monkeypatch, tmp_path
 ):
-    (tmp_path / "it.toml").write_text(TRAINING)
+    (tmp_path / "it.toml").write_text(TOML)
     names = ("path", "tensorboard", "model", "best")
     paths = SimpleNamespace(**{name: Path(name) for name in names})
-    facts = dict.fromkeys(command.REPORTED_FACTS) | {"steps": 64}
-    facts |= {"ratio": ratio, "qualified": qualified}
+    facts = {"steps": 64, "ratio": ratio, "qualified": qualified}
     monkeypatch.setattr("panto_agents.train.train", lambda *_, **__: paths)
     monkeypatch.setattr("panto_agents.model_file.read_model", lambda path: (SimpleNamespace(**facts), None))
     command.train(tmp_path / "it.toml", output=tmp_path / "out")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -21,6 +24,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.policies import find_policy
 
+from .test_apg import PASS
 from .test_rollout import stepped
 
 torch.set_num_threads(1)
@@ -30,35 +34,12 @@ SEEN = {"harmonics": 2, "history": 1, "memory": [0, 0.04, 0.1], "memory_spans": 
 
 
 def settings(**changes: Any) -> Training:
-    environment = {
-        "id": "Pantograph-v0",
-        "accuracy": "fast",
-        "washout": 0,
-        "settle": 2,
-        "distance": 150.0,
-        "catenary": "re330",
-        "pantograph": "dsa380",
-        "speed_kmh": [260, 300],
-        "line_condition": "as-built",
-        "observation": "deviations",
-        **SEEN,
-        **changes.pop("environment", {}),
-    }
-    table = {
-        "algorithm": "dagger",
-        "total_steps": 6_000,
-        "lanes": 6,
-        "checkpoint_steps": 10_000,
-        "washout": {},
-        "environment": environment,
-        "evaluation": {"interval_steps": 10_000, "speeds_kmh": [280]},
-        "hyperparameters": {
-            "teacher": TEACHER,
-            "learning_rate": [1e-2, 1e-3],
-            "net_arch": [8],
-            "recurrent_units": 4,
-        },
-    }
+    environment = PASS | {"catenary": "re330", "pantograph": "dsa380", "speed_kmh": [260, 300]} | SEEN
+    environment |= {"observation": "deviations"} | changes.pop("environment", {})
+    table = {"algorithm": "dagger", "total_steps": 6000, "lanes": 6, "checkpoint_steps": 9000, "washout": {}}
+    table |= {"environment": environment, "evaluation": {"interval_steps": 9000, "speeds_kmh": [280]}}
+    hyperparameters = {"teacher": TEACHER, "learning_rate": [1e-2, 1e-3], "net_arch": [8]}
+    table["hyperparameters"] = hyperparameters | {"recurrent_units": 4}
     return parse_training(table | changes, "the test")
 
 
@@ -90,6 +71,23 @@ def test_it_learns_to_do_most_of_what_its_teacher_does(tmp_path):
     assert facts.qualified
     assert facts.ratio < 0.8
     assert sum(each.size for each in (*actor.weights, *actor.biases)) < 500
+
+
+def test_round_by_round_it_comes_nearer_to_its_teacher():
+    hyperparameters = {"teacher": TEACHER, "learning_rate": 1e-2, "net_arch": [8], "updates": 40}
+    training, told, ends = settings(lanes=2, hyperparameters=hyperparameters | {"recurrent_units": 4}), [], []
+    lanes = TaughtLanes(training)
+    lanes.seed(0)
+    learner = training.hyperparameters.make_learner(lanes, 0)
+    learner.set_logger(SimpleNamespace(record=lambda *each: told.append(each), dump=ends.append))
+    steps = [len(each.wanted) for each in deepcopy(lanes).teach(None)]
+    for _ in range(3):
+        learner.learn(1, MagicMock())
+    errors = [value for name, value in told if name == "train/relative_error"]
+    assert len(errors) == 3
+    assert errors[2] < 0.85 * errors[0]
+    assert ends[0] == sum(steps)
+    assert learner.num_timesteps == ends[2] > 2.5 * ends[0]
 
 
 def test_a_sequence_goes_through_the_network_as_step_by_step():

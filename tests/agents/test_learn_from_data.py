@@ -62,18 +62,6 @@ def test_a_controller_is_cloned_from_a_few_episodes_at_one_speed(tmp_path):
 
 
 @pytest.mark.study
-def test_sigma_is_learnt_from_a_few_designs(tmp_path):
-    pytest.importorskip("sklearn")
-    settings = load_designs("dataset-designs").model_copy(update={"count": 320})
-    made = make_designs(settings, tmp_path, workers=1)
-    scores = load("learn_from_data").surrogate(made.folder / "designs.parquet")
-    r2, errors = ({name: each[k] for name, each in scores.items()} for k in (0, 1))
-    assert r2["mean"] < 0.1 < 0.5 < r2["linear"] < 1
-    assert r2["trees"] > 0.7
-    assert errors["trees"] < 0.7 * errors["mean"]
-
-
-@pytest.mark.study
 def test_from_the_whole_data_a_clone_does_what_its_teacher_does_and_sigma_is_known_to_some_percent(tmp_path):
     """Half an hour on two cores: the numbers of docs/datasets.md."""
     pytest.importorskip("torch")

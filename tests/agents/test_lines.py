@@ -17,12 +17,12 @@ from panto_agents import train
 from panto_agents.lanes import PolicyLanes, SideBySide, lane_seeds, make_lanes
 from panto_agents.model_file import read_model
 from panto_agents.policy import load
-from panto_agents.settings import Training, parse_training
+from panto_agents.settings import Training
 from panto_env import InputError, simulate
 from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
 
-from ..marks import some_at_once
+from .test_agents import settings
 
 ENVIRONMENT = {
     "id": "Pantograph-v0",
@@ -35,42 +35,28 @@ ENVIRONMENT = {
 }
 
 
-def training(**changes):
-    table = {
-        "algorithm": "ppo",
-        "seed": 1,
-        "total_steps": 512,
-        "lanes": 4,
-        "lines": 2,
-        "checkpoint_steps": 512,
-        "environment": ENVIRONMENT,
-        "evaluation": {"interval_steps": 512, "speeds_kmh": [300]},
-        "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 1, "net_arch": [8]},
-    }
-    return parse_training(table | changes, "test")
+def training(**changes: Any) -> Training:
+    evaluation = {"interval_steps": 256, "speeds_kmh": [300]}
+    usual = {"lanes": 4, "checkpoint_steps": 256, "environment": ENVIRONMENT, "evaluation": evaluation}
+    return settings("ppo", **usual | changes)
 
 
-@pytest.mark.parametrize(
-    "source", some_at_once(["family:high-speed", "section:fast-line"], ["family:high-speed"])
-)
-def test_a_training_gives_a_policy_for_lines_that_it_has_not_met(source, tmp_path):
-    own = training(environment=ENVIRONMENT | {"catenary": source})
-    folder = train.train(own, tmp_path / "run", progress=False)
+def test_a_training_gives_a_policy_for_lines_that_it_has_not_met(tmp_path):
+    folder = train.train(training(lines=2), tmp_path / "run", progress=False)
     facts, actor = read_model(folder.model)
-    assert facts.environment["catenary"] == source
+    assert facts.environment["catenary"] == "family:high-speed"
     assert facts.needs.line_values
     # Readings 5, place 2, speed, nominal force, line 7, action, with the deviation in the place of the force.
     assert actor.weights[0].shape == (8, 17)
     assert facts.ratio == pytest.approx(1.0, abs=0.5)
-    for line in (source, "re330"):
-        run = simulate(line, speed_kmh=300, policy=str(folder.model), seed=3, accuracy="fast", distance=900.0)
-        assert run.summary().std > 0
+    run = simulate("re330", speed_kmh=300, policy=str(folder.model), accuracy="fast", distance=900.0)
+    assert run.summary().std > 0
     with pytest.raises(InputError, match="Only a flexible catenary has the values"):
         simulate("periodic-stiffness", policy=str(folder.model))
 
 
 def test_lanes_of_a_training_meet_the_lines_of_its_seeds():
-    own = training(seed=3)
+    own = training(seed=3, lines=2)
     lanes = make_lanes(own)
     seeds = lane_seeds(own)
     lanes.seed(seeds[0])
@@ -101,31 +87,20 @@ def test_base_policies_get_the_context_of_their_lane_s_line(tmp_path):
     assert lines[1] != lines[2]
 
 
-@pytest.mark.parametrize("source", ["family:high-speed", "section:fast-line"])
-def test_a_speed_of_an_evaluation_must_be_one_for_the_lines(source):
+def test_a_speed_of_an_evaluation_must_be_one_for_the_lines():
     with pytest.raises(InputError, match="has no line for 500 km/h"):
-        training(
-            environment=ENVIRONMENT | {"catenary": source},
-            evaluation={"interval_steps": 512, "speeds_kmh": [500]},
-        )
+        training(evaluation={"interval_steps": 256, "speeds_kmh": [500]})
 
 
 VARIANTS = [{"pantograph": "dsa250"}, {"pantograph": "dsa380", "speed_kmh": 280}]
 
 
-def varied(**changes: Any) -> Training:
-    environment = {"id": "Pantograph-v0", "distance": 60.0, "settle": 0, "observation": "deviations"}
-    table = {
-        "algorithm": "ppo",
-        "total_steps": 256,
-        "lanes": 4,
-        "checkpoint_steps": 256,
-        "environment": environment | {"speed_kmh": 250} | changes.pop("environment", {}),
-        "evaluation": {"interval_steps": 256, "speeds_kmh": [250]},
-        "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 1, "net_arch": [8]},
-        "variants": VARIANTS,
-    }
-    return parse_training(table | changes, "the test")
+def varied(environment: Any = None, **changes: Any) -> Training:
+    usual = {"id": "Pantograph-v0", "distance": 60.0, "settle": 0, "observation": "deviations"}
+    environment = usual | {"speed_kmh": 250} | (environment or {})
+    evaluation = {"interval_steps": 256, "speeds_kmh": [250]}
+    usual = {"environment": environment, "evaluation": evaluation, "variants": VARIANTS, "seed": 0}
+    return training(**usual | changes)
 
 
 def test_each_variant_has_its_share_of_the_lanes():
@@ -137,17 +112,14 @@ def test_each_variant_has_its_share_of_the_lanes():
         lanes.seed(first)
     np.testing.assert_array_equal(together.reset(), np.concatenate([lanes.reset() for lanes in alone]))
     random, ended = np.random.default_rng(0), 0
-    for _ in range(120):
+    for _ in range(95):
         actions = random.uniform(-1, 1, (4, 1)).astype(np.float32)
         observations, rewards, dones, infos = together.step(actions)
         each = [lanes.step(actions[k : k + 2]) for k, lanes in zip((0, 2), alone, strict=True)]
-        for whole, parts in zip(
-            (observations, rewards, dones), zip(*(own[:3] for own in each), strict=True), strict=True
-        ):
-            np.testing.assert_array_equal(whole, np.concatenate(parts))
-        assert [info.get("figures") for info in infos] == [
-            info.get("figures") for own in each for info in own[3]
-        ]
+        for k, whole in enumerate((observations, rewards, dones)):
+            np.testing.assert_array_equal(whole, np.concatenate([own[k] for own in each]))
+        parts = [info for own in each for info in own[3]]
+        assert [info.get("figures") for info in infos] == [info.get("figures") for info in parts]
         ended += int(dones.sum())
     assert ended >= 4
     assert isinstance(together, SideBySide)
@@ -182,15 +154,15 @@ def test_each_variant_is_evaluated_at_its_own_speeds_unless_they_are_given():
         ({"start_from": "pd"}, "start_from and variants exclude each other"),
         ({"variants": [{"pantograph": "nobody"}]}, "nobody"),
         ({"variants": [{"panto": "dsa250"}]}, "panto"),
+        (
+            {
+                "environment": {"observation": "full"},
+                "variants": [{"pantograph": "dsa250"}, {"pantograph": "identified-2dof"}],
+            },
+            "must have the same observations and actions, not .* and .* entries",
+        ),
     ],
 )
 def test_variants_that_cannot_be_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
-        varied(**changes)
-
-
-def test_variants_with_other_observations_are_refused():
-    environment = {"observation": "full"}
-    variants = [{"pantograph": "dsa250"}, {"pantograph": "identified-2dof"}]
-    with pytest.raises(InputError, match="must have the same observations and actions"):
-        make_lanes(varied(environment=environment, variants=variants))
+        make_lanes(varied(**changes))

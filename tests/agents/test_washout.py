@@ -19,7 +19,6 @@ from panto_baselines.policies.repetitive import Washout, WashoutSettings
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
 
-from ..marks import some_at_once
 from .test_agents import LINE, settings
 
 INTERVAL = 0.01  # s
@@ -36,7 +35,7 @@ def constant(model, value, facts=None):
 @pytest.fixture(scope="module", params=[None, "fb+ff"])
 def washed(request, tmp_path_factory):
     """A finished training whose agent has a washout, alone or added to a policy; read only."""
-    training = settings("ppo", washout={"time_constant": 0.5}, residual_of=request.param)
+    training = settings("ppo", total_steps=128, washout={"time_constant": 0.5}, residual_of=request.param)
     return train.train(
         training, tmp_path_factory.mktemp("runs") / "washed", progress=False, command="panto train it"
     )
@@ -53,19 +52,18 @@ def test_it_is_the_filter_of_its_equation():
     np.testing.assert_allclose(ours, lfilter([1.0, -1.0], [1.0, -pole], forces, axis=0), atol=1e-10)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", some_at_once([1e9, 2500.0], [2500.0]))
-def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side(rate):
+def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side():
     """A pulse of 120 N for a quarter of the time, which limits of force and rate cut, and nothing between."""
+    rate, step = 2500.0, 2.5e-4
     washout = Washout(WashoutSettings(time_constant=0.5, rate=rate), INTERVAL, 100.0, (1,))
-    pulses = np.tile([120.0, 120.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1000)
+    pulses = np.tile([120.0, 120.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 150)
     left = np.array([washout(np.array([each])) for each in pulses])[:, 0]
     assert np.abs(left).max() <= 100.0
-    force, forces, step = 0.0, [], 1e-4
+    force, forces = 0.0, []
     for each in np.repeat(left, round(INTERVAL / step)):  # the actuator, in finer steps
         force += step * np.clip((each - force) / 0.015, -rate, rate)
         forces.append(force)
-    settled = np.array(forces[-round(40 / step) :])
+    settled = np.array(forces[-round(8 / step) :])
     assert settled.std() > 10
     assert abs(settled.mean()) < 0.03 * settled.std()
 
@@ -108,30 +106,20 @@ def test_lanes_do_as_the_policy_does(washed):
 
 
 def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, tmp_path):
-    target = tmp_path / "mine.safetensors"
-    result = CliRunner().invoke(make_app(), ["export", str(washed.best), str(target)])
+    def export(source, target):
+        return CliRunner().invoke(make_app(), ["export", str(source), str(tmp_path / target)])
+
+    result = export(washed.best, "mine.safetensors")
     assert result.exit_code == 0, result.output
-    assert all(name.startswith("actor/") for name in load_file(target))
-    facts, actor = read_model(target)
-    before, same = read_model(washed.best)
-    assert facts == before
-    assert facts.command == "panto train it"
-    for ours, theirs in zip((*actor.weights, *actor.biases), (*same.weights, *same.biases), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-    given = settings("ppo").arguments
-    forces = [simulate(**given, policy=str(path)).contact_force for path in (target, washed.best)]
-    np.testing.assert_array_equal(*forces)
-
-
-def test_a_damaged_model_is_not_exported(washed, tmp_path):
-    damaged = tmp_path / "damaged.safetensors"
-    damaged.write_bytes(washed.best.read_bytes()[:-200])
-    result = CliRunner().invoke(make_app(), ["export", str(damaged), str(tmp_path / "out.safetensors")])
-    assert isinstance(result.exception, InputError)
-    assert "not a whole model file" in str(result.exception)
+    held = load_file(tmp_path / "mine.safetensors")
+    assert all(name.startswith("actor/") for name in held)
+    assert read_model(tmp_path / "mine.safetensors")[0] == read_model(washed.best)[0]
+    assert read_model(washed.best)[0].command == "panto train it"
+    whole = load_file(washed.best)
+    assert held.keys() == {name for name in whole if name.startswith("actor/")}
+    for name, array in held.items():
+        np.testing.assert_array_equal(array, whole[name])
+    (tmp_path / "damaged.safetensors").write_bytes(washed.best.read_bytes()[:-200])
+    with pytest.raises(InputError, match="not a whole model file"):
+        raise export(tmp_path / "damaged.safetensors", "out.safetensors").exception
     assert not (tmp_path / "out.safetensors").exists()
-
-
-def test_its_time_constant_is_positive():
-    with pytest.raises(InputError, match="washout"):
-        settings("ppo", washout={"time_constant": 0.0})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import signal
 import subprocess
 import sys
@@ -15,25 +14,16 @@ pytest.importorskip("stable_baselines3")
 
 from panto_agents import train
 from panto_agents.model_file import read_model
-from panto_agents.settings import Training, parse_training
+from panto_agents.settings import Training
 from panto_agents.trainings import RunFolder, plan, train_all
 from panto_env import InputError
 from panto_env.base.files import alone_in
 
+from ..agents.test_agents import rows, weights
+from ..agents.test_agents import settings as small
 from ..deadly import deadly
 from ..plugin import on_path
 
-TABLE = {
-    "algorithm": "ppo",
-    "seed": 1,
-    "total_steps": 512,
-    "lanes": 2,
-    "checkpoint_steps": 128,
-    "environment": {"id": "PantographStiffness-v0", "distance": 80.0},
-    "evaluation": {"interval_steps": 128},
-    "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
-    "cloning": {"steps": 256, "batch_size": 64, "epochs": 1},
-}
 CONFIG = """
 algorithm = "ppo"
 total_steps = 768
@@ -54,12 +44,12 @@ net_arch = [8]
 
 
 def settings(**changes) -> Training:
-    return parse_training(TABLE | changes, "test")
+    cloning = {"steps": 256, "batch_size": 64, "epochs": 1}
+    return small("ppo", **{"total_steps": 512, "cloning": cloning} | changes)
 
 
 def steps_evaluated(folder: Path) -> list[int]:
-    with (folder / "evaluations.csv").open(newline="") as file:
-        return [int(row["steps"]) for row in csv.DictReader(file)]
+    return [int(row["steps"]) for row in rows(RunFolder(folder))]
 
 
 def panto(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -68,9 +58,7 @@ def panto(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def same_weights(one: Path, other: Path) -> bool:
-    networks = [read_model(path)[1] for path in (one, other)]
-    pairs = zip(*([*each.weights, *each.biases] for each in networks), strict=True)
-    return all(np.array_equal(left, right) for left, right in pairs)
+    return all(map(np.array_equal, weights(one), weights(other)))
 
 
 @pytest.mark.slow
@@ -125,25 +113,26 @@ def test_a_run_that_another_process_still_trains_is_left_alone(tmp_path):
     with alone_in(folder.path, "trains into"), pytest.raises(InputError, match="Another process trains into"):
         train.train(settings(), folder.path, resume=True, progress=False)
     assert (folder.model.read_bytes(), folder.settings.read_text()) == before
-    train.train(settings(), folder.path, resume=True, progress=False)
-    assert steps_evaluated(folder.path) == [128, 256, 384, 512]
+    train.train(settings(total_steps=256), folder.path, resume=True, progress=False)
+    assert steps_evaluated(folder.path) == [128, 256]
 
 
 class TestTrainings:
     @pytest.mark.slow
     def test_what_one_killed_training_leaves_goes_on_and_the_others_begin(self, tmp_path):
-        planned = {tmp_path / "one": settings(), tmp_path / "other": settings(seed=2)}
-        train.train(settings(), tmp_path / "one", progress=False)
+        one, other = (settings(seed=seed, total_steps=128) for seed in (1, 2))
+        planned = {tmp_path / "one": one, tmp_path / "other": other}
+        train.train(one, tmp_path / "one", progress=False)
         before = (tmp_path / "one" / "model.safetensors").read_bytes()
         with pytest.raises(InputError, match="exists already"):
             train_all(planned, workers=1)
         assert not (tmp_path / "other").exists()
         outcomes = train_all(planned, resume=True, workers=1)
         assert (tmp_path / "one" / "model.safetensors").read_bytes() == before
-        assert [outcome.seed for outcome in outcomes] == [1, 2]
-        alone = train.train(settings(seed=2), tmp_path / "alone", progress=False)
+        assert [outcome["seed"] for outcome in outcomes] == [1, 2]
+        alone = train.train(other, tmp_path / "alone", progress=False)
         assert same_weights(alone.model, tmp_path / "other" / "model.safetensors")
-        assert outcomes[1].ratio == read_model(alone.best)[0].ratio
+        assert outcomes[1]["ratio"] == read_model(alone.best)[0].ratio
 
     def test_configurations_times_seeds(self, tmp_path):
         for name in ("one", "other"):

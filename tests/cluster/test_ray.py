@@ -3,7 +3,6 @@
 Workers are killed by a policy, ``deadly``.
 """
 
-import csv
 import importlib
 import os
 import sys
@@ -20,14 +19,14 @@ import ray
 from ray.cluster_utils import Cluster
 
 from panto_agents.model_file import read_model
-from panto_agents.settings import Training, parse_training
-from panto_agents.trainings import train_all
+from panto_agents.trainings import RunFolder, train_all
 from panto_baselines.benchmark.run import run
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line
 from panto_env import InputError
 from panto_env import cluster as tasks
 from panto_env.cluster import spread
 
+from ..agents.test_agents import rows, settings
 from ..deadly import deadly
 from ..plugin import on_path
 
@@ -164,25 +163,11 @@ def test_a_machine_that_dies_loses_no_job(tmp_path):
     assert results[2:] == ["0", "1", "2", "3"]
 
 
-def training(seed: int, **changes) -> Training:
-    table = {
-        "algorithm": "ppo",
-        "seed": seed,
-        "total_steps": 768,
-        "lanes": 2,
-        "checkpoint_steps": 128,
-        "environment": {"id": "PantographStiffness-v0", "distance": 80.0},
-        "evaluation": {"interval_steps": 128},
-        "hyperparameters": {"n_steps": 64, "batch_size": 64, "n_epochs": 2, "net_arch": [8]},
-    }
-    return parse_training(table | changes, "test")
-
-
 def test_a_training_whose_worker_is_killed_goes_on_from_its_checkpoint(two_nodes, site, tmp_path):
     folder = tmp_path / "run"
     deadly(site, wanted=folder / "checkpoints" / "step-000000256.safetensors")
-    train_all({folder: training(1, residual_of="deadly"), tmp_path / "other": training(2)}, ray=two_nodes)
+    killed, other = settings("ppo", total_steps=768, residual_of="deadly"), settings("ppo", seed=2)
+    train_all({folder: killed, tmp_path / "other": other}, ray=two_nodes)
     assert (site / "deadly.dead").exists()
     assert read_model(folder / "model.safetensors")[0].steps == 768
-    with (folder / "evaluations.csv").open(newline="") as file:
-        assert [row["steps"] for row in csv.DictReader(file)] == [str(128 * k) for k in range(7)]
+    assert [row["steps"] for row in rows(RunFolder(folder))] == [str(128 * k) for k in range(7)]
