@@ -1,8 +1,9 @@
-"""``panto simulate``: one pass along a line."""
+"""``panto simulate``, ``film`` and ``app``: one pass along a line, as figures, as a film, in the browser."""
 
 from __future__ import annotations
 
 import math
+import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -24,6 +25,7 @@ from ..analysis.options import (
 )
 from ..analysis.plots import plot_run, save
 from ..base.errors import InputError
+from ..base.extras import require
 from ..base.table import Table as TextTable
 from ..metrics.by_span import SPEED_HEADINGS, by_speed
 from ..metrics.figures import LABELS, SpanChoice, in_words
@@ -253,3 +255,26 @@ def film(
         highlight=False,
         soft_wrap=True,
     )
+
+
+def app(
+    port: Annotated[
+        int, Option(min=1024, max=65535, help="Port of this machine at which it is served.")
+    ] = 5006,
+    no_browser: Annotated[
+        bool, Option("--no-browser", help="Only serve the page, and open no browser.")
+    ] = False,
+) -> None:
+    """Serve a page on which line, pantograph, speed and policy are chosen and their run is seen at once.
+
+    Only browsers of this machine reach it, and it needs no network. Ctrl+C ends it.
+    """
+    require("The page", "app", "bokeh")
+    from ..app.page import serve
+
+    def ready(address: str) -> None:
+        console.print(f"The page is {address}; Ctrl+C ends it.", soft_wrap=True)
+        if not no_browser:
+            webbrowser.open(address)
+
+    serve(port, ready)

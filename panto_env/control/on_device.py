@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
-from ..backend.cuda import Columns, map_arrays
+from ..backend.cuda import TILE, Columns, map_arrays
 from ..base.arrays import Array
 from ..plant.state import Row
 from .episode import Flags, Results, counts
@@ -24,9 +24,9 @@ from .task import Task
 
 
 class Begun(NamedTuple):
-    """What is told of each lane's episode."""
+    """What is told of each lane's episode: the speed of its train (m/s), (lanes,)."""
 
-    speed: Array  # of the train (m/s), (lanes,)
+    speed: Array
 
 
 RUN, SENSORS, EPISODE, RUNNING, RESULTS, BEGUN = 4, 5, 7, 8, 9, 10
@@ -117,18 +117,13 @@ class TensorLanes:
 
     def _read(self, lanes: torch.Tensor, *numbers: int) -> None:
         """Copy some tuples of lanes, (n,), to the first ones of the task on the processor."""
-        arrays = arrays_of(self.task)
         for number in numbers:
-            self._columns.read(number, lanes, arrays[number])
+            self._columns.read(number, lanes, arrays_of(self.task)[number])
 
 
 def _tile(lanes: int, device: torch.device) -> int:
     """Lanes in a tile: on the processor all lie in one."""
-    if device.type != "cuda":
-        return lanes
-    from ..backend.cuda import TILE
-
-    return TILE
+    return TILE if device.type == "cuda" else lanes
 
 
 def _bound(columns: Columns) -> Callable[[], Any]:

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force from its static value (N), ten times any real one: it has diverged."""
 
+SERIES = {"head": Row.HEAD_HEIGHT, "frame": Row.FRAME_HEIGHT, "wire": Row.WIRE_HEIGHT} | {
+    row.name.lower(): row
+    for row in (Row.CONTACT_FORCE, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.FRAME_FORCE, Row.HEAD_FORCE)
+}
+"""Rows of samples that a record has under these names."""
+
 
 def diverged(task: Any, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
     """Whether rows, (n,), have diverged, as their ending or an impossible value shows.
@@ -100,14 +106,7 @@ def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int,
     return Trajectory(
         time=(np.arange(steps) + 0.5)[on_line] * plant.time_step,
         position=position[on_line],
-        contact_force=rows[:, Row.CONTACT_FORCE].copy(),
-        head=rows[:, Row.HEAD_HEIGHT].copy(),
-        frame=rows[:, Row.FRAME_HEIGHT].copy(),
-        wire=rows[:, Row.WIRE_HEIGHT].copy(),
-        head_velocity=rows[:, Row.HEAD_VELOCITY].copy(),
-        frame_velocity=rows[:, Row.FRAME_VELOCITY].copy(),
-        frame_force=rows[:, Row.FRAME_FORCE].copy(),
-        head_force=rows[:, Row.HEAD_FORCE].copy(),
+        **{name: rows[:, row].copy() for name, row in SERIES.items()},
         uplift=uplift if last else uplift.copy(),
         support_position=plant.model.supports,
         dropper_force=tension if last else tension.copy(),

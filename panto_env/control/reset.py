@@ -36,7 +36,7 @@ class Starts(NamedTuple):
     pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
     drift: Array | None  # (lanes, drifting): of the speeds; None where these are constant
-    faults: Array | None = None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
+    faults: Array | None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
 
 
 def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
@@ -100,8 +100,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     run_in = np.minimum(run_in, end // length.control_steps - 1).astype(np.int64)
     counted_from = np.zeros((len(distances), len(lanes)))
     for agent, distance in enumerate(distances):
-        uncounted = distance - distances[0] + length.settling
-        if uncounted:
+        if uncounted := distance - distances[0] + length.settling:
             counted_from[agent] = length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
     at_start = [_at_start(task, agent, lanes) for agent in range(task.agents)]
     _begin(task, lanes, at_start, end, counted_from)
