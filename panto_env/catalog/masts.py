@@ -196,12 +196,10 @@ def _with_sequence(
     header = re.search(r"^[ \t]*\[", text, re.MULTILINE)
     place = len(text) if header is None else header.start()
     plain = re.sub(r"^[ \t]*spans[ \t]*=.*\n?", "", text[:place], flags=re.MULTILINE)
-    spans = "".join(f"    {_inline(item)},\n" for item in items)
+    spans, masts = ("".join(f"    {_inline(each)},\n" for each in rows) for rows in (items, named))
     given = f"sequence = {{ value = [\n{spans}], source = {json.dumps(source)} }}\n"
-    if end:
-        given += f"end_support = {_inline(end)}\n"
-    if named:
-        given += f"masts = [\n{''.join(f'    {_inline(each)},{chr(10)}' for each in named)}]\n"
+    given += f"end_support = {_inline(end)}\n" if end else ""
+    given += f"masts = [\n{masts}]\n" if named else ""
     comment = f"# Spans between the masts of {json.dumps(source)}, in the order of travel."
     made = f"{plain.rstrip()}\n\n{comment}\n{given}\n{text[place:]}"
     expected = {key: value for key, value in table.items() if key != "spans"}

@@ -384,7 +384,12 @@ class LineSection(DrawnLines):
         spans = [{"span_length": length} | own for length, own in zip(lengths.tolist(), at, strict=False)]
         if self.kinds is not None:
             spans = [span | {"droppers": droppers[of]} for span, of in zip(spans, kind.tolist(), strict=True)]
-        overlaps = self._overlaps(random, lengths, heights, bridges)
+        overlaps: list[dict[str, Any]] = []
+        if self.overlaps is not None:  # none of them under a bridge or on a ramp to it, nor beside
+            level = (np.abs(heights[1:]) < FLAT) & (np.abs(heights[:-1]) < FLAT)
+            for bridge in bridges:
+                level[max(bridge.span - 1, 0) : bridge.span + 2] = False
+            overlaps = self.overlaps.draw(random, lengths, level)
         if self.plan is not None:
             table |= self.plan.draw(random, curvature)
         return table | {
@@ -396,17 +401,6 @@ class LineSection(DrawnLines):
             "sequence": spans,
             "end_support": at[-1],
         }
-
-    def _overlaps(
-        self, random: np.random.Generator, lengths: Array, heights: Array, bridges: list[Bridge]
-    ) -> list[dict[str, Any]]:
-        """Overlaps of a line, none of them under a bridge or on a ramp to it, nor beside."""
-        if self.overlaps is None:
-            return []
-        level = (np.abs(heights[1:]) < FLAT) & (np.abs(heights[:-1]) < FLAT)
-        for bridge in bridges:
-            level[max(bridge.span - 1, 0) : bridge.span + 2] = False
-        return self.overlaps.draw(random, lengths, level)
 
     def _droppers(self, random: np.random.Generator, base: FlexibleCatenaryData) -> dict[str, Any]:
         kept = base.droppers.model_dump(exclude={"positions", "sag"}, exclude_none=True)

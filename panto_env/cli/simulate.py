@@ -111,7 +111,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
             | ({"by_speed": [each._asdict() for each in by_speed(own, chosen)]} if profile else {})
             for own in train
         ]
-        others = [_own_facts(own) | result for own, result in zip(train[1:], results[1:], strict=True)]
+        others = [_facts(own, OWN_FACTS) | found for own, found in zip(train[1:], results[1:], strict=True)]
         behind = {"followers": others} if others else {}
         print_json(_facts(trajectory) | {"spans": covered} | results[0] | behind)
         return
@@ -161,25 +161,13 @@ def _shown(
         yield lambda share: progress.update(bar, completed=share), None
 
 
-def _own_facts(run: Trajectory) -> dict[str, Any]:
-    """What a pantograph behind the first has of its own."""
-    return {name: getattr(run, name) for name in ("pantograph", "policy", "nominal_force", "target_mean")}
+FACTS = "catenary pantograph speed_kmh policy seed terminated ending nominal_force target_mean settings"
+OWN_FACTS = "pantograph policy nominal_force target_mean"
+"""What JSON has of a run, and of a pantograph behind the first."""
 
 
-def _facts(run: Trajectory) -> dict[str, Any]:
-    names = (
-        "catenary",
-        "pantograph",
-        "speed_kmh",
-        "policy",
-        "seed",
-        "terminated",
-        "ending",
-        "nominal_force",
-        "target_mean",
-        "settings",
-    )
-    return {name: getattr(run, name) for name in names}
+def _facts(run: Trajectory, names: str = FACTS) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in names.split()}
 
 
 MOST = 4

@@ -28,7 +28,7 @@ from ..base.files import PAGES, make_folder
 from ..base.table import TABLES
 from ..catalog import load_catenary
 from ..cluster import RayAddress
-from ..control.identity import plain
+from ..control.record import plain
 from ..control.settings import run_settings
 from ..metrics.figures import LABELS, NUMBER
 from ..studies.design import check as designs_of

@@ -66,6 +66,17 @@ class TensorLanes:
         if self.task.odometers.drawn:
             noises.append((self.task.odometers.noise, self._episode.odometer))
         self._noises = [(torch.tensor(noise.rms, device=device), arrays) for noise, arrays in noises]
+        self._arguments = settings, lanes, starts, device
+
+    def __reduce__(self) -> Any:
+        """A copy has tensors of its own, and a kernel that is bound to these."""
+        return TensorLanes, self._arguments, (self.task, self._bank.blocks, self._columns.blocks)
+
+    def __setstate__(self, state: Any) -> None:
+        self.task, *contents = state
+        for columns, blocks in zip((self._bank, self._columns), contents, strict=True):
+            for block, numbers in blocks.items():
+                columns.blocks[block].copy_(numbers)
 
     def draw_starts(self, random: Callable[[int], np.random.Generator]) -> None:
         """Draw all starts, each from its own generator, and run them in."""

@@ -30,8 +30,7 @@ from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading
 from .entries import CENTRES, READING_ENTRIES, Entry, present
-from .identity import NOT_OF_A_RUN
-from .observation import Layout
+from .observation import NOT_OF_A_RUN, Layout
 from .settings import RunSettings, as_designed
 
 

@@ -19,7 +19,6 @@ from .episode import Results
 from .memory import forget
 from .reward import limits
 from .state import Result, TaskRow
-from .step import no_figures
 
 if TYPE_CHECKING:
     from .task import Task
@@ -130,7 +129,8 @@ def _at_start(task: Task, agent: int, lanes: Any) -> Array:
     """Rows of a controlled collector in lanes, (n, rows of ``TaskRow``), wherever their episodes begin."""
     collector = task.episode.controlled[agent]
     start, pantograph = task.plant.run.table[collector, lanes], task.settings.riding[collector]
-    values = np.tile(no_figures(task.episode.table.shape[1]), (len(lanes), 1))
+    values = np.zeros((len(lanes), task.episode.table.shape[1]))
+    values[:, TaskRow.MAX], values[:, TaskRow.MIN] = -np.inf, np.inf  # no figures yet
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
     if not nominal[low] > 0:  # the reward is relative to it

@@ -188,8 +188,7 @@ class RunSettings(Numerics):
         'such as "family:high-speed" or a section such as "section:main-line", one is drawn per episode',
     )
     pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
-        "en50318-2002",
-        description="pantograph: a name of the catalogue or a TOML file",
+        "en50318-2002", description="pantograph: a name of the catalogue or a TOML file"
     )
     pantographs: Annotated[tuple[PantographData, ...], BeforeValidator(_pantographs)] = Field(
         (),
@@ -205,8 +204,7 @@ class RunSettings(Numerics):
         "the others are passive",
     )
     speed_kmh: Annotated[tuple[_Speed, _Speed], BeforeValidator(speed_range)] = Field(
-        300.0,
-        description="train speed (km/h): a number, or a range of two to draw from",
+        300.0, description="train speed (km/h): a number, or a range of two to draw from"
     )
     speed_drift: SpeedDrift = Field(
         0.0,

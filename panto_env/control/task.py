@@ -12,6 +12,7 @@ from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError, shown
 from ..metrics.figures import Figures, SpanChoice, settled_spans
+from ..metrics.low_pass import low_pass_sections
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
@@ -36,11 +37,11 @@ from .passive_run import (
     trimmed,
     warn_of_spring,
 )
-from .record import diverged, divergence, ending, trajectory
+from .record import divergence, ending, figures_of, trajectory
 from .reset import LaneGenerators, reset
 from .settings import RunSettings
 from .state import RESULT_ROWS, Flag, TaskRow
-from .step import control_steps, figures_so_far, observe_start, running_figures
+from .step import RunningFigures, control_steps, observe_start
 
 COASTED = 100
 """Control steps without a policy per call."""
@@ -106,7 +107,9 @@ class Task:
         self.episode: Any = new_episode(settings, plant, self.layout, length.control_steps, arrays)
         self.sensors: Any = sensors
         self.samples: Any = plant.samples(rows, tension=record_droppers)
-        self.running: Any = running_figures(lanes * self.agents, len(plant.model.supports), plant.time_step)
+        sections, settled = low_pass_sections(plant.time_step)
+        peak = np.zeros((lanes * self.agents, len(plant.model.supports)))
+        self.running: Any = RunningFigures(sections.copy(), settled.flatten(), peak)
         self.noise = None if rms is None else Noise(rms, lanes)
         self._most_threads = threads
         self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
@@ -320,28 +323,7 @@ class Task:
             raise InputError(self.divergence(row // self.agents))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
-    def figures_of(self, rows: Any) -> tuple[dict[str, Array], Flags]:
-        """Figures of several rows, (n,), by name, and which of them have none, because they diverged."""
-        lanes, agents = np.divmod(np.arange(self.lanes * self.agents)[rows], self.agents)
-        collectors = np.array(self.episode.controlled)[agents]
-        run, supports = self.plant.run.table[collectors, lanes], self.plant.model.supports
-        with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
-            figures = figures_so_far(
-                self.episode.table[rows],
-                self.running.peak[rows],
-                run,
-                supports,
-                self.plant.time_step,
-                partial(self.plant.ahead, lanes),
-                np.array([own.distance for own in self.plant.train.collectors])[collectors],
-            )
-        distance = figures["distance"]
-        deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
-        shares = np.array([own.share_at_head for own in self.settings.riding])[collectors]
-        deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
-        return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
-
-    divergence, ending, trajectory = divergence, ending, trajectory
+    divergence, ending, figures_of, trajectory = divergence, ending, figures_of, trajectory
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:

@@ -213,13 +213,10 @@ def described(text: str) -> str:
 def _observation_table(kind: str) -> str:
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
     settings = RunSettings.model_construct(observation=kind, actuator=actuator, pantograph=pantograph)
-    rows = [
-        f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
-        for k, each in enumerate(Layout.of(settings).entries)
-    ]
-    return "\n".join(
-        ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
-    )
+    rows = ["| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|"]
+    for k, each in enumerate(Layout.of(settings).entries):
+        rows.append(f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |")
+    return "\n".join(rows)
 
 
 def _id_table(name: str) -> str:

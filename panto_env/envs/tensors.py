@@ -22,23 +22,6 @@ from .settings import TensorSettings
 from .vector import SharedByLanes
 
 
-class CopiedLanes(TensorLanes):
-    """Lanes whose copies have tensors of their own, and a kernel that is bound to these."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self._arguments = arguments
-
-    def __reduce__(self) -> Any:
-        return CopiedLanes, self._arguments, (self.task, self._bank.blocks, self._columns.blocks)
-
-    def __setstate__(self, state: Any) -> None:
-        self.task, *contents = state
-        for columns, blocks in zip((self._bank, self._columns), contents, strict=True):
-            for block, numbers in blocks.items():
-                columns.blocks[block].copy_(numbers)
-
-
 class PantographTensorEnv(SharedByLanes):
     """Many pantographs stepped together on a GPU; actions, observations, rewards and flags are tensors there.
 
@@ -67,7 +50,7 @@ class PantographTensorEnv(SharedByLanes):
                 "name one line as catenary, or leave out device."
             )
         try:
-            self._lanes = CopiedLanes(settings, settings.trains, settings.used_starts, self.device)
+            self._lanes = TensorLanes(settings, settings.trains, settings.used_starts, self.device)
         except torch.OutOfMemoryError as error:
             raise InputError(
                 f"{settings.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."

@@ -21,7 +21,7 @@ from panto_env.plant.line_condition import LineCondition
 from panto_env.plant.pantograph.schema import PantographData
 from panto_env.plant.sensors import SENSORS, sensor_settings
 
-ABSURD = (-1e9, 1e9, math.nan, math.inf, -math.inf, "12", True)
+ABSURD = (-1e9, 1e9, math.nan, "12", True)
 LINES = {load_catenary(name).kind: load_catenary(name) for name in reversed(available("catenary"))}
 """A line of each kind, to change one value of."""
 ALONE = {  # of settings that are not files: how they are read
@@ -30,10 +30,7 @@ ALONE = {  # of settings that are not files: how they are read
     "sensors": (SENSORS.values(), sensor_settings),
     "estimator": ((EstimatorSettings,), lambda value: parse(EstimatorSettings, value, "settings")),
     **{
-        f"force model {name}": (
-            (kind,),
-            lambda value, name=name: as_force_model({"kind": name} | value),
-        )
+        f"force model {name}": ((kind,), lambda value, name=name: as_force_model({"kind": name} | value))
         for name, kind in FORCE_MODELS.items()
     },
 }

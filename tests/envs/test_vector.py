@@ -1,7 +1,6 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.wrappers.vector import ClipAction, NormalizeObservation, RecordEpisodeStatistics
 
 from panto_env import InputError
 from panto_env.envs import BARE
@@ -21,28 +20,14 @@ def make(name=None, lanes=3, **settings):
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        ("Pantograph-v0", LIVELY | {"distance": 40.0, "settle": 0.0}),
-        ("PantographStiffness-v0", LIVELY | {"speed_kmh": (200, 330), "distance": 15.0}),
-        ("PantographStiffness-v0", LIVELY | {"pantograph_scatter": 0.1, "distance": 15.0}),
-        ("PantographStiffness-v0", LIVELY | {"run_in": 2.0, "distance": 15.0}),
+        ("Pantograph-v0", LIVELY | {"distance": 20.0, "settle": 0.0}),
+        ("PantographStiffness-v0", LIVELY | {"pantograph_scatter": 0.1, "run_in": 2.0, "distance": 15.0}),
     ],
 )
 def test_many_lanes_are_single_environments_with_the_seeds_that_follow(name, settings):
     """Bit for bit, over the end of an episode and the autoreset, on one thread and on several."""
-    ran = check_lanes_are_singles(f"panto_env:{name}", settings, steps=120, lanes=20)
-    assert ran.ends >= 20
-
-
-def test_gymnasium_s_vector_wrappers_work():
-    env = ClipAction(NormalizeObservation(RecordEpisodeStatistics(make(distance=20.0, lanes=4))))
-    env.reset(seed=0)
-    lengths = []
-    for _ in range(60):
-        observation, _, _, _, infos = env.step(np.full((4, 1), 3.0, np.float32))
-        if "episode" in infos:
-            lengths += infos["episode"]["l"][infos["_episode"]].tolist()
-    assert observation.shape == (4, 9)
-    assert set(lengths) == {24}
+    ran = check_lanes_are_singles(f"panto_env:{name}", settings, steps=60, lanes=8)
+    assert ran.ends >= 8
 
 
 @pytest.mark.parametrize(
@@ -80,7 +65,7 @@ def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
         "speed_kmh": (200, 320),
         "distance": 200.0,
     }
-    ran = check_lanes_are_singles("panto_env:Pantograph-v0", scattered, steps=60, lanes=5)
+    ran = check_lanes_are_singles("panto_env:Pantograph-v0", scattered, steps=20, lanes=5)
     ran.vector.reset(seed=3)
     plant = ran.vector.unwrapped.task.plant
     assert len({own.tobytes() for own in plant.pantographs.table[0]}) == 5
