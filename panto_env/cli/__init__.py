@@ -73,12 +73,19 @@ def _refuse(sentence: str) -> int:
     return 2
 
 
-def _show_warning(message: Any, category: type[Warning], filename: str, lineno: int, *_: Any) -> None:
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: Any = None,
+    line: Any = None,
+) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
     if issubclass(category, AccuracyWarning | PlugInWarning | UnusualWarning):
         say(f"warning: {message}")
     elif sys.stderr is not None:
-        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
 
 
 def make_app() -> typer.Typer:
@@ -98,7 +105,13 @@ def make_app() -> typer.Typer:
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
-    commands = [simulate.simulate, simulate.film, simulate.app, sweep.sweep, sweep.permissible_speed]
+    commands: list[Any] = [
+        simulate.simulate,
+        simulate.film,
+        simulate.app,
+        sweep.sweep,
+        sweep.permissible_speed,
+    ]
     commands += [sweep.design, lines.family, lines.line, studies.validate, studies.speed, studies.reproduce]
     commands += [studies.rig, identify.identify, estimate.estimate, fit.fit, fit.drift, diagnose.diagnose]
     for command in (*commands, records.record, records.compare):

@@ -138,7 +138,7 @@ class Results(NamedTuple):
 
     def copy(self) -> Results:
         """A copy of the arrays."""
-        return Results(*(each.copy() for each in self))
+        return Results(self.observation.copy(), self.values.copy(), self.flags.copy())
 
 
 def counts(steps: Any, table: Any) -> Any:

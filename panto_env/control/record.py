@@ -223,7 +223,7 @@ def settings_of(run: Trajectory) -> dict[str, Any]:
     design, known = run.designed, run.settings.get("known_pantograph")
     values = {"catenary": design.line, "pantograph": design.pantograph, "pantographs": design.pantographs}
     values["known_pantograph"] = PantographData.model_validate(known) if known else None
-    given = (run.settings | values).items()
+    given = {**run.settings, **values}.items()
     return {
         name: value for name, value in given if name in RunSettings.model_fields and value not in (None, ())
     }

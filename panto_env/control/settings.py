@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from ..base.arrays import from_kmh, to_kmh
@@ -180,15 +180,16 @@ def speed_range(speed_kmh: Any, name: str = "speed_kmh") -> tuple[float, float]:
 class RunSettings(Numerics):
     """All settings of a run. ``time_step``, ``spacing``, ``window``, ``precision``: see ``Numerics``."""
 
-    model_config = ConfigDict(validate_default=True)
-
     catenary: Annotated[Lines, BeforeValidator(load_lines)] = Field(
         "en50318-2002",
+        validate_default=True,
         description="line: a name of the catalogue or a TOML file; from a list of lines, a family of them "
         'such as "family:high-speed" or a section such as "section:main-line", one is drawn per episode',
     )
     pantograph: Annotated[PantographData, BeforeValidator(load_pantograph)] = Field(
-        "en50318-2002", description="pantograph: a name of the catalogue or a TOML file"
+        "en50318-2002",
+        validate_default=True,
+        description="pantograph: a name of the catalogue or a TOML file",
     )
     pantographs: Annotated[tuple[PantographData, ...], BeforeValidator(_pantographs)] = Field(
         (),
@@ -200,11 +201,14 @@ class RunSettings(Numerics):
     )
     controlled: Annotated[tuple[int, ...], BeforeValidator(controlled_numbers)] = Field(
         1,
+        validate_default=True,
         description="numbers of the pantographs that have an actuator and are controlled, 1 for the first; "
         "the others are passive",
     )
     speed_kmh: Annotated[tuple[_Speed, _Speed], BeforeValidator(speed_range)] = Field(
-        300.0, description="train speed (km/h): a number, or a range of two to draw from"
+        300.0,
+        validate_default=True,
+        description="train speed (km/h): a number, or a range of two to draw from",
     )
     speed_drift: SpeedDrift = Field(
         0.0,
@@ -220,12 +224,14 @@ class RunSettings(Numerics):
     )
     actuator: Annotated[ActuatorSettings, BeforeValidator(actuator_settings)] = Field(
         "ideal",
+        validate_default=True,
         description="actuator: "
         f"{', '.join(map(json.dumps, ACTUATOR_PRESETS))}, one with values such as "
         '"realistic:delay=0.01", or a table',
     )
     sensors: Annotated[SensorSettings, BeforeValidator(sensor_settings)] = Field(
         "ideal",
+        validate_default=True,
         description='sensors: "ideal", "realistic", "blind", one with values such as "ideal:force_noise=5", '
         "or a table",
     )
@@ -237,6 +243,7 @@ class RunSettings(Numerics):
     )
     line_condition: Annotated[tuple[LineCondition, ...], BeforeValidator(_one_or_more_conditions)] = Field(
         "new",
+        validate_default=True,
         description='condition of the line: "new", "smooth", "as-built", "fair", "worn", one with values, '
         'defects and weather such as "worn:broken_droppers=[(4, 5)],wind=15,ice=0.3", or a table; from a '
         "list one is drawn per run",
@@ -304,6 +311,7 @@ class RunSettings(Numerics):
     )
     estimator: Annotated[EstimatorSettings, BeforeValidator(_estimator)] = Field(
         "usual",
+        validate_default=True,
         description='estimator of the observation "estimated": "usual", "displacements", one with values '
         'such as "usual:suspension_drift=0", or a table',
     )
@@ -314,11 +322,13 @@ class RunSettings(Numerics):
     )
     reward: Annotated[Reward, _parsed(Reward, "reward", REWARDS)] = Field(
         None,
+        validate_default=True,
         description='weights of the reward\'s terms: "paper1", "benchmark", "agent", one with values such as '
         '"agent:rate=0.01", or a table; by default paper 1\'s',
     )
     cost: Annotated[CostWeights, _parsed(CostWeights, "cost")] = Field(
         None,
+        validate_default=True,
         description='weights of the terms of `info["cost"]`, for safe learning: a table of contact_loss, '
         "uplift and max_force; by default 1 each",
     )

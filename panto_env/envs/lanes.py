@@ -212,7 +212,7 @@ class LaneGroups:
         """As ``VectorLanes.begin``; episodes: of each group."""
         for group, its, own in zip(self._groups, self._lanes, episodes, strict=True):
             if lanes[its].any():
-                group.begin(lanes[its], own, lambda lane, first=its.start: random(first + lane), anew)
+                group.begin(lanes[its], own, _of_group(random, its.start), anew)
 
     def step(self, action: Array, waiting: Flags | None, random: OfLane) -> bool:
         """As ``VectorLanes.step``."""
@@ -228,7 +228,7 @@ class LaneGroups:
         ended = False
         for group, its in zip(self._groups[first:last], self._lanes[first:last], strict=True):
             idle = None if waiting is None or not waiting[its].any() else waiting[its]
-            ended = group.step(action[its], idle, lambda lane, first=its.start: random(first + lane)) or ended
+            ended = group.step(action[its], idle, _of_group(random, its.start)) or ended
         return int(ended)
 
     def answer(self) -> Answer:
@@ -251,6 +251,11 @@ class LaneGroups:
             for name, value in group.figures(lanes[its]).items():
                 values.setdefault(name, np.zeros(len(lanes)))[its] = value
         return values
+
+
+def _of_group(random: OfLane, first: int) -> OfLane:
+    """The generators of a group whose lanes begin with ``first``."""
+    return lambda lane: random(first + lane)
 
 
 def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | LaneGroups:

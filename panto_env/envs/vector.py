@@ -263,7 +263,8 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
         if not (self._running or mask.all()):
             raise InputError("The first reset must begin episodes in all lanes; leave out reset_mask.")
         check_whole_trains(mask, self.task.agents)
-        return mask.copy()
+        lanes: Flags = mask.copy()
+        return lanes
 
     def _seed(self, lanes: Flags, seeds: Sequence[int | None]) -> None:
         """Seed the marked lanes; a lane without a given seed keeps its generator if it has one."""

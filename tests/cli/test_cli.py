@@ -54,9 +54,11 @@ def test_a_switch_has_no_opposite_and_an_option_of_one_value_is_given_once():
     for words, command in every:
         assert [option for each in command.params for option in each.secondary_opts] == []
         assert isinstance(command, group._GivenOnce), words
-    for words in ("list", "benchmark", "dataset episodes"):  # ours, a plug-in, one of its group
-        done = panto(*words.split(), "--json", "--json")
-        assert (done.returncode, done.stderr) == (2, "panto: --json is given twice; give it once.\n")
+    ours, of_plug_ins = ("list", "--json"), (("benchmark", "--json"), ("dataset episodes", "--workers=1"))
+    for words, option in (ours, *of_plug_ins):
+        done = panto(*words.split(), option, option)
+        said = f"panto: {option.partition('=')[0]} is given twice; give it once.\n"
+        assert (done.returncode, done.stderr) == (2, said)
 
 
 @pytest.mark.parametrize(

@@ -98,16 +98,10 @@ def test_time_aware_observation_knows_the_longest_episode():
 
 
 def test_numpy_s_numbers_are_numbers():
-    numbers = {
-        "speed_kmh": (np.float32(200), np.int64(250)),
-        "distance": np.int32(20),
-        "control_interval": np.float64(0.01),
-        "pantograph_scatter": np.float16(0.125),
-        "bilateral": np.bool_(True),
-        "actuator": {"force_limit": np.float32(50), "delay": np.array(0.005)},
-        "reward": {"effort": np.float32(0.5)},
-        "line_condition": [{"irregularity": np.int8(1)}],
-    }
+    numbers = {"speed_kmh": (np.float32(200), np.int64(250)), "distance": np.int32(20)}
+    numbers |= {"pantograph_scatter": np.float16(0.125), "bilateral": np.bool_(True)}
+    numbers |= {"actuator": {"force_limit": np.float32(50), "delay": np.array(0.005)}}
+    numbers |= {"line_condition": [{"irregularity": np.int8(1)}]}
     env = gymnasium.make("PantographStiffness-v0", **numbers)
     observation, info = env.reset(seed=np.int64(3), options={"distance": np.float32(10)})
     envs = gymnasium.make_vec("PantographStiffness-v0", np.int64(2), max_episode_steps=np.int16(9), **numbers)
@@ -115,4 +109,3 @@ def test_numpy_s_numbers_are_numbers():
     assert env.unwrapped.context.force_limit == 50
     assert 200 <= info["speed_kmh"] <= 250
     assert envs.num_envs == 2
-    assert gymnasium.make("Pantograph-v0", spans=np.int64(4), window=np.int64(3)).spec is not None
