@@ -105,16 +105,10 @@ def make_app() -> typer.Typer:
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
-    commands: list[Any] = [
-        simulate.simulate,
-        simulate.film,
-        simulate.app,
-        sweep.sweep,
-        sweep.permissible_speed,
-    ]
-    commands += [sweep.design, lines.family, lines.line, studies.validate, studies.speed, studies.reproduce]
-    commands += [studies.rig, identify.identify, estimate.estimate, fit.fit, fit.drift, diagnose.diagnose]
-    for command in (*commands, records.record, records.compare):
+    commands: list[Any] = [simulate.simulate, simulate.film, simulate.app, sweep.sweep, sweep.design]
+    commands += [sweep.permissible_speed, lines.family, lines.line, studies.validate, studies.speed]
+    commands += [studies.reproduce, studies.rig, identify.identify, estimate.estimate, fit.fit, fit.drift]
+    for command in (*commands, diagnose.diagnose, records.record, records.compare):
         app.command()(command)
     give_options_once(app)
     return app

@@ -177,11 +177,6 @@ class TensorSettings(VectorSettings):
         "many lanes it takes a good part of the time",
     )
 
-    @property
-    def used_starts(self) -> int:
-        """Number of starts."""
-        return self.starts or max(2, min(self.trains, USUAL_STARTS))
-
     @model_validator(mode="after")
     def _no_pictures(self) -> TensorSettings:
         if self.render_mode is not None:

@@ -18,7 +18,7 @@ from ..control.on_device import TensorLanes
 from ..control.settings import read_settings
 from .episodes import check_whole_trains, checked_options, checked_seed, one_at_a_time
 from .lanes import REWARD, Answer, final_infos, lane_figures, lane_infos
-from .settings import TensorSettings
+from .settings import USUAL_STARTS, TensorSettings
 from .vector import SharedByLanes
 
 
@@ -49,8 +49,9 @@ class PantographTensorEnv(SharedByLanes):
                 "On a device all lanes share one line, and a list, a family or a section gives several; "
                 "name one line as catenary, or leave out device."
             )
+        starts = settings.starts or max(2, min(settings.trains, USUAL_STARTS))
         try:
-            self._lanes = TensorLanes(settings, settings.trains, settings.used_starts, self.device)
+            self._lanes = TensorLanes(settings, settings.trains, starts, self.device)
         except torch.OutOfMemoryError as error:
             raise InputError(
                 f"{settings.num_envs:,} lanes do not fit into the memory of {self.device}; take fewer."

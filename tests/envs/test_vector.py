@@ -15,7 +15,6 @@ def make(lanes=3, **settings):
     ("settings", "message"),
     [
         ({"autoreset_mode": "Never"}, "autoreset_mode must be one of NextStep, SameStep, Disabled"),
-        ({"lanes": 0}, "num_envs must be a whole number from 1"),
         ({"render_mode": "human"}, "must be None or 'rgb_array'"),
         ({"pantograph_scatter": 2}, "pantograph_scatter must be a number from 0 to 0.3, not 2"),
         ({"line_condition": []}, "line_condition must name at least one condition"),
