@@ -235,7 +235,7 @@ def test_overwriting_is_told_in_one_line(tmp_path):
     assert (tmp_path / "run.parquet").read_bytes() == before
 
 
-def test_a_benchmark_is_overwritten_only_if_asked_and_printed_before_it_fails_to_be(old, monkeypatch):
+def test_a_benchmark_is_overwritten_only_if_asked(old, monkeypatch):
     words = (*BENCHMARK, "--output", "out.json")
     assert "out.json exists already; give another --output, or --force" in refused(*words)
     monkeypatch.setattr(files.Path, "replace", fail)

@@ -217,14 +217,9 @@ def bad_actions(kind, env):
         inner = [np.array([np.nan]), np.zeros(2), "up", None, torch.zeros(1, requires_grad=True)]
         return [None, {}, good | {"other": np.zeros(1)}, 0.5, *({name: each} for each in inner)]
     as_tensor = torch.as_tensor(good)
-    bad = [
-        as_tensor.clone().requires_grad_(),
-        as_tensor.to_sparse(),
-        as_tensor.to(torch.complex64),
-        "up",
-        None,
-    ]
-    wrong = [good[..., None], good * np.nan, good[:-1]]
+    bad = ["up", None, {}, {0.5}, [[0.5], [0.5, 0.5]], np.ma.masked_array(as_tensor.numpy(), mask=True)]
+    bad += [as_tensor.clone().requires_grad_(), as_tensor.to_sparse(), as_tensor.to(torch.complex64)]
+    wrong = [good[..., None], good * np.nan, good * np.inf, good[:-1]]
     if kind is Tensors:
         bad += [as_tensor.numpy(), as_tensor.to("meta"), torch.nested.nested_tensor(list(as_tensor))]
     return [*bad, *wrong]
