@@ -58,7 +58,7 @@ def inside(value, ends):
 
 @pytest.mark.plain
 def test_drawn_lines_lie_in_the_ranges_and_hang():
-    sags = []
+    sags, armed = [], set()
     for seed in range(12):
         line, (low, high) = line_of(seed)
         span, contact, messenger = line.span_length, line.contact_wire, line.messenger_wire
@@ -77,11 +77,13 @@ def test_drawn_lines_lie_in_the_ranges_and_hang():
         assert hang(line).dropper_length.min() >= FAMILY.droppers.shortest
         assert (hang(line).dropper_tension > 0).all()
         sags.append(max(line.droppers.sag) / span)
+        armed.add((line.steady_arm.mass > 0, line.steady_arm.stiffness > 0))
         wave_speed_kmh = 3.6 * math.sqrt(contact.tension / contact.mass)
         assert max(200, 0.45 * wave_speed_kmh) == pytest.approx(low)
         assert min(350, 0.7 * wave_speed_kmh) == pytest.approx(high)
     assert min(sags) == 0  # a flat wire, or one with a pre-sag
     assert 0.0005 < max(sags) <= 0.001
+    assert armed == {(False, False), (True, True)}  # steady arms on some lines, with both or without
 
 
 @pytest.mark.slow
