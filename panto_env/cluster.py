@@ -183,12 +183,9 @@ def make_parts(
     if progress is not None:
         progress(kept, len(jobs))
     if missing:
-        spread(
-            [partial(job, path) for path, job in missing.items()],
-            workers=workers,
-            ray=ray,
-            progress=None if progress is None else lambda done, _: progress(kept + done, len(jobs)),
-        )
+        told = None if progress is None else lambda done, _: progress(kept + done, len(jobs))
+        todo = [partial(job, path) for path, job in missing.items()]
+        spread(todo, workers=workers, ray=ray, progress=told)
 
 
 def remove_parts(folder: Path) -> None:

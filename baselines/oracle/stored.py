@@ -19,8 +19,8 @@ from panto_env.base.errors import InputError
 from panto_env.base.files import finite, read_toml, write_text
 from panto_env.base.settings import Positive, Settings, parse
 from panto_env.catalog.loader import is_entry
-from panto_env.control.identity import OF_TRAINS
 from panto_env.control.lines import draws_line, line_name
+from panto_env.control.record import OF_TRAINS
 from panto_env.control.settings import (
     ControlInterval,
     PantographScatter,

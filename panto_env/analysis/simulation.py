@@ -17,8 +17,8 @@ from ..base.arrays import Array
 from ..base.errors import InputError, shown
 from ..control import Task, passive_mean, trim_of_pass
 from ..control.arguments import check_arguments, parameters
-from ..control.identity import identity, settings_of
 from ..control.lines import on_drawn_line
+from ..control.record import identity, settings_of
 from ..control.settings import RunSettings, default, far_enough, run_settings
 from ..control.state import Result
 from ..metrics.figures import SpanChoice

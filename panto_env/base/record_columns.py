@@ -220,12 +220,16 @@ def _parts(heading: str) -> tuple[str, str]:
     return (re.sub(r"[\s_-]", "", match[1]).lower(), (match[2] or "").strip()) if match else ("", "")
 
 
+def _check_known(what: str, given: Mapping[str, str] | None, columns: Mapping[str, Column]) -> None:
+    if unknown := [name for name in given or {} if name not in columns]:
+        raise InputError(f"{what} of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")
+
+
 def _spellings(
     columns: Mapping[str, Column], headings: Mapping[str, str] | None
 ) -> dict[str, tuple[str, ...]]:
     """Names of headings by column. Raises InputError for a heading of an unknown column."""
-    if unknown := [name for name in headings or {} if name not in columns]:
-        raise InputError(f"Heading of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")
+    _check_known("Heading", headings, columns)
     given = {name: (_parts(heading)[0],) for name, heading in (headings or {}).items()}
     return {name: given.get(name, column.spellings) for name, column in columns.items()}
 
@@ -244,10 +248,7 @@ def places_of(
     '-', to refuse what must not be ignored. Raises InputError for a missing column, one that is there twice,
     and an unknown or missing unit.
     """
-    units = dict(units or {})
-    unknown = [name for name in units if name not in columns]
-    if unknown:
-        raise InputError(f"Unit of unknown column '{unknown[0]}': {suggest(unknown[0], list(columns))}.")
+    _check_known("Unit", units, columns)
     spellings = _spellings(columns, headings)
     places: dict[str, tuple[int, float]] = {}
     for place, heading in enumerate(header):
@@ -259,7 +260,7 @@ def places_of(
             continue
         if name in places:
             raise InputError(f"{path} has column {name} twice; keep one.")
-        unit = units.get(name) or written or columns[name].usual
+        unit = (units or {}).get(name) or written or columns[name].usual
         places[name] = (place, 1.0 if columns[name].text else _scale(path, name, columns[name], unit))
     needed = [name for name, column in columns.items() if column.required or name in (headings or {})]
     missing = [name for name in needed if name not in places]
@@ -279,9 +280,8 @@ def _scale(path: str | Path, name: str, column: Column, unit: str | None) -> flo
             f"'{name} ({column.example})', or give --unit."
         )
     if unit not in column.units:
-        raise InputError(
-            f"Column {name} of {path} is in '{unit}'; known units are {', '.join(column.units)}."
-        )
+        known = ", ".join(column.units)
+        raise InputError(f"Column {name} of {path} is in '{unit}'; known units are {known}.")
     return column.units[unit]
 
 

@@ -73,11 +73,8 @@ def parse_inline(text: str) -> dict[str, Any]:
         if name in values:
             raise InputError(f"'{name}' is given twice.")
         word = value.strip()
-        if word in TRUTH:
-            values[name] = TRUTH[word]
-            continue
         try:
-            values[name] = ast.literal_eval(word)
+            values[name] = TRUTH[word] if word in TRUTH else ast.literal_eval(word)
         except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):  # not a literal
             values[name] = word
     return values

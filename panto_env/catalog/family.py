@@ -27,6 +27,7 @@ from .drawn_lines import (
     SupportRanges,
     WireRanges,
     in_words,
+    meaning,
 )
 
 GRADIENTS = (
@@ -77,22 +78,20 @@ class LineFamily(DrawnLines):
     most_draws: ClassVar[int] = 1000
 
     kind: Literal["family"] = "family"
-    speed_share: Range[Share] = Field(
-        description="speeds of trains, as shares of the wave speed of the contact wire (-)"
+    speed_share: Range[Share] = meaning(
+        "speeds of trains, as shares of the wave speed of the contact wire (-)"
     )
-    max_speed_kmh: Annotated[float, Between(1, 2000, "km/h")] = Field(
-        description="maximum speed of trains (km/h)"
-    )
+    max_speed_kmh: Annotated[float, Between(1, 2000, "km/h")] = meaning("maximum speed of trains (km/h)")
     system: PowerSystem = Field("AC", description="power supply of the lines, as of a single line")
-    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
-    span_length: Range[Annotated[float, Between(2, LONGEST_SPAN, "m")]] = Field(
-        description="distance between supports (m)"
+    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = meaning("default number of spans")
+    span_length: Range[Annotated[float, Between(2, LONGEST_SPAN, "m")]] = meaning(
+        "distance between supports (m)"
     )
-    encumbrance: Range[Share] = Field(
-        description="height of messenger over contact wire at support, as a share of the span (-)"
+    encumbrance: Range[Share] = meaning(
+        "height of messenger over contact wire at support, as a share of the span (-)"
     )
-    tension_ratio: Range[Annotated[float, Between(0, 100)]] = Field(
-        description="tension of the messenger over that of the contact wire (-); others are drawn again"
+    tension_ratio: Range[Annotated[float, Between(0, 100)]] = meaning(
+        "tension of the messenger over that of the contact wire (-); others are drawn again"
     )
     contact_wire: WireRanges
     messenger_wire: WireRanges
@@ -145,9 +144,9 @@ class LineFamily(DrawnLines):
         span = random.uniform(*self.span_length)
         sagging, sag = random.random() < self.pre_sag.chance, random.uniform(*self.pre_sag.share)
         with_arms = random.random() < self.steady_arm.chance
-        arm_mass, arm_stiffness = (
-            random.uniform(*ends) for ends in (self.steady_arm.mass, self.steady_arm.stiffness)
-        )
+        arm = {
+            key: with_arms * random.uniform(*getattr(self.steady_arm, key)) for key in ("mass", "stiffness")
+        }
         values: dict[str, Any] = {
             "name": self.full_name,
             "description": f"Drawn from a family. {self.description}",
@@ -158,15 +157,9 @@ class LineFamily(DrawnLines):
             "contact_wire": self.contact_wire.draw(random),
             "messenger_wire": self.messenger_wire.draw(random),
             "droppers": self.droppers.draw(random, span, sagging * sag * span),
-            "support": {
-                "stiffness": random.uniform(*self.support.stiffness),
-                "damping": random.uniform(*self.support.damping),
-            },
-            "steady_arm": {"mass": with_arms * arm_mass, "stiffness": with_arms * arm_stiffness},
-            "damping": {
-                "alpha": random.uniform(*self.damping.alpha),
-                "beta": random.uniform(*self.damping.beta),
-            },
+            "support": {key: random.uniform(*ends) for key, ends in self.support},
+            "steady_arm": arm,
+            "damping": {key: random.uniform(*ends) for key, ends in self.damping},
         }
         if self.plan is not None:
             drawn = self.plan.draw(random, np.zeros(2))

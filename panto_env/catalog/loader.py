@@ -31,12 +31,13 @@ E = TypeVar("E", CatenaryData, PantographData)
 
 Lines = CatenaryData | tuple[CatenaryData, ...] | LineFamily | LineSection
 """A line, lines to choose from, or a family or a section to draw from."""
-FOLDERS = {
-    "catenary": Path(__file__).parent / "catenaries",
-    "pantograph": Path(__file__).parent / "pantographs",
-    "family": Path(__file__).parent / "families",
-    "section": Path(__file__).parent / "sections",
+_PLURALS = {
+    "catenary": "catenaries",
+    "pantograph": "pantographs",
+    "family": "families",
+    "section": "sections",
 }
+FOLDERS = {family: Path(__file__).parent / plural for family, plural in _PLURALS.items()}
 SCHEMAS: dict[str, Mapping[str, type[Settings]]] = {
     "catenary": {name: kind.schema for name, kind in CATENARIES.items()},
     "pantograph": {"pantograph": PantographData},
@@ -371,14 +372,13 @@ def _schema(family: str, table: Mapping[str, Any]) -> type[Settings]:
         return next(iter(schemas.values()))
     if "kind" not in table:
         raise _TableError(f"key 'kind' is missing: {kinds}")
-    if family in ("catenary", *DRAWN) and table["kind"] in DRAWN and table["kind"] != family:
-        what = (
-            f"a {table['kind']} of lines" if table["kind"] == "family" else f"a {table['kind']} to draw from"
-        )
-        raise _TableError(f"it is {what}, so give it with '{table['kind']}:' before its path")
-    if not isinstance(table["kind"], str) or table["kind"] not in schemas:
-        raise _TableError(f"key 'kind' must be {kinds} (given: {shown(table['kind'])})")
-    return schemas[table["kind"]]
+    kind = table["kind"]
+    if family in ("catenary", *DRAWN) and kind in DRAWN and kind != family:
+        what = "a family of lines" if kind == "family" else "a section to draw from"
+        raise _TableError(f"it is {what}, so give it with '{kind}:' before its path")
+    if not isinstance(kind, str) or kind not in schemas:
+        raise _TableError(f"key 'kind' must be {kinds} (given: {shown(kind)})")
+    return schemas[kind]
 
 
 class _TableError(Exception):

@@ -21,27 +21,26 @@ from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHOR
 from .loader import file_of
 
 HEIGHTS = LENGTHS | {"cm": 0.01}
+METRES = {"m": 1.0}
+
+
+def _length(spellings: str, units: Mapping[str, float] = HEIGHTS, **more: bool) -> Column:
+    return Column(tuple(spellings.split()), units, "m", required=False, usual="m", **more)
+
+
 COLUMNS = {
-    "position": Column(
-        ("position", "x", "chainage"), HEIGHTS | {"km": 1e3}, "m", required=False, usual="m", chainage=True
-    ),
-    "span": Column(("span", "spanlength"), {"m": 1.0}, "m", required=False, blank=True, usual="m"),
-    "contact_height": Column(
-        ("contactheight", "contactwireheight", "contactwire"), HEIGHTS, "m", required=False, usual="m"
-    ),
-    "messenger_height": Column(
-        ("messengerheight", "messengerwireheight", "messenger"), HEIGHTS, "m", required=False, usual="m"
-    ),
-    "encumbrance": Column(("encumbrance", "systemheight"), HEIGHTS, "m", required=False, usual="m"),
-    "stitch_wire": Column(
-        ("stitchwire", "stitchwirelength", "stitch"), {"m": 1.0}, "m", required=False, blank=True, usual="m"
-    ),
+    "position": _length("position x chainage", HEIGHTS | {"km": 1e3}, chainage=True),
+    "span": _length("span spanlength", METRES, blank=True),
+    "contact_height": _length("contactheight contactwireheight contactwire"),
+    "messenger_height": _length("messengerheight messengerwireheight messenger"),
+    "encumbrance": _length("encumbrance systemheight"),
+    "stitch_wire": _length("stitchwire stitchwirelength stitch", METRES, blank=True),
     "type": Column(("type", "spantype"), {}, "text", required=False, text=True),
     "mast": Column(("mast", "name", "mastname", "mastnumber", "mastno"), {}, "text", False, text=True),
-    "stagger": Column(("stagger", "zigzag"), HEIGHTS, "m", required=False, blank=True, usual="m"),
-    "messenger_stagger": Column(("messengerstagger",), HEIGHTS, "m", required=False, blank=True, usual="m"),
-    "radius": Column(("radius", "r"), {"m": 1.0, "km": 1e3}, "m", required=False, blank=True, usual="m"),
-    "cant": Column(("cant", "superelevation"), HEIGHTS, "m", required=False, blank=True, usual="m"),
+    "stagger": _length("stagger zigzag", blank=True),
+    "messenger_stagger": _length("messengerstagger", blank=True),
+    "radius": _length("radius r", METRES | {"km": 1e3}, blank=True),
+    "cant": _length("cant superelevation", blank=True),
 }
 """Columns of a table of masts, in the order of travel: a row per mast, with the span that begins there."""
 SURVEYED = {"mast": "name", "position": "chainage"} | {
@@ -197,12 +196,10 @@ def _with_sequence(
     header = re.search(r"^[ \t]*\[", text, re.MULTILINE)
     place = len(text) if header is None else header.start()
     plain = re.sub(r"^[ \t]*spans[ \t]*=.*\n?", "", text[:place], flags=re.MULTILINE)
-    spans = "".join(f"    {_inline(item)},\n" for item in items)
+    spans, masts = ("".join(f"    {_inline(each)},\n" for each in rows) for rows in (items, named))
     given = f"sequence = {{ value = [\n{spans}], source = {json.dumps(source)} }}\n"
-    if end:
-        given += f"end_support = {_inline(end)}\n"
-    if named:
-        given += f"masts = [\n{''.join(f'    {_inline(each)},{chr(10)}' for each in named)}]\n"
+    given += f"end_support = {_inline(end)}\n" if end else ""
+    given += f"masts = [\n{masts}]\n" if named else ""
     comment = f"# Spans between the masts of {json.dumps(source)}, in the order of travel."
     made = f"{plain.rstrip()}\n\n{comment}\n{given}\n{text[place:]}"
     expected = {key: value for key, value in table.items() if key != "spans"}

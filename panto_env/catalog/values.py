@@ -52,11 +52,9 @@ def _source(sources: Mapping[str, str], key: str, given: bool) -> str:
     """Source of a value, or else of what it is a table of, or of the table or list in which it is given."""
     if key in sources or not given:
         return sources.get(key, BY_DEFAULT)
-    inner = {
-        name.removeprefix(f"{key}."): text for name, text in sources.items() if name.startswith(f"{key}.")
-    }
+    inner = [name for name in sources if name.startswith(f"{key}.")]
     if inner:
-        return "; ".join(f"{name}: {text}" for name, text in inner.items())
+        return "; ".join(f"{name.removeprefix(f'{key}.')}: {sources[name]}" for name in inner)
     if key == "spans" and "sequence" in sources:  # which gives their number
         return sources["sequence"]
     while key not in sources and "." in key:

@@ -8,8 +8,7 @@ import signal
 import sys
 import warnings
 from contextlib import suppress
-from types import FrameType
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any
 
 import typer
 from typer import Abort, Option
@@ -39,16 +38,15 @@ def _run() -> int:
     """Exit status of the command."""
     stopped: list[int] = []
 
-    def stop(number: int, frame: FrameType | None) -> None:
+    def stop(number: int, _: Any) -> None:
         """Turn the first SIGTERM into an interrupt; a second one kills."""
         signal.signal(number, signal.SIG_DFL)
         stopped.append(number)
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, stop)
-    status: int | None
     try:
-        status = make_app()(standalone_mode=False)  # otherwise Typer draws a box around errors
+        status: int | None = make_app()(standalone_mode=False)  # otherwise Typer draws a box around errors
         print(end="", flush=True)  # output that cannot be written fails here, not at the exit
     except InputError as error:
         return _refuse(str(error))
@@ -56,8 +54,7 @@ def _run() -> int:
         if type(error).__name__ == "NoArgsIsHelpError":  # not an error: its message is the help
             error.show()
             return int(error.exit_code)
-        context = error.ctx
-        command = "panto" if context is None else context.command_path
+        command = "panto" if error.ctx is None else error.ctx.command_path
         return _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`.")
     except Abort:
         status = 1
@@ -81,8 +78,8 @@ def _show_warning(
     category: type[Warning],
     filename: str,
     lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
+    file: Any = None,
+    line: Any = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
     if issubclass(category, AccuracyWarning | PlugInWarning | UnusualWarning):
@@ -93,21 +90,7 @@ def _show_warning(
 
 def make_app() -> typer.Typer:
     """The command with all its sub-commands; it finds those of installed packages when they are called."""
-    from . import (
-        catalogue,
-        design,
-        diagnose,
-        estimate,
-        fit,
-        identify,
-        lines,
-        page,
-        permissible,
-        records,
-        simulate,
-        studies,
-        sweep,
-    )
+    from . import catalogue, diagnose, estimate, fit, identify, lines, records, simulate, studies, sweep
 
     app = typer.Typer(
         name="panto",
@@ -122,19 +105,10 @@ def make_app() -> typer.Typer:
     )
     app.callback()(_about)
     app.command("list")(catalogue.list_entries)
-    for command in (
-        *(
-            simulate.simulate,
-            simulate.film,
-            sweep.sweep,
-            page.app,
-            permissible.permissible_speed,
-            design.design,
-        ),
-        *(lines.family, lines.line, studies.validate),
-        *(identify.identify, estimate.estimate, diagnose.diagnose, records.record, records.compare),
-        *(fit.fit, fit.drift, studies.speed, studies.reproduce, studies.rig),
-    ):
+    commands: list[Any] = [simulate.simulate, simulate.film, simulate.app, sweep.sweep, sweep.design]
+    commands += [sweep.permissible_speed, lines.family, lines.line, studies.validate, studies.speed]
+    commands += [studies.reproduce, studies.rig, identify.identify, estimate.estimate, fit.fit, fit.drift]
+    for command in (*commands, diagnose.diagnose, records.record, records.compare):
         app.command()(command)
     give_options_once(app)
     return app
@@ -146,10 +120,9 @@ def _show_version(requested: bool) -> None:
         raise typer.Exit
 
 
-Version = Annotated[
-    bool, Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
-]
-
-
-def _about(version: Version = False) -> None:
+def _about(
+    version: Annotated[
+        bool, Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
+    ] = False,
+) -> None:
     """Pantograph-catenary simulation, control and learning."""

@@ -64,13 +64,12 @@ class Description(NamedTuple):
 
 def everything() -> dict[str, list[Description]]:
     """Descriptions of everything with a name, by family."""
-    return {
-        **{
-            family: [_entry(family, load(name)) for name in available(family)]
-            for family, load in LOADERS.items()
-        },
-        POLICY: [_policy_or_why_not(name) for name in policy_names()],
-        **{family: [_preset(family, name) for name in presets] for family, presets in PRESETS.items()},
+    found = {
+        family: [_entry(family, load(each)) for each in available(family)] for family, load in LOADERS.items()
+    }
+    found[POLICY] = [_policy_or_why_not(name) for name in policy_names()]
+    return found | {
+        family: [_preset(family, each) for each in presets] for family, presets in PRESETS.items()
     }
 
 
@@ -116,14 +115,10 @@ def _policy_or_why_not(name: str) -> Description:
 
 def _policy(name: str) -> Description:
     maker = maker_of(name)
-    texts = [inspect.getdoc(maker) or ""]
-    made = maker.__init__ if inspect.isclass(maker) and maker.__init__ is not object.__init__ else None
-    texts += [inspect.getdoc(made) or ""] if made is not None else []
-    text = "\n\n".join(filter(None, texts))
-    defaults = {
-        key: None if each.default is each.empty else each.default
-        for key, each in parameters_of(maker).items()
-    }
+    own = inspect.isclass(maker) and maker.__init__ is not object.__init__
+    text = "\n\n".join(filter(None, map(inspect.getdoc, [maker, *([maker.__init__] if own else [])])))
+    known = parameters_of(maker).items()
+    defaults = {key: None if each.default is each.empty else each.default for key, each in known}
     rows = [(key, repr(value)) for key, value in defaults.items()]
     plain = {key: value if _fit_for_json(value) else repr(value) for key, value in defaults.items()}
     data = {"name": name, "description": text, "parameters": plain}

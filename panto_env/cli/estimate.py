@@ -127,7 +127,10 @@ def estimate(
     scores = _scores(motion, found)
     with written_last() as later:
         if output is not None:
-            later(write_table, _sheet(found), output)
+            normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
+            columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
+            units = {"time": "time (s)", "contact_force": "contact_force (N)", "nis": "nis (-)"}
+            later(write_table, Sheet("estimate", columns, units), output)
         if plot is not None:
             title = f"{file.name}, {known.name}, {settings.observation}, {settings.force_model.kind}"
             later(save, plot_estimate(found, title, motion.contact_force), plot)
@@ -150,13 +153,6 @@ def _lift(pantograph: PantographData, speed: float | None, lift: float | None, m
     if pantograph.force == "mean":  # this is the contact force: the lowest spring needs a lift in addition
         nominal += pantograph.stiffnesses[-1] * float(motion.frame.mean())
     return nominal
-
-
-def _sheet(found: Estimate) -> Sheet:
-    normalised = nis(found.filtered) / found.filtered.innovations.shape[1]
-    columns = {"time": found.time, "contact_force": found.force, "nis": normalised}
-    units = {"time": "time (s)", "contact_force": "contact_force (N)", "nis": "nis (-)"}
-    return Sheet("estimate", columns, units)
 
 
 def _figures(found: Estimate) -> dict[str, float]:
@@ -202,16 +198,11 @@ def _plain(
 def _print(
     found: Estimate, motion: Motion, settings: EstimatorSettings, scores: list[Score], name: str
 ) -> None:
-    rows: list[tuple[str, str, str]] = [
-        (LABELS[key].heading, number(value), "") for key, value in _figures(found).items()
-    ]
-    rows += [
-        ("lift, which determines the mean (N)", number(motion.lift), ""),
-        ("rms error by the model, all frequencies (N)", number(found.deviation), ""),
-    ]
-    rows += [
-        (test.name, test.text if test.kept else Alarm(test.text), test.bounds) for test in found.verdict.tests
-    ]
+    rows = [(LABELS[key].heading, number(value), "") for key, value in _figures(found).items()]
+    rows.append(("lift, which determines the mean (N)", number(motion.lift), ""))
+    rows.append(("rms error by the model, all frequencies (N)", number(found.deviation), ""))
+    for test in found.verdict.tests:
+        rows.append((test.name, test.text if test.kept else Alarm(test.text), test.bounds))
     rows.append(("reliable", "yes" if found.verdict.believe else Alarm("no"), "all within these bounds"))
     model = f"{settings.observation}, {settings.force_model.kind}"
     print_table(Table(f"{name}: contact force, 0 to 20 Hz, from {model}", ("", "", "judged by"), rows))

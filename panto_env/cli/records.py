@@ -51,8 +51,7 @@ from ..terminal import (
 from .identify import given
 
 Unit = Annotated[
-    list[str] | None,
-    Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated."),
+    list[str] | None, Option(help="Unit of a column whose heading has none, e.g. force=kN; may be repeated.")
 ]
 Heading = Annotated[
     list[str] | None,
@@ -74,10 +73,7 @@ Filtered = Annotated[
     ),
 ]
 
-Page = Annotated[
-    str | None,
-    into_file("Write a page with tables and charts to this file", PAGES),
-]
+Page = Annotated[str | None, into_file("Write a page with tables and charts to this file", PAGES)]
 
 PRINTED = 12
 """Most rows of a table of parts in the terminal; files and pages have all."""

@@ -1,8 +1,9 @@
-"""``panto simulate``: one pass along a line."""
+"""``panto simulate``, ``film`` and ``app``: one pass along a line, as figures, as a film, in the browser."""
 
 from __future__ import annotations
 
 import math
+import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -24,6 +25,7 @@ from ..analysis.options import (
 )
 from ..analysis.plots import plot_run, save
 from ..base.errors import InputError
+from ..base.extras import require
 from ..base.table import Table as TextTable
 from ..metrics.by_span import SPEED_HEADINGS, by_speed
 from ..metrics.figures import LABELS, SpanChoice, in_words
@@ -109,7 +111,7 @@ def _print(trajectory: Trajectory, chosen: SpanChoice, json: bool) -> None:
             | ({"by_speed": [each._asdict() for each in by_speed(own, chosen)]} if profile else {})
             for own in train
         ]
-        others = [_own_facts(own) | result for own, result in zip(train[1:], results[1:], strict=True)]
+        others = [_facts(own, OWN_FACTS) | found for own, found in zip(train[1:], results[1:], strict=True)]
         behind = {"followers": others} if others else {}
         print_json(_facts(trajectory) | {"spans": covered} | results[0] | behind)
         return
@@ -159,25 +161,13 @@ def _shown(
         yield lambda share: progress.update(bar, completed=share), None
 
 
-def _own_facts(run: Trajectory) -> dict[str, Any]:
-    """What a pantograph behind the first has of its own."""
-    return {name: getattr(run, name) for name in ("pantograph", "policy", "nominal_force", "target_mean")}
+FACTS = "catenary pantograph speed_kmh policy seed terminated ending nominal_force target_mean settings"
+OWN_FACTS = "pantograph policy nominal_force target_mean"
+"""What JSON has of a run, and of a pantograph behind the first."""
 
 
-def _facts(run: Trajectory) -> dict[str, Any]:
-    names = (
-        "catenary",
-        "pantograph",
-        "speed_kmh",
-        "policy",
-        "seed",
-        "terminated",
-        "ending",
-        "nominal_force",
-        "target_mean",
-        "settings",
-    )
-    return {name: getattr(run, name) for name in names}
+def _facts(run: Trajectory, names: str = FACTS) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in names.split()}
 
 
 MOST = 4
@@ -253,3 +243,26 @@ def film(
         highlight=False,
         soft_wrap=True,
     )
+
+
+def app(
+    port: Annotated[
+        int, Option(min=1024, max=65535, help="Port of this machine at which it is served.")
+    ] = 5006,
+    no_browser: Annotated[
+        bool, Option("--no-browser", help="Only serve the page, and open no browser.")
+    ] = False,
+) -> None:
+    """Serve a page on which line, pantograph, speed and policy are chosen and their run is seen at once.
+
+    Only browsers of this machine reach it, and it needs no network. Ctrl+C ends it.
+    """
+    require("The page", "app", "bokeh")
+    from ..app.page import serve
+
+    def ready(address: str) -> None:
+        console.print(f"The page is {address}; Ctrl+C ends it.", soft_wrap=True)
+        if not no_browser:
+            webbrowser.open(address)
+
+    serve(port, ready)

@@ -162,11 +162,11 @@ def reproduce(
     with bars() as progress:
         for study, run in chosen.items():
             bar = progress.add_task(study, total=1.0)
-            outcome = run(
-                lambda what, share, bar=bar, study=study: progress.update(  # type: ignore[misc]
-                    bar, completed=share, description=f"{study}: {what}"
-                )
-            )
+
+            def report(what: str, share: float, bar: Any = bar, study: str = study) -> None:
+                progress.update(bar, completed=share, description=f"{study}: {what}")
+
+            outcome = run(report)
             progress.remove_task(bar)
             found[study] = outcome.as_dict()
             if not json:
@@ -177,10 +177,9 @@ def reproduce(
                 failed.append(error)
                 continue
             if not json:
-                figures = f"{len(files) - 1 - len(outcome.rows)} figures"
-                csv = [f"{name}.csv" for name in outcome.rows]
-                written = f"{', '.join([figures, *csv])} and {studies.NUMBERS}"
-                console.print(f"{written} are in {output / study}.\n")
+                written = [f"{len(files) - 1 - len(outcome.rows)} figures"]
+                written += [f"{name}.csv" for name in outcome.rows]
+                console.print(f"{', '.join(written)} and {studies.NUMBERS} are in {output / study}.\n")
     if json:
         print_json(found)
     if failed:

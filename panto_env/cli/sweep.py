@@ -1,13 +1,16 @@
-"""``panto sweep``: figures over ranges of one to three parameters."""
+"""``panto sweep``, ``permissible-speed`` and ``design``: many passes, over parameters, speeds and designs."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 from math import isfinite
+from pathlib import Path
 from typing import Annotated, Any
 
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from typer import Argument, Option
 
@@ -21,11 +24,30 @@ from ..analysis.sweep import sweep as run
 from ..analysis.sweep_plots import pantographs_of, plot_sweep
 from ..base.checksums import __version__
 from ..base.errors import InputError
+from ..base.files import PAGES, make_folder
 from ..base.table import TABLES
-from ..control.identity import plain
+from ..catalog import load_catenary
+from ..cluster import RayAddress
+from ..control.record import plain
 from ..control.settings import run_settings
 from ..metrics.figures import LABELS, NUMBER
-from ..terminal import Json, Plot, console, counting, into_file, number, print_json, written_last
+from ..studies.design import check as designs_of
+from ..studies.design.search import best_of, read_design, search
+from ..studies.permissible import USUAL, Scan, scan
+from ..studies.permissible.scan import VERIFIED_FROM
+from ..studies.permissible.shown import NOTES, answers_table, plot_scan, reasons, write_page
+from ..terminal import (
+    Json,
+    Plot,
+    bars,
+    console,
+    counting,
+    into_file,
+    number,
+    print_json,
+    print_table,
+    written_last,
+)
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""
@@ -144,3 +166,117 @@ def _print(rows: list[dict[str, Any]], parameters: list[str]) -> None:
         whose = [f"{row[NUMBER]}"] if NUMBER in row else []
         table.add_row(*(f"{row[name]:g}" for name in parameters), policy, *whose, *cells, row["requirements"])
     console.print(table)
+
+
+MOST_SPEEDS = 1000
+"""Maximum number of speeds of a scan."""
+
+
+@with_settings(left_out=("observation", "catenary", "speed_kmh", "speed_profile"), defaults=False)
+def permissible_speed(
+    settings: dict[str, Any],
+    line: Annotated[str, Argument(help="Line: a name of the catalogue or a TOML file.")],
+    policy: Annotated[
+        list[str] | None,
+        Option(
+            help="Policy: a name, name:key=value,... or a model file; may be repeated. passive always runs."
+        ),
+    ] = None,
+    speeds: Annotated[
+        str,
+        Option(help="Speeds as first:last:step (km/h), all of which are run: forbidden ones come in bands."),
+    ] = "200:350:10",
+    seeds: Annotated[int, Option(min=1, help="Number of lines as built, with a drifting speed each.")] = 8,
+    verify: Annotated[
+        bool, Option("--verify", help="Scan again with other seeds at half the step; the lower limit counts.")
+    ] = False,
+    workers: Annotated[int | None, Option(help="Processes; one per core by default.", min=1)] = None,
+    ray: RayAddress = None,
+    plot: Plot = None,
+    html: Annotated[str | None, into_file("Write a page of it to this file", PAGES)] = None,
+    json: Json = False,
+) -> None:
+    """Scan speeds for those at which a train keeps all requirements, without control and with.
+
+    Lines are as built, actuator and sensors realistic, and the mean force is the standard's, unless the
+    options say otherwise. Each pass is run once more with an actuator that fails half-way.
+    """
+    values = parse_speeds(speeds)
+    data = load_catenary(line)
+    given: dict[str, Any] = {"catenary": line, "workers": workers, "ray": ray} | settings
+    with counting("lines and speeds") as progress:
+        found = scan(values, policy or (), seeds=range(seeds), progress=progress, **given)
+    again: Scan | None = None
+    if verify:
+        half = sorted({*values, *((a + b) / 2 for a, b in pairwise(values))})
+        others = range(VERIFIED_FROM, VERIFIED_FROM + seeds)
+        with counting("lines and speeds, other seeds") as progress:
+            again = scan(half, policy or (), seeds=others, progress=progress, **given)
+    used = USUAL | settings | {"seeds": seeds}
+    with written_last() as later:
+        if plot is not None:
+            later(save, plot_scan(found, data), plot)
+        if html is not None:
+            later(write_page, found, again, data, used, html)
+        if json:
+            facts = plain(run_settings(USUAL | settings | {"catenary": line, "speed_kmh": values[0]}))
+            verification = {} if again is None else {"verification": again.as_dict()}
+            print_json({"version": __version__, "settings": facts} | found.as_dict() | verification)
+            return
+        print_table(answers_table(found, again))
+        for sentence in reasons(found):
+            console.print(sentence)
+        for note in NOTES:
+            console.print(note, style="dim")
+
+
+def parse_speeds(text: str) -> list[float]:
+    """Speeds (km/h) from first:last:step. Raises InputError for anything else."""
+    try:
+        first, last, step = (float(each) for each in text.split(":"))
+        if not (0 < first <= last and step > 0):
+            raise ValueError
+    except ValueError as error:
+        raise InputError(f"--speeds must read first:last:step, such as 200:400:5, not '{text}'.") from error
+    count = int((last - first) / step + 1e-9) + 1
+    if count > MOST_SPEEDS:
+        raise InputError(f"--speeds has {count:,} speeds; the maximum is {MOST_SPEEDS}, take a larger step.")
+    return [first + k * step for k in range(count)]
+
+
+def design(
+    study: Annotated[str, Argument(help="TOML file: what is searched, at which speeds; docs/design.md.")],
+    output: Annotated[
+        Path, Option(help="Folder of what was tried, which a search that was broken off goes on from.")
+    ] = Path("runs/design"),
+    designs: Annotated[
+        int | None, Option(min=1, help="Number of designs, in the place of the file's.")
+    ] = None,
+    workers: Annotated[int | None, Option(min=1, help="Threads; one per core by default.")] = None,
+    json: Json = False,
+) -> None:
+    """Search for values of a line or a pantograph that keep all requirements, and check what was found."""
+    make_folder(output)  # before hours of work
+    wanted = read_design(study)
+    if designs is not None:
+        wanted = wanted.model_copy(update={"designs": designs})
+    columns = BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}")
+    with bars("designs", *columns) as progress:
+        bar = progress.add_task("designs", total=wanted.designs, note="")
+
+        def told(done: int, total: int, note: str) -> None:
+            progress.update(bar, completed=done, total=total, note=note)
+
+        found = search(wanted, output, workers=workers, progress=told)
+    candidates, best = designs_of.candidates_of(wanted, found), best_of(wanted, found)
+    checked = designs_of.check(wanted, candidates)
+    files = designs_of.write(wanted, found, checked, candidates, output)
+    if json:
+        trials = [{"values": trial.params, "objectives": trial.values} for trial in best]
+        rows = [each._asdict() for each in checked]
+        print_json({"designs": len(found.trials), "best": trials, "checked": rows})
+        return
+    print_table(designs_of.values_table(wanted, candidates))
+    print_table(designs_of.checked_table(checked))
+    print_table(designs_of.tornado_table(wanted, best[0].params))
+    console.print(f"Written: {', '.join(map(str, files))}; `panto line` shows the line's droppers.")

@@ -58,9 +58,7 @@ def takes(
     """
     settings: type[RunSettings] = kind  # type: ignore[assignment]
 
-    def decorate(
-        initialise: Callable[[Any, dict[str, Any]], None],
-    ) -> Callable[Concatenate[Any, P], None]:
+    def decorate(initialise: Callable[[Any, dict[str, Any]], None]) -> Callable[Concatenate[Any, P], None]:
         @wraps(initialise)
         def with_keywords(self: Any, /, *arguments: Any, **given: Any) -> None:
             if arguments:
@@ -96,8 +94,7 @@ def check_arguments(given: Mapping[str, Any], kind: type[RunSettings], function:
 
 def table(kind: type[RunSettings] = RunSettings) -> str:
     """The settings as a Markdown table for a docstring."""
-    rows = [
-        f"| `{name}` | `{field.get_default()!r}` | {field.description} |"
-        for name, field in fields(kind).items()
-    ]
-    return "\n".join(("| Argument | Default | Meaning |", "|---|---|---|", *rows))
+    rows = ["| Argument | Default | Meaning |", "|---|---|---|"]
+    for name, field in fields(kind).items():
+        rows.append(f"| `{name}` | `{field.get_default()!r}` | {field.description} |")
+    return "\n".join(rows)

@@ -252,8 +252,7 @@ def _span_length(episode, own, task, now, number):
 
 
 @entries(
-    MEASURED,
-    lambda settings: [(*each, row) for row, each in enumerate(LINE_ENTRIES) if settings.line_values],
+    MEASURED, lambda settings: [(*each, row) for row, each in enumerate(LINE_ENTRIES) if settings.line_values]
 )
 def _line_value(episode, own, task, now, number):
     return episode.line_values[number]

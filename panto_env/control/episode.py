@@ -14,14 +14,14 @@ from ..base.errors import InputError
 from ..plant.alignment import AlignmentArrays
 from ..plant.plant import Plant
 from ..plant.sensors import OdometerArrays
-from ..plant.state import HEAD_RANGE, LOSS_TIME, Ending, PerCollector, per_collector
+from ..plant.state import HEAD_RANGE, LOSS_TIME, Ending, PerCollector, Place, per_collector
 from .entries import AVERAGED, DEVIATIONS, line_values
-from .faults import FaultArrays, fault_arrays
+from .faults import FAULT_ROWS, FaultArrays
 from .memory import FrontArrays, MemoryArrays, front_arrays, memory_arrays
 from .observation import READINGS, Layout
 from .reward import MEAN_TIME
 from .settings import RunSettings
-from .state import NOW_ROWS, RESULT_ROWS, Flag, TaskRow
+from .state import NOW_ROWS, Flag, TaskRow
 
 Flags = NDArray[np.bool_]
 
@@ -68,7 +68,7 @@ def new_episode(
 ) -> Episode:
     """Arrays for the episodes of all lanes of a plant; control_steps: plant steps in a control step."""
     lanes, actuator, controlled = plant.lanes, settings.actuator, plant.train.driven
-    actions, rows = len(actuator.places), lanes * len(controlled)
+    actions, rows, speeds = len(actuator.places), lanes * len(controlled), settings.runs.speeds
     if layout.memory and not odometer.sight:
         raise InputError(
             "memory is looked up by the place within the span, which these sensors do not measure; leave it "
@@ -98,18 +98,12 @@ def new_episode(
         line_values=line_values(plant.catenary) if layout.line_values else np.zeros(0),
         time_step=plant.time_step,
         control_steps=control_steps,
-        front=front_arrays(
-            layout.front, plant.train, lanes, settings.runs.speeds[0] * plant.time_step * control_steps
+        front=front_arrays(layout.front, plant.train, lanes, speeds[0] * plant.time_step * control_steps),
+        memory=memory_arrays(layout, plant.alignment, (rows, actions), speeds, settings.control_interval),
+        faults=FaultArrays(
+            np.zeros((lanes, len(settings.faults), FAULT_ROWS)),
+            np.zeros((rows, READINGS + len(Place) if settings.faults else 0)),
         ),
-        memory=memory_arrays(
-            layout.memory,
-            layout.memory_spans,
-            plant.alignment,
-            (rows, actions),
-            settings.runs.speeds,
-            settings.control_interval,
-        ),
-        faults=fault_arrays(settings.faults, lanes, rows),
         mean_share=_share(settings.control_interval, MEAN_TIME),
         washout_share=_share(settings.control_interval, settings.washout),
         loss_limit=round(LOSS_TIME / plant.time_step),
@@ -154,12 +148,3 @@ def counts(steps: Any, table: Any) -> Any:
     ``Episode``; both arrays, or tensors.
     """
     return (steps > table[:, TaskRow.COUNTED_FROM]) | (table[:, TaskRow.ENDING] > Ending.NONE)
-
-
-def new_results(rows: int, entries: int) -> Results:
-    """Empty arrays for the results of all rows."""
-    return Results(
-        np.empty((rows, entries), dtype=np.float32),
-        np.empty((rows, RESULT_ROWS)),
-        np.empty((rows, len(Flag)), dtype=np.bool_),
-    )

@@ -91,12 +91,10 @@ class Fault(Settings):
         here = random.uniform() < self.probability if self.probability < 1 else True
         value = random.uniform(*self.value) if isinstance(self.value, tuple) else (self.value or 0.0)
         begin = self.begin + (random.uniform(0, self.every) if self.every is not None else 0.0)
-        lasts = np.inf if self.lasts is None else self.lasts
-        every = np.inf if self.every is None else self.every
-        first, end = PARTS[self.part]
-        kind = Kind[self.kind.upper()]
+        lasts, every = (np.inf if each is None else each for each in (self.lasts, self.every))
         length = lasts / interval if here else 0.0
-        return [first, end, kind, value, begin / interval, length, every / interval]
+        kind = Kind[self.kind.upper()]
+        return [*PARTS[self.part], kind, value, begin / interval, length, every / interval]
 
 
 FAULTS: dict[str, Fault] = {
@@ -123,21 +121,15 @@ def faults_of(value: Any) -> tuple[Fault, ...]:
 
 MOST = 16
 """Maximum number of faults in a run."""
-ROWS = 7
+FAULT_ROWS = 7
 """Entries of a fault: first row and end of its part, kind, value; begin, length, period in plant steps."""
 
 
 class FaultArrays(NamedTuple):
     """Faults of all lanes, and the values that freeze."""
 
-    table: Array  # (lanes, faults, ROWS)
+    table: Array  # (lanes, faults, FAULT_ROWS)
     last: Array  # (rows, readings and places): as it last was; no columns without faults
-
-
-def fault_arrays(faults: tuple[Fault, ...], lanes: int, rows: int) -> FaultArrays:
-    """Arrays for the faults of all lanes; rows: lanes times controlled collectors."""
-    width = READINGS + len(Place) if faults else 0
-    return FaultArrays(np.zeros((lanes, len(faults), ROWS)), np.zeros((rows, width)))
 
 
 @inlined

@@ -39,17 +39,6 @@ class Cost(NamedTuple):
     memory: float  # bytes, of the record
     seconds: float  # of computing, on one core
 
-    @classmethod
-    def of(cls, lanes: int, steps: float, supports: int, droppers: int, moving: float, record: bool) -> Cost:
-        """Cost of a run in all lanes.
-
-        steps: time steps. supports, droppers: numbers of those recorded in each step. moving: numbers in
-        the state of all lanes together. record: whether all steps are recorded.
-        """
-        columns = SAMPLE_ROWS + supports + droppers
-        memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
-        return cls(steps, memory, steps * (lanes * STEP + moving * NUMBER))
-
     def check(self, what: str, remedy: str = "") -> None:
         """Raise InputError where the cost exceeds the machine's memory, or the time ``LONGEST``.
 
@@ -152,6 +141,23 @@ def new_plant(settings: RunSettings, lanes: int) -> Plant:
                 "memory; take fewer."
             )
     return make_plant(lanes=lanes)
+
+
+def cost_of(plant: Plant, steps: float, record: bool, record_droppers: bool) -> Cost:
+    """Cost of a run of time steps in all lanes of a plant; record: whether all of them are recorded.
+
+    Raises InputError where it is too large.
+    """
+    supports, lanes = len(plant.model.supports), plant.lanes
+    near = min(supports, int(plant.model.grid.get("window", supports)) + 2)  # the others take no memory
+    droppers = len(plant.model.droppers) if record_droppers else 0
+    columns = SAMPLE_ROWS + near + droppers
+    memory = COPIES * lanes * ((steps if record else 0) + 1.0) * columns * np.dtype(float).itemsize
+    moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
+    cost = Cost(steps, memory, steps * (lanes * STEP + moving * NUMBER))
+    remedy = ", or keep no dropper's tension (record_droppers=False)" if droppers else ""
+    cost.check(f"{steps:,.0f} time steps with {supports} supports and {droppers} droppers", remedy)
+    return cost
 
 
 class EpisodeLength:

@@ -42,12 +42,8 @@ def front_arrays(places: tuple[float, ...], train: Train, lanes: int, slowest: f
     Raises InputError where a place lies beyond the pantograph in front, or no controlled one has any.
     """
     collectors, driven = train.collectors, train.driven
-    behind = np.array(
-        [
-            collectors[number].distance - collectors[number - 1].distance if number else 0.0
-            for number in driven
-        ]
-    )
+    gaps = np.diff([own.distance for own in collectors], prepend=collectors[0].distance)
+    behind = gaps[list(driven)]
     if places and not behind.any():
         raise InputError(
             "front is what a pantograph in front measured, and no controlled one has any in front of it; "
@@ -113,18 +109,13 @@ class MemoryArrays(NamedTuple):
 
 
 def memory_arrays(
-    times: tuple[float, ...],
-    spans: int,
-    alignment: Alignment,
-    shape: tuple[int, int],
-    speeds: tuple[float, float],
-    interval: float,
+    layout: Any, alignment: Alignment, shape: tuple[int, int], speeds: tuple[float, float], interval: float
 ) -> MemoryArrays:
-    """Arrays for rows with actions, ``shape``; times: until the places (s); speeds: lowest, highest (m/s).
+    """Arrays for rows with actions, ``shape``, as a ``Layout`` asks for; speeds: lowest, highest (m/s).
 
     Raises InputError where the fastest train covers more than the shortest span until a place.
     """
-    rows, actions = shape
+    (rows, actions), times, spans = shape, layout.memory, layout.memory_spans
     if not times:
         return MemoryArrays(np.zeros(0), 0, np.zeros((rows, 0, 2 + actions)))
     shortest, longest = float(alignment.lengths.min()), float(alignment.lengths.max())

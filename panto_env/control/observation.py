@@ -99,6 +99,8 @@ class Layout:
 
 OBSERVATION_SETTINGS = ("observation", *(field.name for field in fields(Layout)[2:]))
 """Settings of a run that determine only the observation."""
+NOT_OF_A_RUN = (*OBSERVATION_SETTINGS, "reward", "cost", "settle")
+"""Settings that only concern policies; the distance of a run includes what settles."""
 
 
 def _branches(writers: Sequence[Callable[..., Any]]) -> Callable[..., Any]:

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from ..backend import LaneThreads, bind, inlined, open_packed, pack
-from ..backend.cuda import Columns, map_arrays
+from ..backend.cuda import TILE, Columns, map_arrays
 from ..base.arrays import Array
 from ..plant.state import Row
 from .episode import Flags, Results, counts
@@ -24,9 +24,9 @@ from .task import Task
 
 
 class Begun(NamedTuple):
-    """What is told of each lane's episode."""
+    """What is told of each lane's episode: the speed of its train (m/s), (lanes,)."""
 
-    speed: Array  # of the train (m/s), (lanes,)
+    speed: Array
 
 
 RUN, SENSORS, EPISODE, RUNNING, RESULTS, BEGUN = 4, 5, 7, 8, 9, 10
@@ -66,6 +66,17 @@ class TensorLanes:
         if self.task.odometers.drawn:
             noises.append((self.task.odometers.noise, self._episode.odometer))
         self._noises = [(torch.tensor(noise.rms, device=device), arrays) for noise, arrays in noises]
+        self._arguments = settings, lanes, starts, device
+
+    def __reduce__(self) -> Any:
+        """A copy has tensors of its own, and a kernel that is bound to these."""
+        return TensorLanes, self._arguments, (self.task, self._bank.blocks, self._columns.blocks)
+
+    def __setstate__(self, state: Any) -> None:
+        self.task, *contents = state
+        for columns, blocks in zip((self._bank, self._columns), contents, strict=True):
+            for block, numbers in blocks.items():
+                columns.blocks[block].copy_(numbers)
 
     def draw_starts(self, random: Callable[[int], np.random.Generator]) -> None:
         """Draw all starts, each from its own generator, and run them in."""
@@ -117,18 +128,13 @@ class TensorLanes:
 
     def _read(self, lanes: torch.Tensor, *numbers: int) -> None:
         """Copy some tuples of lanes, (n,), to the first ones of the task on the processor."""
-        arrays = arrays_of(self.task)
         for number in numbers:
-            self._columns.read(number, lanes, arrays[number])
+            self._columns.read(number, lanes, arrays_of(self.task)[number])
 
 
 def _tile(lanes: int, device: torch.device) -> int:
     """Lanes in a tile: on the processor all lie in one."""
-    if device.type != "cuda":
-        return lanes
-    from ..backend.cuda import TILE
-
-    return TILE
+    return TILE if device.type == "cuda" else lanes
 
 
 def _bound(columns: Columns) -> Callable[[], Any]:

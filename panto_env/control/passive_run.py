@@ -30,8 +30,7 @@ from ..metrics.trajectory import Trajectory
 from ..plant.pantograph.schema import PantographData
 from ..plant.sensors import Reading
 from .entries import CENTRES, READING_ENTRIES, Entry, present
-from .identity import NOT_OF_A_RUN
-from .observation import Layout
+from .observation import NOT_OF_A_RUN, Layout
 from .settings import RunSettings, as_designed
 
 
@@ -94,12 +93,12 @@ RunPassively = Callable[[RunSettings], Trajectory]
 """Function from settings to the record of a run without control."""
 
 
-class PassiveRun(BySpeed):
-    """Means, then standard deviations over the settled spans; each as in ``Reading``, then ``LOW_PASSED``."""
+def passive_run(settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> BySpeed:
+    """Means, then standard deviations over the settled spans; each as in ``Reading``, then ``LOW_PASSED``.
 
-    def __init__(self, settings: RunSettings, speeds: tuple[float, float], run: RunPassively) -> None:
-        """speeds: the range (m/s)."""
-        super().__init__(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
+    speeds: the range (m/s).
+    """
+    return BySpeed(speeds, KNOT_DISTANCE, partial(_at_speed, settings, run))
 
 
 def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[float]:
@@ -108,8 +107,7 @@ def _at_speed(settings: RunSettings, run: RunPassively, speed: float) -> list[fl
     own = {name: getattr(usual if name in NO_MATTER else settings, name) for name in RunSettings.model_fields}
     designed = as_designed(RunSettings.model_construct(**own), speed)
     inputs = designed.model_dump(mode="json", exclude=NO_MATTER, serialize_as_any=True)
-    line = designed.line.name
-    means, spreads = cached_for(line, "passive_run", inputs, lambda: _measured(run(designed)))
+    means, spreads = cached_for(designed.line.name, "passive_run", inputs, lambda: _measured(run(designed)))
     return [*means, *spreads]
 
 
@@ -130,7 +128,7 @@ _ROWS = {name: row for row, (name, _, _) in enumerate(READING_ENTRIES)}
 _ROWS["remembered force"] = _ROWS["contact force"]
 
 
-def normalised(layout: Layout, run: PassiveRun, speed_kmh: tuple[float, float]) -> Layout:
+def normalised(layout: Layout, run: BySpeed, speed_kmh: tuple[float, float]) -> Layout:
     """The layout with speed and readings, present and earlier, normalised by a passive run.
 
     speed_kmh: the given range of speeds (km/h). Raises InputError where a reading has no spread.
@@ -139,7 +137,7 @@ def normalised(layout: Layout, run: PassiveRun, speed_kmh: tuple[float, float]) 
     return replace(layout, entries=entries, normalise=speed_kmh)
 
 
-def _normalised(entry: Entry, run: PassiveRun) -> Entry:
+def _normalised(entry: Entry, run: BySpeed) -> Entry:
     if entry.name == "speed":
         half = 0.5 * float(run.speeds[-1] - run.speeds[0])
         return entry._replace(centre=float(run.speeds.mean()), scale=half or CENTRES["speed"][1])
@@ -178,14 +176,13 @@ MakePassiveMean = Callable[[RunSettings, int, SpanChoice], PassiveMean]
 
 @dataclass(frozen=True)
 class Trim:
-    """Static forces that give the required mean forces, by speed."""
+    """Static forces of all pantographs that give the required mean forces of one run."""
 
-    speeds: tuple[float, ...]  # m/s, rising
-    static_forces: tuple[Forces, ...]  # at each speed
+    static_forces: Forces
 
-    def static_force(self, speed: float, collector: int = 0) -> float:
-        """Static force of a collector (N) at a speed (m/s)."""
-        return float(np.interp(speed, self.speeds, [forces[collector] for forces in self.static_forces]))
+    def static_force(self, _: float, collector: int = 0) -> float:
+        """Static force of a collector (N), the same at every speed."""
+        return self.static_forces[collector]
 
 
 def target_mean(settings: RunSettings, speed: float, collector: int = 0) -> float | None:
@@ -246,11 +243,13 @@ def trim_of_pass(
         "seed": seed,
         "spans": spans,
     }
-    line = settings.line.name
     forces = cached_for(
-        line, "mean_force", inputs, lambda: _solve(settings, passive_mean(settings, seed, spans))
+        settings.line.name,
+        "mean_force",
+        inputs,
+        lambda: _solve(settings, passive_mean(settings, seed, spans)),
     )
-    return Trim((low,), (tuple(forces),))
+    return Trim(tuple(forces))
 
 
 class TrimAsDesigned(BySpeed):
@@ -260,17 +259,17 @@ class TrimAsDesigned(BySpeed):
         self, settings: RunSettings, speeds: tuple[float, float], passive_mean: MakePassiveMean
     ) -> None:
         """speeds: lowest and highest (m/s)."""
-        super().__init__(speeds, TRIM_DISTANCE, partial(_trimmed_as_designed, settings, passive_mean))
+
+        def forces_at(speed: float) -> Forces:
+            trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
+            assert trim is not None  # a mean force is required at every speed or at none
+            return trim.static_forces
+
+        super().__init__(speeds, TRIM_DISTANCE, forces_at)
 
     def static_force(self, speed: float, collector: int = 0) -> float:
         """Static force of a collector (N) at a speed (m/s). InputError where its mean cannot be met."""
         return float(self.at(speed, collector))
-
-
-def _trimmed_as_designed(settings: RunSettings, passive_mean: MakePassiveMean, speed: float) -> Forces:
-    trim = trim_of_pass(as_designed(settings, speed), 0, None, passive_mean)
-    assert trim is not None  # a mean force is required at every speed or at none
-    return trim.static_forces[0]
 
 
 def _solve(settings: RunSettings, means: PassiveMean) -> Forces:
@@ -280,61 +279,37 @@ def _solve(settings: RunSettings, means: PassiveMean) -> Forces:
     """
     speed, riding = settings.speeds[0], settings.riding
     targets = [target_mean(settings, speed, number) for number in range(len(riding))]
-    searches = [
-        None if target is None else _Search(settings, own, target)
-        for own, target in zip(riding, targets, strict=True)
+    aerodynamic = [own.nominal_force(speed) - own.static_force for own in riding]
+
+    def possible(k: int, force: float) -> float:
+        if force < 0:
+            raise InputError(
+                f"A mean force of {targets[k]:.1f} N cannot be met by '{riding[k].name}' at "
+                f"{settings.speed_kmh[0]:g} km/h: its aerodynamic uplift alone is {aerodynamic[k]:.1f} N; "
+                "set a larger mean_force, or use another pantograph."
+            )
+        return force
+
+    forces = [
+        riding[k].static_force if target is None else possible(k, float(target - aerodynamic[k]))
+        for k, target in enumerate(targets)
     ]
+    before: dict[int, tuple[float, float]] = {}  # the last force of a search, and what its mean missed
     for _ in range(MOST_RUNS):
-        forces = tuple(
-            own.static_force if search is None else search.force
-            for own, search in zip(riding, searches, strict=True)
-        )
-        found = [
-            search is None or search.meets(mean) for search, mean in zip(searches, means(forces), strict=True)
-        ]
-        if all(found):
-            return forces
-        for search, met in zip(searches, found, strict=True):
-            if search is not None and not met:
-                search.go_on()
+        found = means(tuple(forces))
+        missing = {k: target - found[k] for k, target in enumerate(targets) if target is not None}
+        missing = {k: missed for k, missed in missing.items() if not abs(missed) <= TOLERANCE}
+        if not missing:
+            return tuple(forces)
+        for k, missed in missing.items():
+            slope = (before[k][1] - missed) / (forces[k] - before[k][0]) if k in before else 1.0
+            before[k] = forces[k], missed
+            forces[k] = possible(k, forces[k] + missed / (slope if slope > 0 else 1.0))
     raise InputError(
         f"No static force of {named(riding)} was found that gives a mean force of "
         f"{' and '.join(f'{target:.1f}' for target in targets if target is not None)} N on "
         f"'{settings.line.name}' at {settings.speed_kmh[0]:g} km/h; set the static force itself."
     )
-
-
-class _Search:
-    def __init__(self, settings: RunSettings, pantograph: PantographData, target: float) -> None:
-        speed = settings.speeds[0]
-        self._aerodynamic = pantograph.nominal_force(speed) - pantograph.static_force
-        self._name, self._speed_kmh, self._target = pantograph.name, settings.speed_kmh[0], target
-        self._before: tuple[float, float] | None = None
-        self._missing = 0.0
-        self.force = float(target - self._aerodynamic)
-        self._check()
-
-    def _check(self) -> None:
-        if self.force < 0:
-            raise InputError(
-                f"A mean force of {self._target:.1f} N cannot be met by '{self._name}' at "
-                f"{self._speed_kmh:g} km/h: its aerodynamic uplift alone is {self._aerodynamic:.1f} N; set "
-                "a larger mean_force, or use another pantograph."
-            )
-
-    def meets(self, mean: float) -> bool:
-        """Whether the force gives the mean (N), which a run with it had."""
-        self._missing = self._target - mean
-        return abs(self._missing) <= TOLERANCE
-
-    def go_on(self) -> None:
-        """Try another force."""
-        slope, missing = 1.0, self._missing
-        if self._before is not None:
-            slope = (self._before[1] - missing) / (self.force - self._before[0])
-        self._before = self.force, missing
-        self.force += missing / (slope if slope > 0 else 1.0)
-        self._check()
 
 
 def named(riding: Sequence[PantographData]) -> str:

@@ -1,4 +1,4 @@
-"""The record of a lane's run, and the messages for a run that ended early or diverged."""
+"""The record of a lane's run with its identity, its figures so far, and why it ended early or diverged."""
 
 from __future__ import annotations
 
@@ -10,13 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, to_kmh
+from ..base.checksums import __version__
 from ..base.errors import InputError
+from ..base.files import finite
 from ..catalog.values import by_value
 from ..metrics.compliance import LineFacts
 from ..metrics.trajectory import Trajectory
+from ..plant.pantograph.schema import PantographData
+from ..plant.plant import Plant
 from ..plant.state import LARGEST_HEIGHT, LARGEST_SPEED, Ending, Row, reason
-from .identity import identity
+from .observation import NOT_OF_A_RUN
 from .passive_run import named, target_mean
+from .settings import RunSettings
 from .state import TaskRow
 
 if TYPE_CHECKING:
@@ -24,6 +29,12 @@ if TYPE_CHECKING:
 
 LARGEST_DEVIATION = 2e3
 """Mean deviation of the contact force from its static value (N), ten times any real one: it has diverged."""
+
+SERIES = {"head": Row.HEAD_HEIGHT, "frame": Row.FRAME_HEIGHT, "wire": Row.WIRE_HEIGHT} | {
+    row.name.lower(): row
+    for row in (Row.CONTACT_FORCE, Row.HEAD_VELOCITY, Row.FRAME_VELOCITY, Row.FRAME_FORCE, Row.HEAD_FORCE)
+}
+"""Rows of samples that a record has under these names."""
 
 
 def diverged(task: Any, rows: Any, deviation: Array, height: Array) -> NDArray[np.bool_]:
@@ -64,6 +75,47 @@ def _bound(task: Task, lane: int) -> str:
     return f"the contact force was over {LARGEST_DEVIATION:,g} N from its static value in the mean"
 
 
+def figures_of(task: Task, rows: Any) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Figures of several rows, (n,), by name, and which of them have none, because they diverged."""
+    lanes, agents = np.divmod(np.arange(task.lanes * task.agents)[rows], task.agents)
+    collectors = np.array(task.episode.controlled)[agents]
+    table, run = task.episode.table[rows], task.plant.run.table[collectors, lanes]
+    supports, peak = task.plant.model.supports, task.running.peak[rows]
+    behind = np.array([own.distance for own in task.plant.train.collectors])[collectors]
+    stride, steps, samples = run[:, Row.STRIDE], run[:, Row.STEP], table[:, TaskRow.SAMPLES]
+    with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
+        shift = table[:, TaskRow.DEVIATION] / samples
+        mean = run[:, Row.NOMINAL_FORCE] + shift
+        std = np.sqrt(np.maximum(table[:, TaskRow.SQUARED_DEVIATION] / samples - shift**2, 0.0))
+        begin = steps - samples
+        shifted = task.plant.ahead(lanes, np.stack([begin, steps], axis=1)).T
+        # Positions of the first and last sample: half a step before each end.
+        first = (begin - 0.5) * stride + shifted[0] - behind
+        last = (steps - 0.5) * stride + shifted[1] - behind
+        passed = (supports > first[:, None] - 1e-6) & (supports < last[:, None] + 1e-6)
+        largest = np.max(np.where(passed, peak, -np.inf), axis=1, initial=-np.inf)
+        changes = np.maximum(samples - 1, 1.0)
+        figures = {
+            "mean": mean,
+            "std": std,
+            "statistical_max": mean + 3 * std,
+            "statistical_min": mean - 3 * std,
+            "max": table[:, TaskRow.MAX],
+            "min": table[:, TaskRow.MIN],
+            "max_uplift": np.where(passed.any(axis=1), largest, np.nan),
+            "contact_loss": 100 * table[:, TaskRow.ALL_LOSS_STEPS] / samples,
+            "cost_function": table[:, TaskRow.ALL_COST],
+            "effort": np.sqrt(table[:, TaskRow.SQUARED_EFFORT] / samples),
+            "effort_rate": np.sqrt(table[:, TaskRow.SQUARED_CHANGE] / changes) / task.plant.time_step,
+            "distance": samples * stride + (shifted[1] - shifted[0]),
+        }
+    distance = figures["distance"]
+    deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
+    shares = np.array([own.share_at_head for own in task.settings.riding])[collectors]
+    deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
+    return figures, diverged(task, rows, deviation, run[:, Row.WIRE_HEIGHT])
+
+
 def trajectory(
     task: Task, lane: int, policy: str = "passive", seed: int = 0, *, last: bool = False
 ) -> Trajectory:
@@ -100,14 +152,7 @@ def _of_collector(task: Task, lane: int, collector: int, policy: str, seed: int,
     return Trajectory(
         time=(np.arange(steps) + 0.5)[on_line] * plant.time_step,
         position=position[on_line],
-        contact_force=rows[:, Row.CONTACT_FORCE].copy(),
-        head=rows[:, Row.HEAD_HEIGHT].copy(),
-        frame=rows[:, Row.FRAME_HEIGHT].copy(),
-        wire=rows[:, Row.WIRE_HEIGHT].copy(),
-        head_velocity=rows[:, Row.HEAD_VELOCITY].copy(),
-        frame_velocity=rows[:, Row.FRAME_VELOCITY].copy(),
-        frame_force=rows[:, Row.FRAME_FORCE].copy(),
-        head_force=rows[:, Row.HEAD_FORCE].copy(),
+        **{name: rows[:, row].copy() for name, row in SERIES.items()},
         uplift=uplift if last else uplift.copy(),
         support_position=plant.model.supports,
         dropper_force=tension if last else tension.copy(),
@@ -146,3 +191,39 @@ def ending(task: Task, lane: int) -> str:
 
 def _ending(task: Task, lane: int) -> Ending:
     return Ending(int(task.episode.table[lane * task.agents, TaskRow.ENDING]))
+
+
+OF_TRAINS = ("pantographs", "distances", "controlled")
+"""Settings that say nothing of a train with one pantograph."""
+
+
+def plain(settings: RunSettings) -> dict[str, Any]:
+    """Settings by name as plain data; line and pantograph only by their names."""
+    alone = () if settings.pantographs else OF_TRAINS
+    values = settings.model_dump(mode="json", exclude={*NOT_OF_A_RUN, *alone}, serialize_as_any=True)
+    names: dict[str, Any] = {name: getattr(settings, name).name for name in ("catenary", "pantograph")}
+    if settings.pantographs:
+        names["pantographs"] = [own.name for own in settings.pantographs]
+    table: dict[str, Any] = finite(values | names)
+    return table
+
+
+def identity(settings: RunSettings, plant: Plant, distance: float) -> dict[str, Any]:
+    """Identity of a run over ``distance`` (m): version, settings, time step (s), spans and grid."""
+    resulting = {"time_step": plant.time_step, "spans": plant.spans, "distance": distance}
+    grid = plant.model.grid or dict.fromkeys(("spacing", "window", "precision"))
+    return {"version": __version__, **plain(settings), **resulting, **grid}
+
+
+def settings_of(run: Trajectory) -> dict[str, Any]:
+    """Settings with which a run can be repeated, but for those that only concern policies.
+
+    The inverse of ``identity``. Raises KeyError or ValueError where something is missing or not valid.
+    """
+    design, known = run.designed, run.settings.get("known_pantograph")
+    values = {"catenary": design.line, "pantograph": design.pantograph, "pantographs": design.pantographs}
+    values["known_pantograph"] = PantographData.model_validate(known) if known else None
+    given = {**run.settings, **values}.items()
+    return {
+        name: value for name, value in given if name in RunSettings.model_fields and value not in (None, ())
+    }

@@ -19,7 +19,6 @@ from .episode import Results
 from .memory import forget
 from .reward import limits
 from .state import Result, TaskRow
-from .step import no_figures
 
 if TYPE_CHECKING:
     from .task import Task
@@ -36,7 +35,7 @@ class Starts(NamedTuple):
     pantographs: Sequence[Sequence[PantographData]]  # of each lane's collectors; empty where lanes are alike
     way: Array  # (lanes,): distance of the run-in (m)
     drift: Array | None  # (lanes, drifting): of the speeds; None where these are constant
-    faults: Array | None = None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
+    faults: Array | None  # (lanes, faults, entries of ``FaultArrays.table``); None where none are
 
 
 def _draw(task: Task, lanes: Any, random: Callable[[int], np.random.Generator]) -> Starts:
@@ -100,8 +99,7 @@ def reset(task: Task, lanes: Any, random: LaneGenerators, results: Results) -> N
     run_in = np.minimum(run_in, end // length.control_steps - 1).astype(np.int64)
     counted_from = np.zeros((len(distances), len(lanes)))
     for agent, distance in enumerate(distances):
-        uncounted = distance - distances[0] + length.settling
-        if uncounted:
+        if uncounted := distance - distances[0] + length.settling:
             counted_from[agent] = length.plant_steps(drawn.speed, run_in, drawn.drift, uncounted)
     at_start = [_at_start(task, agent, lanes) for agent in range(task.agents)]
     _begin(task, lanes, at_start, end, counted_from)
@@ -131,7 +129,8 @@ def _at_start(task: Task, agent: int, lanes: Any) -> Array:
     """Rows of a controlled collector in lanes, (n, rows of ``TaskRow``), wherever their episodes begin."""
     collector = task.episode.controlled[agent]
     start, pantograph = task.plant.run.table[collector, lanes], task.settings.riding[collector]
-    values = np.tile(no_figures(task.episode.table.shape[1]), (len(lanes), 1))
+    values = np.zeros((len(lanes), task.episode.table.shape[1]))
+    values[:, TaskRow.MAX], values[:, TaskRow.MIN] = -np.inf, np.inf  # no figures yet
     nominal = start[:, Row.NOMINAL_FORCE]
     low = nominal.argmin()
     if not nominal[low] > 0:  # the reward is relative to it

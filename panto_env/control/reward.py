@@ -63,12 +63,7 @@ REWARDS: dict[str, Reward] = {
     # What the benchmark measures: sigma relative to the passive run's, at its mean force. Without a weight
     # for the mean, an agent would simply reduce the contact force, and with it the swing.
     "agent": Reward(
-        cost_function=0.0,
-        contact_loss=1.0,
-        rate=0.1,
-        mean_force=150.0,
-        low_passed=1.0,
-        target="passive",
+        cost_function=0.0, contact_loss=1.0, rate=0.1, mean_force=150.0, low_passed=1.0, target="passive"
     ),
 }
 

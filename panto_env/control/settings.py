@@ -366,11 +366,9 @@ class RunSettings(Numerics):
         if not isinstance(settings.catenary, CatenaryData):
             return settings
         conditions = settings.on_line(settings.catenary).line_condition
-        return (
-            settings
-            if conditions == settings.line_condition
-            else handler({**values, "catenary": settings.catenary, "line_condition": conditions})
-        )
+        if conditions == settings.line_condition:
+            return settings
+        return handler({**values, "catenary": settings.catenary, "line_condition": conditions})
 
     def on_line(self, line: CatenaryData) -> Self:
         """These settings on another line, in the conditions in which runs on it are."""
@@ -481,13 +479,11 @@ class RunSettings(Numerics):
     @property
     def runs(self) -> Runs:
         """The runs for which the plant is built."""
-        slow, quick = self.speeds
-        drift = largest_drift(self.drift)
-        train = self.train
+        (slow, quick), drift, train = self.speeds, largest_drift(self.drift), self.train
         contacts = [own.pantograph for own in train.collectors if own.pantograph.hard_contact]
         hard = max((float(own.contact_stiffness) for own in contacts), default=0.0)
-        speeds, conditions = (slow - drift, quick + drift), self.line_condition
-        return Runs(speeds, self.control_interval, conditions, hard, train.length)
+        speeds = slow - drift, quick + drift
+        return Runs(speeds, self.control_interval, self.line_condition, hard, train.length)
 
     @property
     def numerics(self) -> Numerics:
@@ -502,8 +498,7 @@ def far_enough(settings: RunSettings) -> RunSettings:
     after a sequence of spans keeps those, and the run goes to its last span.
     """
     line = settings.line
-    given = settings.distance is not None or settings.spans is not None
-    if given or line.ends:
+    if settings.distance is not None or settings.spans is not None or line.ends:
         return settings
     last = max(LAST_USUAL, line.spans - 1)
     distance = line.alignment(last).length

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
-
-import numpy as np
 
 from ..backend import NOT_NEGATIVE, inlined, kernel, open_packed
 from ..base.arrays import Array
-from ..metrics.low_pass import low_pass_sections
 from ..plant.alignment import between_supports
 from ..plant.catenary.protocol import ending_by_wire
 from ..plant.sensors import take_first_readings, take_readings
-from ..plant.state import ENDING, LARGEST_HEIGHT, PLACE, ROW, Row
+from ..plant.state import ENDING, LARGEST_HEIGHT, PLACE, ROW
 from ..plant.step import record_lane, step_lane
 from ..plant.train import mean_stride, place_on_line, position
 from .faults import spoil_command, spoil_readings
@@ -38,7 +34,7 @@ from .reward import (
     forget_reward,
     steps_left,
 )
-from .state import FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW, TaskRow
+from .state import FLAG, NOW, RESULT, RESULT_ROWS, TASK_ROW
 
 
 class RunningFigures(NamedTuple):
@@ -47,63 +43,6 @@ class RunningFigures(NamedTuple):
     sections: Array  # (sections, 6): EN 50317's filter, second-order sections
     settled: Array  # (2 sections,): its state settled at 1 N
     peak: Array  # (lanes, supports): maximum uplift (m)
-
-
-def running_figures(lanes: int, supports: int, time_step: float) -> RunningFigures:
-    """Arrays for the running figures of all lanes; time_step: s."""
-    sections, settled = low_pass_sections(time_step)
-    return RunningFigures(sections.copy(), settled.flatten(), np.zeros((lanes, supports)))
-
-
-def no_figures(rows: int) -> Array:
-    """Values of a number of rows of ``TaskRow`` at the start of an episode, (rows,)."""
-    values = np.zeros(rows)
-    values[TaskRow.MAX], values[TaskRow.MIN] = -np.inf, np.inf
-    return values
-
-
-def figures_so_far(
-    table: Array,
-    peak: Array,
-    run: Array,
-    supports: Array,
-    time_step: float,
-    ahead: Callable[[Array], Array],
-    behind: Array,
-) -> dict[str, Array]:
-    """The ``Figures`` of runs so far, by name, (runs,) each.
-
-    table: (runs, rows of TaskRow). peak: (runs, supports). run: (runs, rows of Row). supports: their
-    positions (m). time_step: s. ahead: from numbers of steps, (runs, n), to the lead of the trains over
-    steady ones (m), (runs, n). behind: distance of the collectors behind the first ones (m), (runs,).
-    """
-    stride, steps = run[:, Row.STRIDE], run[:, Row.STEP]
-    samples = table[:, TaskRow.SAMPLES]
-    shift = table[:, TaskRow.DEVIATION] / samples
-    mean = run[:, Row.NOMINAL_FORCE] + shift
-    std = np.sqrt(np.maximum(table[:, TaskRow.SQUARED_DEVIATION] / samples - shift**2, 0.0))
-    begin = steps - samples
-    shifted = ahead(np.stack([begin, steps], axis=1)).T
-    # Positions of the first and last sample: half a step before each end.
-    first = (begin - 0.5) * stride + shifted[0] - behind
-    last = (steps - 0.5) * stride + shifted[1] - behind
-    passed = (supports > first[:, None] - 1e-6) & (supports < last[:, None] + 1e-6)
-    largest = np.max(np.where(passed, peak, -np.inf), axis=1, initial=-np.inf)
-    changes = np.maximum(samples - 1, 1.0)
-    return {
-        "mean": mean,
-        "std": std,
-        "statistical_max": mean + 3 * std,
-        "statistical_min": mean - 3 * std,
-        "max": table[:, TaskRow.MAX],
-        "min": table[:, TaskRow.MIN],
-        "max_uplift": np.where(passed.any(axis=1), largest, np.nan),
-        "contact_loss": 100 * table[:, TaskRow.ALL_LOSS_STEPS] / samples,
-        "cost_function": table[:, TaskRow.ALL_COST],
-        "effort": np.sqrt(table[:, TaskRow.SQUARED_EFFORT] / samples),
-        "effort_rate": np.sqrt(table[:, TaskRow.SQUARED_CHANGE] / changes) / time_step,
-        "distance": samples * stride + (shifted[1] - shifted[0]),
-    }
 
 
 @inlined

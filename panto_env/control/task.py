@@ -12,14 +12,15 @@ from ..backend import LaneThreads, bind, copy_whole, pack
 from ..base.arrays import Array, Lanes
 from ..base.errors import InputError, shown
 from ..metrics.figures import Figures, SpanChoice, settled_spans
+from ..metrics.low_pass import low_pass_sections
 from ..metrics.trajectory import Trajectory
 from ..plant.plant import Plant
 from ..plant.sensors import Noise, Odometers
 from ..plant.state import Row
 from .arguments import not_finite
 from .entries import DEVIATIONS, ESTIMATED
-from .episode import Flags, Results, counts, new_episode, new_results
-from .length import Cost, EpisodeLength, arrays_of, new_plant
+from .episode import Flags, Results, counts, new_episode
+from .length import EpisodeLength, cost_of, new_plant
 from .observation import Context, Layout
 from .passive_run import (
     ADVICE,
@@ -27,20 +28,20 @@ from .passive_run import (
     SPREADS,
     Forces,
     PassiveMean,
-    PassiveRun,
     Trim,
     TrimAsDesigned,
     named,
     normalised,
+    passive_run,
     target_mean,
     trimmed,
     warn_of_spring,
 )
-from .record import diverged, divergence, ending, trajectory
+from .record import divergence, ending, figures_of, trajectory
 from .reset import LaneGenerators, reset
 from .settings import RunSettings
-from .state import TaskRow
-from .step import control_steps, figures_so_far, observe_start, running_figures
+from .state import RESULT_ROWS, Flag, TaskRow
+from .step import RunningFigures, control_steps, observe_start
 
 COASTED = 100
 """Control steps without a policy per call."""
@@ -80,40 +81,40 @@ class Task:
         warn_of_spring(settings)
         self.length = length = EpisodeLength(settings, plant)
         self.record_droppers, self.keep_samples = record_droppers, keep_samples
-        self.cost = self._cost(plant, lanes)
+        self.cost = cost_of(plant, length.most_plant_steps, keep_samples, record_droppers)
         self.layout = Layout.of(settings)
         self.known_pantograph = settings.known_pantograph or settings.controlled_pantograph
-        if settings.normalise is not None and settings.observation == DEVIATIONS:
-            raise InputError(
-                "The observation 'deviations' has scales of its own, for any line; leave out normalise, or "
-                "take 'measured'."
-            )
         if settings.normalise is not None:
+            if settings.observation == DEVIATIONS:
+                raise InputError(
+                    "The observation 'deviations' has scales of its own, for any line; leave out normalise, "
+                    "or take 'measured'."
+                )
             known = settings.with_pantograph(plant.train.driven[0], self.known_pantograph)
-            run = PassiveRun(known, self._speeds_of_passive_runs(settings.normalise), passive_pass)
+            run = passive_run(known, self._speeds_of_passive_runs(settings.normalise), passive_pass)
             self.layout = normalised(self.layout, run, settings.normalise)
         targets = settings.controlled if settings.reward.target == "passive" else ()
         self.passive = tuple(  # that each agent's reward counts from, or none
-            PassiveRun(settings.model_copy(update={"controlled": (n,)}), length.speed_range, passive_pass)
+            passive_run(settings.model_copy(update={"controlled": (n,)}), length.speed_range, passive_pass)
             for n in targets
         )
-        self.speed = plant.speed
-        agents = len(plant.train.driven)
-        odometers = Odometers(settings.sensors.odometer, lanes * agents, plant.alignment)
+        self.plant, self.speed, self.lanes = plant, plant.speed, lanes
+        self.agents = len(plant.train.driven)  # rows of results for each lane
+        self.odometers = Odometers(settings.sensors.odometer, lanes * self.agents, plant.alignment)
         sensors, rms = self._sensors(plant, lanes)
         rows = int(length.most_plant_steps) + 1 if keep_samples else 1  # row 0 is the start
-        self.plant, self.lanes, self.agents = plant, lanes, agents  # agents: rows of results for each lane
-        arrays = odometers.arrays()
+        arrays = self.odometers.arrays()
         self.episode: Any = new_episode(settings, plant, self.layout, length.control_steps, arrays)
         self.sensors: Any = sensors
         self.samples: Any = plant.samples(rows, tension=record_droppers)
-        self.running: Any = running_figures(lanes * agents, len(plant.model.supports), plant.time_step)
-        self.noise, self.odometers = None if rms is None else Noise(rms, lanes), odometers
+        sections, settled = low_pass_sections(plant.time_step)
+        peak = np.zeros((lanes * self.agents, len(plant.model.supports)))
+        self.running: Any = RunningFigures(sections.copy(), settled.flatten(), peak)
+        self.noise = None if rms is None else Noise(rms, lanes)
         self._most_threads = threads
         self._over: Flags = np.ones(lanes, dtype=np.bool_)  # lanes whose episode has ended, or not begun
         self._any_over = True
         self.results = self.new_results()
-        copy_whole(*self._arrays)
         self._bind()
 
     def _speeds_of_passive_runs(self, normalise: tuple[float, float]) -> tuple[float, float]:
@@ -125,17 +126,6 @@ class Task:
                 f"The observation is normalised by passive runs at {low} to {high} km/h; take {ADVICE}. "
                 f"{error}"
             ) from error
-
-    def _cost(self, plant: Plant, lanes: int) -> Cost:
-        steps, supports = self.length.most_plant_steps, len(plant.model.supports)
-        window = plant.model.grid.get("window", supports)
-        near = min(supports, int(window) + 2)  # those of the others take no memory
-        droppers = len(plant.model.droppers) if self.record_droppers else 0
-        moving = sum(array.size for array in arrays_of((plant.model.wire, plant.actuators.table)))
-        cost = Cost.of(lanes, steps, near, droppers, moving, self.keep_samples)
-        remedy = ", or keep no dropper's tension (record_droppers=False)" if droppers else ""
-        cost.check(f"{steps:,.0f} time steps with {supports} supports and {droppers} droppers", remedy)
-        return cost
 
     def _sensors(self, plant: Plant, lanes: int) -> tuple[Any, tuple[float, ...] | None]:
         settings = self.settings
@@ -183,21 +173,21 @@ class Task:
         )
 
     @property
-    def _arrays(self) -> tuple[Any, ...]:
-        """The named tuples that the kernels take after those of the plant."""
-        return self.sensors, self.samples, self.episode, self.running
-
-    @property
     def arrays(self) -> tuple[Any, ...]:
         """All named tuples that the kernels take, in their order."""
-        return *self.plant.arrays, *self._arrays
+        return *self.plant.arrays, self.sensors, self.samples, self.episode, self.running
 
     def _bind(self) -> None:
+        copy_whole(self.sensors, self.samples, self.episode, self.running)
         packed = pack(*self.arrays)
         run = bind(control_steps, packed, *self.results, 0, self.lanes)
-        self._threads = threads = LaneThreads(run, self.lanes, self._most_threads)
-        alone = partial(run, *self.results, 0, 1)
-        self._plain_step = alone if self.lanes == 1 else partial(threads.step, *self.results)
+        self._threads = LaneThreads(run, self.lanes, self._most_threads)
+        step = (
+            partial(run, *self.results, 0, 1)
+            if self.lanes == 1
+            else partial(self._threads.step, *self.results)
+        )
+        self._plain_step = step
         self._observe_start = bind(observe_start, packed, *self.results, 0, self.lanes)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -206,12 +196,15 @@ class Task:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        copy_whole(*self._arrays)
         self._bind()
 
     def new_results(self) -> Results:
         """Empty arrays for the results of a step."""
-        return new_results(self.lanes * self.agents, len(self.layout.entries))
+        rows = self.lanes * self.agents
+        observation = np.empty((rows, len(self.layout.entries)), dtype=np.float32)
+        return Results(
+            observation, np.empty((rows, RESULT_ROWS)), np.empty((rows, len(Flag)), dtype=np.bool_)
+        )
 
     def begin(self, lanes: Any) -> None:
         """Mark that episodes begin in lanes, (n,)."""
@@ -226,20 +219,16 @@ class Task:
         self._observe_start(*results, int(lanes.min()), int(lanes.max()) + 1)
         idle[:] = False
 
-    def step(
-        self,
-        action: Array,
-        skip: Flags | None = None,
-        results: Results | None = None,
-    ) -> bool:
+    def step(self, action: Array, skip: Flags | None = None, results: Results | None = None) -> bool:
         """Make one control step in all lanes, except those to skip, under actions, (rows, actions).
 
         Returns whether an episode has ended. Actions are clipped to -1..1. Results go to ``results``, by
         default the task's own. Skipped lanes do not change. Raises InputError, and changes nothing, for an
         action that is not finite, or a lane whose episode has ended or not begun.
         """
-        if self._any_over:
-            self._refuse_over(skip)
+        if self._any_over and (over := self._over if skip is None else self._over & ~skip).any():
+            lane = np.flatnonzero(over)[0]
+            raise InputError(f"The episode of lane {lane} has ended or not begun; reset the lane first.")
         self.episode.action[...] = action
         if self.noise is not None:
             self.noise.prepare(self.sensors, skip)
@@ -249,19 +238,10 @@ class Task:
         if skip is None and results is None:
             return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible
         results = results or self.results
-        if skip is None:
-            return self._evaluate(self._threads.step(*results), results)
-        self.episode.idle[:] = skip
+        self.episode.idle[:] = False if skip is None else skip
         answer = self._threads.step(*results)
         self.episode.idle[:] = False
         return self._evaluate(answer, results, skip)
-
-    def _refuse_over(self, skip: Flags | None) -> None:
-        over = self._over if skip is None else self._over & ~skip
-        if over.any():
-            raise InputError(
-                f"The episode of lane {np.flatnonzero(over)[0]} has ended or not begun; reset the lane first."
-            )
 
     def _evaluate(self, answer: int, results: Results, skip: Flags | None = None) -> bool:
         """Whether an episode has ended, from a kernel's answer. Raises InputError for an invalid action."""
@@ -307,10 +287,9 @@ class Task:
 
     def counts(self) -> Flags:
         """Whether the reward of each row's last step counts, (rows,); see ``episode.counts``."""
-        first, *others = self.episode.controlled
-        steps = self.plant.run.table[first, :, Row.STEP]  # a view, which is quicker
-        if others:
-            steps = self.plant.run.table[[first, *others], :, Row.STEP].T.reshape(-1)
+        steps = self.plant.run.table[self.episode.controlled[0], :, Row.STEP]  # a view, which is quicker
+        if self.agents > 1:
+            steps = self.plant.run.table[list(self.episode.controlled), :, Row.STEP].T.reshape(-1)
         found: Flags = counts(steps, self.episode.table)
         return found
 
@@ -344,28 +323,7 @@ class Task:
             raise InputError(self.divergence(row // self.agents))
         return Figures(**{name: float(value[0]) for name, value in values.items()})
 
-    def figures_of(self, rows: Any) -> tuple[dict[str, Array], Flags]:
-        """Figures of several rows, (n,), by name, and which of them have none, because they diverged."""
-        lanes, agents = np.divmod(np.arange(self.lanes * self.agents)[rows], self.agents)
-        collectors = np.array(self.episode.controlled)[agents]
-        run, supports = self.plant.run.table[collectors, lanes], self.plant.model.supports
-        with np.errstate(over="ignore", invalid="ignore"):  # of a computation that diverged
-            figures = figures_so_far(
-                self.episode.table[rows],
-                self.running.peak[rows],
-                run,
-                supports,
-                self.plant.time_step,
-                partial(self.plant.ahead, lanes),
-                np.array([own.distance for own in self.plant.train.collectors])[collectors],
-            )
-        distance = figures["distance"]
-        deviation = np.where(distance > 0, figures["cost_function"] / np.maximum(distance, 1e-9), 0.0)
-        shares = np.array([own.share_at_head for own in self.settings.riding])[collectors]
-        deviation = deviation - (1.0 - shares) * run[:, Row.NOMINAL_FORCE]  # at least so much
-        return figures, diverged(self, rows, deviation, run[:, Row.WIRE_HEIGHT])
-
-    divergence, ending, trajectory = divergence, ending, trajectory
+    divergence, ending, figures_of, trajectory = divergence, ending, figures_of, trajectory
 
 
 def passive_pass(settings: RunSettings) -> Trajectory:
@@ -388,7 +346,7 @@ def passive_mean(
     task = Task(settings)
 
     def means(forces: Forces) -> Forces:
-        task.trim = Trim((0.0,), (forces,))
+        task.trim = Trim(forces)
         task.reset(0, np.random.default_rng(seed))
         task.run_passively()
         run = task.trajectory(0, seed=seed)

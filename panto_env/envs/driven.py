@@ -93,5 +93,4 @@ class DrivenByPolicies(
         return self._seen(), reward, terminated, truncated, info
 
     def _seen(self) -> Observation:
-        seen: Observation = self._train.task.results.observation[self._rows].reshape(-1)
-        return seen
+        return self._train.task.results.observation[self._rows].reshape(-1)

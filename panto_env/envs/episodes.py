@@ -83,9 +83,8 @@ class CopiedAlone(Whole):
         if self._spec is not None:
             self._spec.max_episode_steps = self._longest
             # ``make_vec`` also adds it to the arguments; left there, a spec made from this one would differ.
-            self._spec.kwargs = {
-                k: value for k, value in self._spec.kwargs.items() if k != "max_episode_steps"
-            }
+            given = self._spec.kwargs.items()
+            self._spec.kwargs = {key: value for key, value in given if key != "max_episode_steps"}
 
     def _state(self) -> dict[str, Any]:
         return vars(self)

@@ -31,15 +31,8 @@ from .settings import VectorSettings
 # Rows of results as plain integers: members of an enum would take longer.
 REWARD, COST = int(Result.REWARD), int(Result.COST)
 CONTACT_FORCE, POSITION = int(Result.CONTACT_FORCE), int(Result.POSITION)
-INFOS = tuple(
-    zip(
-        ("contact_force", "head", "wire", "frame_force", "head_force", "position", "cost"),
-        range(CONTACT_FORCE, COST + 1),
-        strict=True,
-    )
-)
-"""Keys of infos, and the rows of results that they have."""
-REWARD_TERMS = tuple(zip(TERMS, range(Result.TERM, CONTACT_FORCE), strict=True))
+INFOS = ("contact_force", "head", "wire", "frame_force", "head_force", "position", "cost")
+"""Keys of infos that have the rows of results from CONTACT_FORCE on."""
 
 OfLane = Callable[[int], np.random.Generator]
 """Function from a lane's number to its generator."""
@@ -219,7 +212,7 @@ class LaneGroups:
         """As ``VectorLanes.begin``; episodes: of each group."""
         for group, its, own in zip(self._groups, self._lanes, episodes, strict=True):
             if lanes[its].any():
-                group.begin(lanes[its], own, partial(_of_group, random, its.start), anew)
+                group.begin(lanes[its], own, _of_group(random, its.start), anew)
 
     def step(self, action: Array, waiting: Flags | None, random: OfLane) -> bool:
         """As ``VectorLanes.step``."""
@@ -235,26 +228,21 @@ class LaneGroups:
         ended = False
         for group, its in zip(self._groups[first:last], self._lanes[first:last], strict=True):
             idle = None if waiting is None or not waiting[its].any() else waiting[its]
-            ended = group.step(action[its], idle, partial(_of_group, random, its.start)) or ended
+            ended = group.step(action[its], idle, _of_group(random, its.start)) or ended
         return int(ended)
 
     def answer(self) -> Answer:
         """Results of all lanes."""
         answers = [group.answer() for group in self._groups]
         results = zip(*(each.results for each in answers), strict=True)
-        return Answer(
-            Results(*(np.concatenate(parts) for parts in results)),
-            np.concatenate([each.speed_kmh for each in answers]),
-            np.concatenate([each.lanes for each in answers]),
-            np.concatenate([each.counts for each in answers]),
-        )
+        others = zip(*(each[1:] for each in answers), strict=True)
+        whole: Any = [np.concatenate(parts) for parts in others]
+        return Answer(Results(*map(np.concatenate, results)), *whole)
 
     def task_of(self, lane: int) -> tuple[Task, int]:
         """The task that a lane runs, and its number there."""
-        its, group = next(
-            (its, group) for its, group in zip(self._lanes, self._groups, strict=True) if lane < its.stop
-        )
-        return group.task_of(lane - its.start)
+        place = next(k for k, its in enumerate(self._lanes) if lane < its.stop)
+        return self._groups[place].task_of(lane - self._lanes[place].start)
 
     def figures(self, lanes: Flags) -> dict[str, Array]:
         """As ``VectorLanes.figures``."""
@@ -265,9 +253,9 @@ class LaneGroups:
         return values
 
 
-def _of_group(random: OfLane, first: int, lane: int) -> np.random.Generator:
-    """The generator of a lane of the group whose lanes begin with ``first``."""
-    return random(first + lane)
+def _of_group(random: OfLane, first: int) -> OfLane:
+    """The generators of a group whose lanes begin with ``first``."""
+    return lambda lane: random(first + lane)
 
 
 def lanes_of(settings: VectorSettings, keep_samples: bool) -> VectorLanes | LaneGroups:
@@ -317,13 +305,13 @@ def lane_infos(answer: Answer) -> dict[str, Any]:
     (_, values, _), speed_kmh, lanes, counts = answer
     rows = values.T
     infos: dict[str, Any] = {}
-    for name, row in INFOS:
-        infos[name], infos[f"_{name}"] = rows[row], lanes
+    for name, value in zip(INFOS, rows[CONTACT_FORCE:], strict=True):
+        infos[name], infos[f"_{name}"] = value, lanes
     infos["speed_kmh"], infos["_speed_kmh"] = speed_kmh, lanes
     infos["counts"], infos["_counts"] = counts, lanes
     infos["reward_terms"], infos["_reward_terms"] = {}, lanes
-    for name, row in REWARD_TERMS:
-        infos["reward_terms"][name], infos["reward_terms"][f"_{name}"] = rows[row], lanes
+    for name, value in zip(TERMS, rows[Result.TERM : CONTACT_FORCE], strict=True):
+        infos["reward_terms"][name], infos["reward_terms"][f"_{name}"] = value, lanes
     return infos
 
 

@@ -43,12 +43,9 @@ class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
         self.agents: list[str] = []
         seen = self.train.task.results.observation[0].shape
         self._shape = (len(self.train.task.actuator.places),)
-        self.observation_spaces = {
-            name: gymnasium.spaces.Box(-BOUND, BOUND, seen, np.float32) for name in self.possible_agents
-        }
-        self.action_spaces = {
-            name: gymnasium.spaces.Box(-1.0, 1.0, self._shape, np.float32) for name in self.possible_agents
-        }
+        Box, names = gymnasium.spaces.Box, self.possible_agents
+        self.observation_spaces = {name: Box(-BOUND, BOUND, seen, np.float32) for name in names}
+        self.action_spaces = {name: Box(-1.0, 1.0, self._shape, np.float32) for name in names}
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
         """Space of an agent's observation, always the same object."""
@@ -71,11 +68,7 @@ class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
     def step(
         self, actions: dict[str, Observation]
     ) -> tuple[
-        dict[str, Observation],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, dict[str, Any]],
+        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
         """Hold the actions, one for each agent, for one control interval.
 
@@ -89,16 +82,11 @@ class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
         observation, _, terminated, truncated, info = self.train.step(force)
         names = self.agents
         rewards = dict(zip(names, self.train.task.results.values[:, REWARD].tolist(), strict=True))
-        result = (
-            self._of_agents(observation),
-            rewards,
-            dict.fromkeys(names, terminated),
-            dict.fromkeys(names, truncated),
-            self._infos(info),
-        )
+        ends = dict.fromkeys(names, terminated), dict.fromkeys(names, truncated)
+        seen, infos = self._of_agents(observation), self._infos(info)
         if terminated or truncated:
             self.agents = []
-        return result
+        return seen, rewards, *ends, infos
 
     def render(self) -> NDArray[np.uint8] | None:
         """As ``PantographEnv.render``."""
@@ -113,9 +101,7 @@ class PantographParallelEnv(Whole, ParallelEnv):  # type: ignore[misc]
         return self.train.task.results.observation.reshape(-1).copy()
 
     def _of_agents(self, observation: Observation) -> dict[str, Observation]:
-        parts = np.split(observation, len(self.agents))
-        return dict(zip(self.agents, parts, strict=True))
+        return dict(zip(self.agents, np.split(observation, len(self.agents)), strict=True))
 
     def _infos(self, info: dict[str, Any]) -> dict[str, dict[str, Any]]:
-        each = info.get("pantographs", [info])
-        return dict(zip(self.agents, each, strict=True))
+        return dict(zip(self.agents, info.get("pantographs", [info]), strict=True))

@@ -177,11 +177,6 @@ class TensorSettings(VectorSettings):
         "many lanes it takes a good part of the time",
     )
 
-    @property
-    def used_starts(self) -> int:
-        """Number of starts."""
-        return self.starts or max(2, min(self.trains, USUAL_STARTS))
-
     @model_validator(mode="after")
     def _no_pictures(self) -> TensorSettings:
         if self.render_mode is not None:
@@ -213,13 +208,10 @@ def described(text: str) -> str:
 def _observation_table(kind: str) -> str:
     actuator, pantograph = actuator_settings(default("actuator")), load_pantograph(default("pantograph"))
     settings = RunSettings.model_construct(observation=kind, actuator=actuator, pantograph=pantograph)
-    rows = [
-        f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |"
-        for k, each in enumerate(Layout.of(settings).entries)
-    ]
-    return "\n".join(
-        ("| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|", *rows)
-    )
+    rows = ["| Num | Observation | Centre | Scale |", "|-----|-------------|--------|-------|"]
+    for k, each in enumerate(Layout.of(settings).entries):
+        rows.append(f"| {k} | {each.name} | {each.centre:g} | {each.scale:g} {each.unit} |")
+    return "\n".join(rows)
 
 
 def _id_table(name: str) -> str:

@@ -21,14 +21,7 @@ from ..control.episode import Flags
 from ..control.lines import draws_line
 from ..control.observation import BOUND
 from ..control.settings import read_settings
-from .episodes import (
-    CopiedAlone,
-    InUse,
-    check_whole_trains,
-    checked_options,
-    checked_seeds,
-    one_at_a_time,
-)
+from .episodes import CopiedAlone, InUse, check_whole_trains, checked_options, checked_seeds, one_at_a_time
 from .lanes import REWARD, Answer, final_infos, lane_figures, lane_infos, lanes_of
 from .settings import VectorSettings, render_metadata
 
@@ -84,6 +77,18 @@ class SharedByLanes(CopiedAlone, VectorEnv[Any, Any, Any]):
         return tuple(own for _ in range(self.num_envs))
 
     get_attr = call
+
+    def _check_begun(self: Any) -> None:
+        if not self._running:
+            raise InputError("No episode has begun; call reset before step.")
+
+    def _check_none_over(self: Any, ended: Any) -> None:
+        """With "Disabled", raise InputError where the episode of a lane has ended; ended: (lanes,)."""
+        if self.autoreset_mode == AutoresetMode.DISABLED and ended.any():
+            raise InputError(
+                f"The episode of lane {ended.tolist().index(True)} has ended; "
+                "call reset with options={'reset_mask': ...}."
+            )
 
     def set_attr(self, name: str, values: Any) -> None:
         """Raise InputError: the lanes share one environment."""
@@ -147,10 +152,7 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
 
     @one_at_a_time
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes in all lanes, or in those of ``options["reset_mask"]``, (num_envs,) of bool.
 
@@ -175,14 +177,10 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
 
         Raises InputError, and changes nothing, for actions that are not valid.
         """
-        if not self._running:
-            raise InputError("No episode has begun; call reset before step.")
+        self._check_begun()
         force = checked(actions, self._shape)
-        if self.autoreset_mode == AutoresetMode.DISABLED and self._any_ended:
-            raise InputError(
-                f"The episode of lane {np.flatnonzero(self._ended)[0]} has ended; "
-                "call reset with options={'reset_mask': ...}."
-            )
+        if self._any_ended:
+            self._check_none_over(self._ended)
         waiting = None  # in "NextStep": lanes that are reset instead of stepped
         if self._any_ended:
             waiting = self._ended
@@ -227,8 +225,7 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
         for lane in self._drawn:
             task, place = self._lanes.task_of(lane)
             title = f"lane {lane}: {task.settings.names} on {task.plant.catenary.name}"
-            reward = float(self._reward_so_far[lane])
-            frames.append(self._viewer.frame(task, place, title, reward))
+            frames.append(self._viewer.frame(task, place, title, float(self._reward_so_far[lane])))
         return tuple(frames)
 
     @one_at_a_time
@@ -242,8 +239,7 @@ class PantographVectorEnv(SharedByLanes, metaclass=NamedToStableBaselines):
 
     def _begin_at_once(self, answer: Answer) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Reset lanes whose episodes have ended; returns the observation, and infos with final values."""
-        ended = self._ended.copy()
-        final_observation = np.full(self.num_envs, None, dtype=object)
+        ended, final_observation = self._ended.copy(), np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(ended).tolist():
             final_observation[lane] = answer.results.observation[lane].copy()
         final = final_infos(final_observation, lane_infos(answer.of(ended)) | self._figures(), ended)

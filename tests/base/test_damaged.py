@@ -23,15 +23,9 @@ from panto_env.metrics import stored_run
 
 from ..documents import ROOT
 
-TRAINING = {
-    "algorithm": "ppo",
-    "total_steps": 512,
-    "lanes": 2,
-    "checkpoint_steps": 128,
-    "environment": {"id": "PantographStiffness-v0", "distance": 80.0},
-    "evaluation": {"interval_steps": 128},
-    "hyperparameters": {"n_steps": 64, "batch_size": 64},
-}
+TRAINING = {"algorithm": "ppo", "total_steps": 512, "lanes": 2, "checkpoint_steps": 128}
+TRAINING |= {"environment": {"id": "PantographStiffness-v0", "distance": 80.0}}
+TRAINING |= {"evaluation": {"interval_steps": 128}, "hyperparameters": {"n_steps": 64, "batch_size": 64}}
 EVALUATIONS = "steps,speed_kmh,seed\n128,300,1\n256,300,1\n"
 
 
@@ -84,6 +78,7 @@ def test_a_damaged_compressed_table_is_refused(damage, tmp_path):
         read_checked(path)
 
 
+@pytest.mark.slow
 def test_what_comes_with_the_project_is_whole():
     for path in FOLDER.glob("*.safetensors"):
         read_model(path)
@@ -148,10 +143,7 @@ def test_damaged_json_and_checksums_are_refused_in_one_sentence(content, folder,
     (tmp_path / LIST).write_bytes(content or b"abc")
     for attempt, words in (
         (lambda: folder.check_resumable(parse_training(TRAINING, "test")), r"settings\.json"),
-        (
-            lambda: open_parts(tmp_path, {"kind": "designs"}),
-            r"identity\.json (is not|could not be)",
-        ),
+        (lambda: open_parts(tmp_path, {"kind": "designs"}), r"identity\.json (is not|could not be)"),
         (lambda: verify(tmp_path), r"\.$"),
     ):
         with pytest.raises(InputError, match=words):

@@ -108,6 +108,7 @@ print(json.dumps([(each.returncode, each.stdout, each.stderr) for each in done])
 """
 
 
+@pytest.mark.slow
 def test_without_pyarrow_all_but_parquet_works_which_is_told_before_any_work(tmp_path):
     (tmp_path / "run.parquet").write_bytes(b"PAR1")
     lines = json.dumps([line.format(SHORT) for line in COMMANDS])

@@ -1,6 +1,5 @@
 """What can't be computed or understood is refused in one sentence, and changes nothing."""
 
-import copy
 import os
 import re
 from decimal import Decimal
@@ -29,7 +28,7 @@ from panto_env.catalog.loader import text_of
 from panto_env.control import Task
 from panto_env.control.length import SHARE
 from panto_env.control.settings import run_settings
-from panto_env.envs import BARE, IDS
+from panto_env.envs import BARE
 from panto_env.plant.catenary.flexible.model import FlexibleCatenary
 from panto_env.plant.catenary.flexible.static import hang
 from panto_env.plant.pantograph import schema as build
@@ -128,9 +127,9 @@ def test_a_sweep_of_millions_is_refused_before_it_begins():
 
 
 def test_a_sweep_s_line_may_have_more_spans():
-    (row,) = sweep({"speed_kmh": [300.0]}, line_spans=14, distance=700.0)
-    assert row["std"] == simulate(spans=14, distance=700.0, record_droppers=False).summary().std
-    assert row["std"] != sweep({"speed_kmh": [300.0]}, line_spans=20, distance=600.0)[0]["std"]
+    given = {"distance": 150.0, "spans": "all"}
+    (row,) = sweep({"speed_kmh": [300.0]}, line_spans=6, **given)
+    assert row["std"] == simulate(spans=6, distance=150.0, record_droppers=False).summary("all").std
 
 
 def test_a_folder_that_is_asked_for_is_made(tmp_path):
@@ -277,85 +276,41 @@ def test_the_command_says_its_version():
     assert panto("--version").stdout == f"panto-env {panto_env.__version__}\n"
 
 
-# --- actions, seeds and options of environments -----------------------------------------------------
+# --- actions of environments ------------------------------------------------------------------------
 
 
-def odd_actions(shape):
-    """Of an environment with this shape of actions: what is given, and a word of what is said of it."""
-    numbers = (
-        *(np.full(shape, each) for each in (0.5 + 0j, "0.5", b"1", np.datetime64("2020-01-01"))),
-        *(np.full(shape, each, object) for each in (None, HUGE, object())),
-        *(np.full(shape, each).tolist() for each in (0.5 + 0j, "0.5")),
-        *(None, "up", {}, {0.5}, [[0.5], [0.5, 0.5]], np.ma.masked_array(np.zeros(shape), mask=True)),
-    )
-    yield from ((each, "must be numbers") for each in numbers)
-    yield from ((np.full(shape, each), "must be finite") for each in (np.nan, np.inf, -np.inf))
-    for each in (0.5, np.zeros((*shape, 1)), np.zeros(0), np.zeros((7, *shape))):
-        yield each, "must have the shape"
+ODD = np.ma.masked_array(np.zeros(1), mask=True)
 
 
-def made(name, lanes, place):
-    given = {"actuator": {"place": place}}
-    if lanes is None:
-        return gymnasium.make(f"panto_env:{name}", disable_env_checker=True, **given).unwrapped
-    return gymnasium.make_vec(f"panto_env:{name}", num_envs=lanes, **given).unwrapped
+def made(name, **given):
+    return gymnasium.make(f"panto_env:{name}", disable_env_checker=True, **given).unwrapped
 
 
-def assert_same_step(env, twin, action, other):
-    for ours, theirs in zip(env.step(action)[:2], twin.step(other)[:2], strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-
-
-@pytest.mark.parametrize("lanes", [None, 3])
-@pytest.mark.parametrize(("name", "place"), [*((name, "frame") for name in IDS), ("Pantograph-v0", "both")])
-def test_an_odd_action_is_refused_and_changes_nothing(name, lanes, place):
-    env = made(name, lanes, place)
+@pytest.mark.parametrize("action", [np.full(1, 1 + 0j), np.full(1, "0.5"), np.full(1, None), ODD, [b"1"]])
+def test_what_numpy_would_cast_is_no_action(action):
+    env = made("PantographStiffness-v0")
     env.reset(seed=3)
-    shape = env.action_space.shape
-    usual = np.full(shape, 0.25, dtype=np.float32)
-    env.step(usual)
-    twin = copy.deepcopy(env)
-    for action, words in odd_actions(shape):
-        with pytest.raises(InputError, match=words) as caught:
-            env.step(action)
-        assert str(caught.value).endswith(".")
-    for _ in range(3):
-        assert_same_step(env, twin, usual, usual)
-    for sign in (1, -1):  # the largest numbers are clipped like any beyond the range
-        assert_same_step(env, twin, np.full(shape, sign * 1e308), np.full(shape, float(sign)))
+    with pytest.raises(InputError, match="must be numbers"):
+        env.step(action)
+
+
+def test_the_largest_numbers_are_clipped_like_any_beyond_the_range():
+    env, twin = (made("PantographStiffness-v0") for _ in range(2))
+    for each, action in ((env, 1e308), (twin, 1.0)):
+        each.reset(seed=3)
+        each.step(np.full(1, action))
+    np.testing.assert_array_equal(env.step(np.zeros(1))[0], twin.step(np.zeros(1))[0])
 
 
 def test_the_lane_of_a_bad_action_and_a_missing_entry_are_named():
-    env = made("PantographStiffness-v0", 3, "frame")
+    env = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=3)
     env.reset(seed=0)
     with pytest.raises(InputError, match=re.escape("The action of lane 2 must be finite, not [nan]")):
         env.step(np.array([[0.0], [0.0], [np.nan]]))
-    env = made("PantographStiffness-v0", None, "frame")
+    env = made("PantographStiffness-v0")
     observation, _ = env.reset(seed=0)
     with pytest.raises(InputError, match="no entry 'contact farce': did you mean 'contact force'"):
         env.context.layout.read(observation, "contact farce")
-
-
-SEEDS = ["abc", -1, 1.5, True, np.nan, {}, np.float64(2), np.bool_(1), np.array(3)]
-SEEDS += [["a", "b"], [-1, 2], [True, 2], [1], [1, 2, 3], [[1], [2, 3]], np.array([1.0, 2.0])]
-OPTIONS = ["abc", 5, [1], {1: 2}, np.zeros(3), [("speed_kmh", 200)], {"speed_kmh": "x"}]
-
-
-@pytest.mark.parametrize("lanes", [None, 2])
-def test_odd_seeds_and_options_are_refused_and_change_nothing(lanes):
-    env = made("PantographStiffness-v0", lanes, "frame")
-    env.reset(seed=3)
-    before = env.np_random_seed
-    for seed in SEEDS:
-        with pytest.raises(InputError, match=r"^seed must be a (whole )?number"):
-            env.reset(seed=seed)
-    for options in OPTIONS:
-        with pytest.raises(InputError):
-            env.reset(seed=4, options=options)
-    assert env.np_random_seed == before
-    usual = [None, 0, np.int64(7), np.uint8(7), 10**30]
-    for seed in [*usual, *([[1, None], np.array([1, 2]), range(2)] if lanes else [])]:
-        env.reset(seed=seed)
 
 
 # --- settings and names -----------------------------------------------------------------------------
@@ -421,7 +376,7 @@ def test_a_truth_value_is_true_or_false():
     }
     assert {name for _, name in found} >= {"bilateral", "line_values", "blind", "wear_drawn", "trusted"}
     for kind, name in found:
-        for value in ("yes", "1", 1, 0.0, None):
+        for value in ("yes", 1, None):
             with pytest.raises(InputError, match=f"key '{name}' must be true or false"):
                 parse(kind, {name: value}, "it")
     with pytest.raises(InputError, match="record_droppers must be True or False"):

@@ -75,9 +75,8 @@ def test_a_table_that_does_not_fit_is_a_list(capsys, monkeypatch):
     assert shown[-3:] == ["uplift", "  value (N): 12.5", ""]
 
 
-@pytest.mark.parametrize("words", [["list", "en50318-2002"], ["simulate", *SHORT]])
-def test_a_narrow_terminal_shows_every_number_that_a_wide_one_shows(words, monkeypatch):
-    shown = {}
+def test_a_narrow_terminal_shows_every_number_that_a_wide_one_shows(monkeypatch):
+    words, shown = ["simulate", *SHORT], {}
     for width in (40, 400):
         monkeypatch.setattr("panto_env.terminal.console._width", width)
         text = re.sub("[┃│━─┏┓┗┛┡┩┢┪├┤┼╇┳┻└┘┴╭╮╰╯]", " ", panto(*words).stdout)

@@ -3,7 +3,6 @@
 What holds for every description to draw from is tested of sections, too.
 """
 
-import json
 import math
 
 import numpy as np
@@ -18,8 +17,6 @@ from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
 from panto_env.plant.catenary.flexible.as_run import elasticity
 from panto_env.plant.catenary.flexible.static import hang
-
-from ..command import panto
 
 FAMILY = load_family("high-speed")
 DRAWN = {
@@ -61,7 +58,8 @@ def inside(value, ends):
 
 @pytest.mark.plain
 def test_drawn_lines_lie_in_the_ranges_and_hang():
-    for seed in range(30):
+    sags, armed = [], set()
+    for seed in range(12):
         line, (low, high) = line_of(seed)
         span, contact, messenger = line.span_length, line.contact_wire, line.messenger_wire
         assert inside(span, FAMILY.span_length)
@@ -78,27 +76,14 @@ def test_drawn_lines_lie_in_the_ranges_and_hang():
         assert inside(x[0] / span, FAMILY.droppers.first)
         assert hang(line).dropper_length.min() >= FAMILY.droppers.shortest
         assert (hang(line).dropper_tension > 0).all()
+        sags.append(max(line.droppers.sag) / span)
+        armed.add((line.steady_arm.mass > 0, line.steady_arm.stiffness > 0))
         wave_speed_kmh = 3.6 * math.sqrt(contact.tension / contact.mass)
         assert max(200, 0.45 * wave_speed_kmh) == pytest.approx(low)
         assert min(350, 0.7 * wave_speed_kmh) == pytest.approx(high)
-
-
-@pytest.mark.plain
-def test_the_wire_hangs_as_low_as_the_pre_sag_says():
-    """Between droppers it hangs a little lower: by at most what a string of its own weight does."""
-    sags = []
-    for seed in range(12):
-        line, _ = line_of(seed)
-        shape, wire = hang(line), line.contact_wire
-        gap = np.diff(line.droppers.positions).max()
-        own = wire.mass * 9.81 * gap**2 / (8 * wire.tension)
-        between = np.linspace(line.droppers.positions[0], line.droppers.positions[-1], 301)
-        lowest = -shape.contact.height(between).min()
-        deepest = max(line.droppers.sag)
-        assert deepest - 1e-9 <= lowest <= deepest + 1.1 * own
-        sags.append(deepest / line.span_length)
-    assert min(sags) == 0
+    assert min(sags) == 0  # a flat wire, or one with a pre-sag
     assert 0.0005 < max(sags) <= 0.001
+    assert armed == {(False, False), (True, True)}  # steady arms on some lines, with both or without
 
 
 @pytest.mark.slow
@@ -134,9 +119,9 @@ def test_the_lines_of_the_tests_stay_what_they_are(seed, span, tension, mass, dr
 def test_a_list_is_drawn_from_evenly():
     names = ["re250", "re330", "ln2"]
     counts = dict.fromkeys(names, 0)
-    for seed in range(300):
+    for seed in range(90):
         counts[line_of(seed, names)[0].name] += 1
-    assert all(70 < count < 130 for count in counts.values())
+    assert all(18 < count < 42 for count in counts.values())
     drawn, plain = np.random.default_rng(3), np.random.default_rng(3)
     on_drawn_line(run_settings({"catenary": names}), lambda: drawn)
     assert drawn.random() == plain.random()  # the other values of an episode stay
@@ -197,7 +182,7 @@ def test_where_one_line_is_needed_a_family_or_a_list_is_refused(tmp_path):
         run_settings({"catenary": "section:manline"})
 
 
-@drawn
+@pytest.mark.parametrize("source", ["family:high-speed", "section:main-line"])
 def test_a_saved_run_holds_its_line_and_can_be_repeated(source, tmp_path):
     given = {"seed": 5, "speed_kmh": DRAWN[source][1], "distance": 120.0, "line_condition": "fair"}
     run = simulate(source, **given)
@@ -210,11 +195,10 @@ def test_a_saved_run_holds_its_line_and_can_be_repeated(source, tmp_path):
     assert type(run).load(tmp_path / "run.parquet").design["catenary"] == run.design["catenary"]
 
 
-@drawn
-def test_a_required_mean_is_met_on_the_drawn_line(source):
+def test_a_required_mean_is_met_on_the_drawn_line():
     """The passes that trim the static force draw the same line and irregularity."""
-    given = {"speed_kmh": DRAWN[source][1], "line_condition": "fair", "accuracy": "fast"}
-    run = simulate(source, seed=5, mean_force=130.0, **given)
+    given = {"speed_kmh": 160, "line_condition": "fair", "accuracy": "fast"}
+    run = simulate("family:conventional", seed=5, mean_force=130.0, **given)
     assert run.summary().mean == pytest.approx(130.0, abs=0.06)
 
 
@@ -245,26 +229,3 @@ def test_a_thousand_drawn_lines_are_plausible_and_drawn_in_milliseconds():
     found = check_seeds_are_plausible(FAMILY, range(1000))
     assert np.median([one.milliseconds for one in found]) < 20
     assert np.mean([one.draws for one in found]) < 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("source", "band", "most"),
-    [("family:high-speed", "[0.1, 0.45]", 0.2), ("section:main-line", "[0.05, 0.3]", 0.155)],
-)
-def test_the_command_says_which_lines_are_not_plausible(source, band, most, tmp_path):
-    own = file_of(
-        tmp_path,
-        (f"force_deviation = {{ value = {band}", f"force_deviation = {{ value = [0.01, {most}]"),
-        source=source,
-    )
-    result = panto("family", own, "--seeds", "4", "--first", "2000", "--json")
-    assert result.returncode == 1
-    found = json.loads(result.stdout)
-    assert [one["seed"] for one in found] == [2000, 2001, 2002, 2003]
-    for one in found:
-        assert (one["outside"] == ["force_deviation"]) == (one["force_deviation"] > most)
-    text = panto("family", own, "--seeds", "4", "--first", "2000").stdout
-    count = sum(bool(one["outside"]) for one in found)
-    assert count > 0
-    assert f"{count} of 4 lines are not plausible." in " ".join(text.split())

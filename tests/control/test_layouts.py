@@ -33,4 +33,7 @@ def test_entries_are_as_stored():
 
 
 if __name__ == "__main__":
-    STORED.write_text(json.dumps(layouts(), indent=1) + "\n")
+    text = (
+        json.dumps(layouts()).replace("], [", "],\n  [").replace("]], ", "]],\n ").replace(": [[", ": [\n  [")
+    )
+    STORED.write_text(text + "\n")  # an entry a line

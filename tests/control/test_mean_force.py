@@ -22,6 +22,7 @@ from ..command import panto
 
 LIGHT = {"catenary": "periodic-stiffness", "pantograph": "identified-2dof"}
 """A line that costs little, and a pantograph whose spring pulls back by a fifth."""
+DIRECT = load_catenary("en50318-2002").model_copy(update={"system": "DC 3 kV"})
 
 
 @pytest.fixture
@@ -39,10 +40,7 @@ def empty_store(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "pantograph", "speed", "wanted", "target"),
     [
-        ("en50318-2002", "dsa250", 250.0, "en50367", 0.00097 * 250**2 + 70 - 0.05),
         ("en50318-2002", "en50318-2002", 180.0, "en50367", 0.00047 * 180**2 + 90 - 0.05),
-        ("shinkansen-simple", "identified-2dof", 300.0, 54.0, 54.0),
-        ("ohl-three-span", "own-two-mass", 250.0, 130.0, 130.0),
         ("periodic-stiffness", "identified-2dof", 300.0, "60", 60.0),
     ],
 )
@@ -57,9 +55,9 @@ def test_the_mean_is_met_over_the_evaluated_spans(line, pantograph, speed, wante
 
 
 def test_it_is_met_over_the_spans_that_are_named_and_on_ones_own_line():
-    own = {"speed_kmh": 300.0, "mean_force": 110.0, "seed": 3, "line_condition": "worn"}
+    own = LIGHT | {"mean_force": 60.0, "seed": 3, "line_condition": "worn"}
     run = simulate(**own, trimmed_over=(5, 6), distance=400.0)
-    assert run.summary((5, 6)).mean == pytest.approx(110.0, abs=0.1)
+    assert run.summary((5, 6)).mean == pytest.approx(60.0, abs=0.1)
     other = simulate(**own | {"seed": 4}, trimmed_over=(5, 6), distance=400.0)
     assert other.nominal_force != run.nominal_force
 
@@ -87,22 +85,19 @@ def test_under_a_policy_the_passive_pantograph_meets_it(tmp_path):
     assert short.summary("all").mean == pytest.approx(60.0, abs=0.1)
 
 
-def test_a_dc_line_has_another_target():
-    line = load_catenary("en50318-2002").model_copy(update={"system": "DC 3 kV"})
-    run = simulate(line, speed_kmh=160.0, mean_force="en50367", record_droppers=False)
-    assert run.target_mean == pytest.approx(0.00097 * 160**2 + 110 - 0.05)
-    assert 0 <= run.compliance()[0].margin <= 0.1
-
-
-def test_a_pantograph_says_whether_its_force_is_applied_or_the_mean():
-    """The benchmark of 2015 prescribes the mean; EN 50318:2002 has 120 N applied."""
-    assert load_pantograph("en50318-2002").force == "applied"
-    run = simulate("benchmark-2015", "benchmark-2015", 300.0, record_droppers=False)
-    assert run.target_mean == pytest.approx(157.3)
-    assert run.summary().mean == pytest.approx(157.3, abs=0.1)
-    assert run.nominal_force > 160.0
-    told = simulate("benchmark-2015", "benchmark-2015", 300.0, mean_force=130.0, record_droppers=False)
-    assert told.summary().mean == pytest.approx(130.0, abs=0.1)
+@pytest.mark.parametrize(
+    ("given", "speed", "target"),
+    [
+        ({"mean_force": "en50367"}, 250, 0.00097 * 250**2 + 70 - 0.05),
+        ({"mean_force": "en50367", "catenary": DIRECT}, 160, 0.00097 * 160**2 + 110 - 0.05),
+        ({"pantograph": "en50318-2002"}, 300, None),  # 120 N applied
+        ({"pantograph": "benchmark-2015"}, 300, 157.3),  # which prescribes the mean
+        ({"pantograph": "benchmark-2015", "mean_force": 130.0}, 300, 130.0),
+    ],
+)
+def test_what_is_required_goes_by_standard_supply_and_pantograph(given, speed, target):
+    found = target_mean(run_settings(given), speed / 3.6)
+    assert found is target or found == pytest.approx(target)
 
 
 def test_what_was_found_is_kept_and_found_again(empty_store):
@@ -144,43 +139,32 @@ def test_what_a_passive_run_does_not_depend_on_needs_no_other(empty_store):
     assert len(list(folder.iterdir())) == 1
 
 
-@pytest.mark.parametrize("damage", ["digit", "other"])
-def test_a_damaged_file_is_made_anew(empty_store, damage):
+def test_a_damaged_file_is_made_anew(empty_store):
     folder, runs = empty_store
     force = simulate(**LIGHT, mean_force=60.0).nominal_force
     (file,) = folder.iterdir()
     whole = file.read_text()
-    digit = whole.replace(repr(force), repr(force + 1.0))
-    assert digit != whole
-    file.write_text({"digit": digit, "other": "[1, 2]"}[damage])
-    tried = len(runs)
-    assert simulate(**LIGHT, mean_force=60.0).nominal_force == force
-    assert len(runs) > tried + 1
-    assert file.read_text() == whole
+    for damaged in (whole.replace(repr(force), repr(force + 1.0)), "[1, 2]"):
+        assert damaged != whole
+        file.write_text(damaged)
+        tried = len(runs)
+        assert simulate(**LIGHT, mean_force=60.0).nominal_force == force
+        assert len(runs) > tried + 1
+        assert file.read_text() == whole
 
 
-@pytest.mark.parametrize("speeds", [300.0, (290.0, 301.0)])
-def test_an_environment_meets_it_at_any_speed_it_draws(speeds):
-    settings = {**LIGHT, "speed_kmh": speeds, "mean_force": 60.0}
+def test_an_environment_meets_it_at_any_speed_it_draws(empty_store):
+    settings = {**LIGHT, "speed_kmh": (290.0, 301.0), "mean_force": 60.0}
     env = gymnasium.make("panto_env:PantographStiffness-v0", **settings).unwrapped
+    assert not empty_store[1]  # it is not slowed down before it is used
     _, info = env.reset(seed=5)
     applied, speed = env.context.nominal_force, info["speed_kmh"]
     exact = simulate(**LIGHT, speed_kmh=speed, mean_force=60.0).nominal_force
     assert applied == pytest.approx(exact, abs=0.3)
     assert applied > 65.0
-    lanes = gymnasium.make_vec(
-        "panto_env:PantographStiffness-v0", num_envs=2, **LIGHT, speed_kmh=speeds, mean_force=60.0
-    )
+    lanes = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=2, **settings)
     lanes.reset(seed=5)
     assert lanes.unwrapped.task.plant.of(0, Row.NOMINAL_FORCE) == applied
-
-
-def test_an_environment_is_not_slowed_down_before_it_is_used(empty_store):
-    _, runs = empty_store
-    env = gymnasium.make("panto_env:PantographStiffness-v0", **LIGHT, mean_force=60.0)
-    assert not runs
-    env.reset(seed=0)
-    assert runs
 
 
 @pytest.mark.parametrize(
@@ -200,12 +184,6 @@ def test_what_cannot_be_met_is_refused_in_one_sentence(given, message):
     assert "\n" not in str(caught.value)
 
 
-def test_a_sweep_meets_it_at_every_value():
-    rows = sweep({"speed_kmh": [250.0, 300.0]}, **LIGHT, mean_force="60")
-    assert [row["mean"] for row in rows] == pytest.approx([60.0, 60.0], abs=0.1)
-    assert rows[0]["nominal_force"] != rows[1]["nominal_force"]
-
-
 def test_the_command_takes_it_and_says_what_it_applied():
     light = ("--catenary", "periodic-stiffness", "--pantograph", "identified-2dof")
     command = ["simulate", *light, "--spans", "5-8", "--mean-force"]
@@ -216,20 +194,17 @@ def test_the_command_takes_it_and_says_what_it_applied():
     assert told["target_mean"] == pytest.approx(largest_mean(300 / 3.6, "AC") - TOLERANCE)
     assert told["figures"]["mean"] == pytest.approx(told["target_mean"], abs=1.0)
     assert told["nominal_force"] > told["target_mean"]
-    bad = panto(*command, "much")
-    assert bad.returncode == 2
-    assert len(bad.stderr.splitlines()) == 1
 
 
 def test_a_trim_by_speed_is_near_that_of_each_speed():
     """Between the speeds that are trimmed the mean is within a few tenths of a newton."""
-    given = {"catenary": "en50318-2002", "pantograph": "dsa250", "mean_force": "en50367"}
+    given = LIGHT | {"mean_force": 60.0}
     settings = run_settings(given | {"speed_kmh": (240.0, 250.0)})
     trim = TrimAsDesigned(settings, (240 / 3.6, 250 / 3.6), passive_mean)
     assert 3.6 * np.diff(trim.speeds).max() <= TRIM_DISTANCE
     between = far_enough(run_settings(given | {"speed_kmh": 247.3}))
     exact = trim_of_pass(between, 0, None, passive_mean)
-    assert trim.static_force(247.3 / 3.6) == pytest.approx(exact.static_forces[0][0], abs=0.3)
+    assert trim.static_force(247.3 / 3.6) == pytest.approx(exact.static_forces[0], abs=0.3)
 
 
 def made_up(**changes):
@@ -260,15 +235,8 @@ def test_it_is_nothing_at_one_speed_or_where_a_number_or_nothing_is_required():
 
 @pytest.mark.parametrize(("condition", "more"), [("fair", -1), ("fair:wind=15", 0)])
 def test_the_pass_that_met_the_mean_is_the_one_that_simulate_gives(empty_store, condition, more):
-    given = LIGHT | {
-        "pantograph": "dsa380",
-        "speed_kmh": 250.0,
-        "line_condition": condition,
-        "seed": 4,
-        "spans": 30,
-        "distance": 700.0,
-    }
-    given |= {"mean_force": 110.0, "trimmed_over": (5, 8)}
+    given = LIGHT | {"pantograph": "dsa380", "speed_kmh": 250.0, "line_condition": condition, "seed": 4}
+    given |= {"spans": 30, "distance": 700.0, "mean_force": 110.0, "trimmed_over": (5, 8)}
     expected = simulate(**given, record_droppers=False)
     with_trim = len(empty_store[1])
     from_store = passive_at_mean(**given)

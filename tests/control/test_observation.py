@@ -26,7 +26,6 @@ FIVE_MASSES = THREE_MASSES.model_copy(
         "dampings": (10.0, 15.0, 5.0, 20.0, 32.0),
     }
 )
-PANTOGRAPHS = {"three masses": THREE_MASSES, "five masses": FIVE_MASSES}
 
 
 class Episode:
@@ -109,14 +108,12 @@ class Episode:
         return names
 
 
-@pytest.fixture(scope="module", params=PANTOGRAPHS)
-def pantograph(request):
-    return PANTOGRAPHS[request.param]
+EPISODES = {"head": (THREE_MASSES, ("head",)), "frame and head": (FIVE_MASSES, ("frame", "head"))}
 
 
-@pytest.fixture(scope="module", params=[("frame",), ("head",), ("frame", "head")], ids=" and ".join)
-def episode(request, pantograph):
-    return Episode(pantograph, driven=request.param)
+@pytest.fixture(scope="module", params=EPISODES)
+def episode(request):
+    return Episode(*EPISODES[request.param])
 
 
 def test_every_entry_is_what_its_name_says(episode):
@@ -151,21 +148,6 @@ def test_info_tells_the_last_time_step(episode):
     assert position == pytest.approx(episode.speed * 0.01 * (1 + np.arange(len(position))))
 
 
-def test_measured_observation_is_the_beginning_of_the_full_one():
-    settings = {"actuator": {"place": "both"}, "distance": 50.0}
-    full, measured = (
-        gymnasium.make("panto_env:Pantograph-v0", **BARE | {"observation": kind} | settings).unwrapped
-        for kind in ("full", "measured")
-    )
-    seen, _ = measured.reset(seed=0)
-    np.testing.assert_array_equal(seen, full.reset(seed=0)[0][: len(seen)])
-    for action in np.random.default_rng(0).uniform(-1, 1, (20, 2)):
-        seen = measured.step(action)[0]
-        np.testing.assert_array_equal(seen, full.step(action)[0][: len(seen)])
-    names = [entry.name for entry in full.context.layout.entries]
-    assert names[: len(seen)] == [entry.name for entry in measured.context.layout.entries]
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_entries_are_clipped_to_ten_of_their_scales(sign):
     env = gymnasium.make("panto_env:PantographStiffness-v0", bilateral=True).unwrapped
@@ -178,10 +160,9 @@ def test_entries_are_clipped_to_ten_of_their_scales(sign):
     assert env.observation_space.contains(observation)
 
 
-@pytest.mark.parametrize("kind", ["measured", "centred"])
-def test_line_values_say_what_the_line_is(kind):
+def test_line_values_say_what_the_line_is():
     """The values as the line's data and context have them; the other entries stay as they are."""
-    settings = {"observation": kind, "distance": 50.0}
+    settings = {"observation": "centred", "distance": 50.0}
     plain = gymnasium.make("panto_env:Pantograph-v0", **BARE | settings).unwrapped
     env = gymnasium.make("panto_env:Pantograph-v0", **BARE | settings | {"line_values": True}).unwrapped
     before, _ = plain.reset(seed=0)
@@ -204,6 +185,7 @@ def test_line_values_say_what_the_line_is(kind):
         gymnasium.make("panto_env:PantographStiffness-v0", line_values=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "near"),
     [

@@ -6,15 +6,11 @@ import pytest
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from panto_env import InputError, simulate
-from panto_env.backend import JIT
 from panto_env.control.reward import REWARDS
 
 pytestmark = pytest.mark.plain
 
 NAME = "panto_env:PantographStiffness-v0"
-WIRES = pytest.param(
-    "panto_env:Pantograph-v0", marks=pytest.mark.skipif(not JIT, reason="a minute in plain Python")
-)
 WEIGHTS = {"cost_function": 0.7, "contact_loss": 3.0, "effort": 0.2, "rate": 0.4}
 BOTH = {"place": "both", "force_limit": 250.0}
 
@@ -47,9 +43,8 @@ def actions():
     return np.random.default_rng(0).uniform(-1.5, 1.5, (60, 2))
 
 
-@pytest.mark.parametrize("name", [NAME, WIRES])
-def test_effort_and_rate_are_those_of_the_clipped_actions(name, actions):
-    env = gymnasium.make(name, actuator=BOTH, settle=0.0, washout=None).unwrapped
+def test_effort_and_rate_are_those_of_the_clipped_actions(actions):
+    env = gymnasium.make(NAME, actuator=BOTH).unwrapped
     effort, rate = effort_and_rate(actions)
     for seed in (0, 1):  # a second episode begins from no action too
         _, terms, _ = play(env, actions, seed)

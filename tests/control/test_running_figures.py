@@ -10,7 +10,6 @@ from panto_env.catalog import load_catenary
 from panto_env.envs import BARE
 
 SPAN = load_catenary("ohl-three-span").span_length
-MASSLESS = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 330, "distance": 150.0}
 WITH_SUPPORTS = {"catenary": "ohl-three-span", "pantograph": "own-two-mass", "distance": 2 * SPAN - 1.0}
 
 
@@ -32,15 +31,6 @@ def play(env, act):
 def same(figures, run):
     expected = {k: v for k, v in run.summary("all").as_dict().items() if not math.isnan(v)}
     return figures == pytest.approx(expected, rel=1e-9)
-
-
-def test_figures_of_an_episode_are_those_of_its_trajectory():
-    """In a second episode too, which begins anew."""
-    env, random = make(MASSLESS), np.random.default_rng(0)
-    for _ in range(2):
-        figures = play(env, lambda position: random.uniform(-1, 1, 2))
-        assert figures["contact_loss"] > 0
-        assert same(figures, env.trajectory)
 
 
 def test_uplift_of_an_episode_is_that_of_its_trajectory():

@@ -57,61 +57,33 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     assert not any("figures" in info for info in infos[:-1])
 
 
-def test_second_episode_is_as_if_it_were_the_first():
-    settings = {"sensors": "realistic", "actuator": "realistic", "line_condition": "worn", "distance": 40.0}
-    env = gymnasium.make("PantographStiffness-v0", **settings).unwrapped
-    runs = []
-    for actions in (np.ones((99, 1)), -np.ones((99, 1)), np.ones((99, 1))):
-        runs.append([env.reset(seed=3)[0]])
-        ended = False
-        for action in actions[: 99 if len(runs) != 2 else 7]:  # the second one stops half-way
-            if not ended:
-                observation, reward, _, ended, _ = env.step(action)
-                runs[-1].append(np.append(observation, reward))
-    assert ended
-    for first, third in zip(runs[0], runs[2], strict=True):
-        np.testing.assert_array_equal(first, third)
-
-
-def test_id_works_in_a_fresh_process_by_module_name():
-    code = "import gymnasium; print(gymnasium.make('panto_env:Pantograph-v0').reset(seed=0)[0].shape)"
-    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert result.stdout.strip() == "(10,)"
-
-
-def test_import_compiles_nothing_and_leaves_heavy_packages_alone():
+def test_import_compiles_nothing_leaves_heavy_packages_alone_and_makes_ids_known():
     code = (
         "import sys, panto_env; from panto_env.plant import step;"
         "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'pyarrow', 'scipy.linalg', 'scipy.signal'};"
         "heavy |= {'cv2', 'PIL', 'panto_env.render.viewer', 'panto_env.render.picture'};"
-        "print(len(step.advance.signatures), sorted(heavy & set(sys.modules)))"
+        "print(len(step.advance.signatures), sorted(heavy & set(sys.modules)));"
+        "import gymnasium; print(gymnasium.make('panto_env:Pantograph-v0').reset(seed=0)[0].shape)"
     )
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert result.stdout.strip() == "0 []"
+    assert result.stdout.split("\n")[:2] == ["0 []", "(10,)"]
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"speed_kmh": 0}, "The speed must lie above 0 and below the wave speed"),
-        ({"speed_kmh": 440}, "below the wave speed of the contact wire, 438 km/h"),
         ({"speed_kmh": float("nan")}, "not at nan km/h"),
         ({"speed_kmh": (300, 200)}, "must not fall"),
         ({"speed_kmh": "fast"}, "must be a number or a range of two"),
         ({"catenary": "en50318"}, "did you mean 'en50318-2002'"),
         ({"pantograph": "missing.toml"}, "missing.toml does not exist"),
-        ({"actuator": "strong"}, "actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "sensors is not valid: key 'noise'"),
         ({"reward": {"cost_function": -1}}, "reward is not valid: key 'cost_function'"),
         ({"observation": "everything"}, "observation must be one of measured, full"),
-        ({"distance": -5}, "distance must be a positive number"),
-        ({"distance": 1e9}, "distance must be at most 59,520 m"),
         ({"control_interval": 0.0015, "time_step": 1e-3}, "whole number of time steps"),
-        ({"time_step": 0}, "time_step must be a number from 1e-06 to 10 s, not 0"),
         ({"window": 2}, "must be a number of spans from 3 up"),
         ({"precision": "half"}, "precision must be 'single' or 'double', not 'half'"),
-        ({"spans": 1}, "spans must be a whole number from 3 to 1000"),
-        ({"render_mode": "ansi"}, "render_mode must be None, 'human' or 'rgb_array'"),
     ],
 )
 def test_bad_arguments_are_refused_in_one_sentence(settings, message):
@@ -120,12 +92,9 @@ def test_bad_arguments_are_refused_in_one_sentence(settings, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", [panto_env.envs.PantographEnv, panto_env.envs.PantographVectorEnv])
-def test_unknown_argument_is_a_type_error_as_in_python(kind):
-    with pytest.raises(
-        TypeError, match=r"unexpected keyword argument 'pantogaph'; did you mean 'pantograph'"
-    ):
-        kind(pantogaph="dsa250")
+def test_unknown_argument_is_a_type_error_as_in_python():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'pantogaph'; did you mean 'pantograph'"):
+        panto_env.envs.PantographVectorEnv(pantogaph="dsa250")
     with pytest.raises(TypeError, match="unexpected keyword argument 'velocity'"):
         panto_env.simulate(velocity=300)
 
@@ -165,13 +134,6 @@ def test_contact_lost_for_half_a_second_or_a_head_too_high_ends_the_episode():
         assert not truncated
     assert info["head"] > 0.25
     assert env.trajectory.contact_force[-1] > 0
-
-
-def test_contact_lost_now_and_then_does_not_end_the_episode():
-    env = gymnasium.make("PantographStiffness-v0", speed_kmh=350, distance=1500, actuator={"place": "head"})
-    _, infos, terminated = run_episode(env)
-    assert not terminated
-    assert infos[-1]["figures"]["contact_loss"] / 100 * len(infos) * 0.01 > 1.0  # s
 
 
 def test_episode_covers_its_distance_in_whole_control_steps():

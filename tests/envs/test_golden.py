@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 CODE = """
 import hashlib, sys, warnings
 import gymnasium, numpy as np
@@ -37,6 +39,7 @@ def hashes(threads):
     return result.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_bits_are_the_same_under_one_and_two_threads_of_linear_algebra():
     one, two = hashes("1"), hashes("2")
     assert len(one) == 8

@@ -1,13 +1,8 @@
 """Environments whose line is drawn: from a list, a family or a section, in one lane or in groups of lanes."""
 
-import copy
-import pickle
-
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
 
 from panto_env import InputError
 from panto_env.backend import LaneThreads
@@ -17,7 +12,6 @@ from panto_env.control.lines import on_drawn_line
 from panto_env.control.settings import run_settings
 
 from ..lanes import check_lanes_are_singles
-from .test_vector_rules import check_alike, native, of_singles
 
 SHORT = {"distance": 25.0, "settle": 0.0, "reward": "agent", "accuracy": "fast"}
 FAMILY = {"catenary": "family:high-speed"} | SHORT
@@ -58,39 +52,13 @@ def run_to_end(env, action=0.0):
             return np.array(seen)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("settings", "limits"),
-    [
-        (FAMILY, lambda wave_speed: (0.45 * wave_speed, min(350, 0.7 * wave_speed))),
-        (SECTION, lambda wave_speed: (120, 160)),
-    ],
-    ids=["family", "section"],
-)
-def test_each_episode_has_a_line_of_its_own(settings, limits):
-    env = make(**settings)
-    lines, space = [], env.observation_space
-    for seed in (4, None, None, 4):
-        observation, info = env.reset(seed=seed)
-        assert observation in space
-        context = env.unwrapped.context
-        lines.append(values_of(context))
-        slowest, fastest = limits(3.6 * context.catenary.contact_wire.wave_speed)
-        assert slowest <= info["speed_kmh"] <= fastest
-        run_to_end(env)
-    assert lines[0] == lines[3]
-    assert len(set(lines)) == 3
-    assert lines[0] == line_of(4, **settings).model_dump_json(exclude={"sources"})
-
-
 def test_a_list_gives_its_lines():
-    env = make(**LIST)
-    names = []
-    for seed in range(12):
-        env.reset(seed=seed)
-        names.append(env.unwrapped.context.catenary.name)
+    names = [line_of(seed, **LIST).name for seed in range(12)]
     assert set(names) == set(LIST["catenary"])
-    assert names == [line_of(seed, **LIST).name for seed in range(12)]
+    env = make(**LIST)
+    for seed in range(3):
+        env.reset(seed=seed)
+        assert env.unwrapped.context.catenary.name == names[seed]
 
 
 def test_an_option_chooses_the_line_of_an_episode():
@@ -111,22 +79,6 @@ def test_the_episode_on_a_drawn_line_is_that_on_the_same_line_given():
     given = make(**LIST | {"catenary": drawn.unwrapped.context.catenary})
     np.testing.assert_array_equal(observation, given.reset(seed=8)[0])
     np.testing.assert_array_equal(run_to_end(drawn, 0.3), run_to_end(given, 0.3))
-
-
-def test_gymnasium_s_checker_accepts_it():
-    check_env(make(**FAMILY).unwrapped, skip_render_check=True)
-
-
-def test_copies_go_on_alike():
-    env = make(**SECTION)
-    env.reset(seed=1)
-    twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
-    seen = run_to_end(env)
-    env.reset()
-    for twin in twins:
-        np.testing.assert_array_equal(run_to_end(twin), seen)
-        twin.reset()
-        assert values_of(twin.unwrapped.context) == values_of(env.unwrapped.context)
 
 
 def test_every_line_of_a_list_must_be_possible():
@@ -165,14 +117,6 @@ def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     assert ran.ends > 3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", AutoresetMode)
-def test_lanes_on_lines_of_their_own_answer_as_gymnasium_s_vector_environment(mode):
-    ours = native("Pantograph-v0", autoreset_mode=mode, **FAMILY)
-    ends, _ = check_alike(ours, of_singles("Pantograph-v0", mode=mode, **FAMILY), 80, mode)
-    assert ends > 3
-
-
 @drawn
 def test_lanes_of_a_group_share_the_line_of_its_first_lane(settings):
     envs = make_vec(7, lines=3, **settings)
@@ -208,17 +152,16 @@ def test_lanes_that_share_a_line_are_single_environments_on_it(settings):
             assert rewards[lane] == reward
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
 def test_lines_are_drawn_anew_after_so_many_episodes(mode):
     """Episodes on a line go on to their end while others begin on the next one."""
-    envs = make_vec(
-        3, lines=1, episodes_per_line=2, autoreset_mode=mode, **FAMILY | {"speed_kmh": (250, 350)}
-    )
+    short = FAMILY | {"speed_kmh": (250, 350), "distance": 10.0}
+    envs = make_vec(3, lines=1, episodes_per_line=2, autoreset_mode=mode, **short)
     envs.reset(seed=1)
     now = [values_of(envs.unwrapped.context(lane)) for lane in range(3)]
     begun, between = {now[0]: 3}, 0
     ended = np.zeros(3, bool)
-    for actions in np.random.default_rng(0).uniform(-1, 1, (260, 3, 1)).astype(np.float32):
+    for actions in np.random.default_rng(0).uniform(-1, 1, (110, 3, 1)).astype(np.float32):
         waiting = ended
         _, _, terminated, truncated, _ = envs.step(actions)
         ended = terminated | truncated
@@ -283,15 +226,3 @@ def test_groups_step_on_several_threads_as_on_one(settings, monkeypatch):
             np.testing.assert_array_equal(ours[k], theirs[k])
     assert ends > 8
     assert cores() == 1 or many.unwrapped._lanes._threads._pool
-
-
-def test_each_episode_is_drawn_with_its_own_line():
-    pytest.importorskip("PIL")
-    single, several = make(render_mode="rgb_array", **FAMILY), make_vec(2, render_mode="rgb_array", **FAMILY)
-    frames = []
-    for seed in (0, 1):
-        single.reset(seed=seed)
-        several.reset(seed=seed)
-        frames += [single.render(), *several.render()]
-    assert all(np.ptp(frame) > 0 for frame in frames)
-    assert not np.array_equal(frames[0], frames[3])

@@ -33,14 +33,8 @@ CASES = {
     "train": (
         "Pantograph-v0",
         EXACT
-        | {
-            "pantographs": ["en50318-2002", "en50318-2002"],
-            "distances": [100.0],
-            "controlled": [1, 2],
-            "distance": 400.0,
-            "settle": 1.0,
-            "accuracy": "fast",
-        },
+        | {"pantographs": ["en50318-2002"] * 2, "distances": [100.0], "controlled": [1, 2]}
+        | {"distance": 400.0, "settle": 1.0, "accuracy": "fast"},
     ),
 }
 
@@ -135,9 +129,7 @@ def test_context_is_that_of_the_lane():
     env = gymnasium.make_vec("panto_env:PantographStiffness-v0", **make)
     env.reset(seed=7)
     still = torch.zeros(3, 1, device=env.unwrapped.device)
-    while "figures" not in (
-        info := env.step(still)[-1]
-    ):  # which the processor works out in the lanes of starts
+    while "figures" not in (info := env.step(still)[-1]):  # worked out in the lanes of starts
         pass
     for lane, speed_kmh in enumerate(info["speed_kmh"].tolist()):
         assert env.unwrapped.context(lane).speed * 3.6 == pytest.approx(speed_kmh)

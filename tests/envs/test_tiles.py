@@ -6,11 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from panto_env.backend.compile import (  # noqa: E402
-    JIT,
-    KERNEL_OPTIONS,
-    OPTIONS,
-)
+from panto_env.backend.compile import JIT, KERNEL_OPTIONS, OPTIONS  # noqa: E402
 from panto_env.backend.cuda import PackedTiles, in_tile  # noqa: E402
 from panto_env.control import on_device  # noqa: E402
 from panto_env.control.on_device import BEGUN, RESULTS, control_unless_idle  # noqa: E402

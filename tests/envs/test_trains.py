@@ -1,6 +1,5 @@
 """Environments of trains: one pantograph of several is controlled, or each is an agent."""
 
-import copy
 import pickle
 
 import gymnasium
@@ -19,7 +18,7 @@ from panto_env.policies import find_policy
 pettingzoo = pytest.importorskip("pettingzoo")
 TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [100.0], "speed_kmh": (280.0, 320.0)}
 BOTH = {**TRAIN, "controlled": [1, 2]}
-SHORT = {"distance": 400.0, "settle": 0.0}
+SHORT = {"distance": 250.0, "settle": 0.0}
 
 
 def make(**settings):
@@ -41,7 +40,7 @@ def test_the_second_pantograph_s_episode_begins_where_it_comes_onto_the_line():
         ended = terminated or truncated
     first, second = env.unwrapped.trajectory.train
     assert second.distance == pytest.approx(first.distance - 100.0)
-    assert 400 <= second.distance < 400 + 2 * stride
+    assert 250 <= second.distance < 250 + 2 * stride
     assert info["figures"]["distance"] == pytest.approx(second.distance, abs=2 * stride)
     assert info["figures"]["std"] == pytest.approx(second.summary("all").std, rel=0.02)
 
@@ -70,7 +69,7 @@ def test_lanes_of_a_vector_environment_are_the_single_environment_bit_for_bit():
         assert [each["reward"] for each in info["pantographs"]] == rewards[2:].tolist()
         if terminated or truncated:
             break
-    assert step > 300
+    assert step > 200
     figures = [each["figures"]["std"] for each in info["pantographs"]]
     assert infos["figures"]["std"][2:].tolist() == figures
     assert figures[0] != figures[1]
@@ -83,8 +82,8 @@ def parallel(**settings):
 def test_pettingzoo_accepts_it():
     from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-    parallel_api_test(parallel(), num_cycles=1000)
-    parallel_seed_test(parallel, num_cycles=100)
+    parallel_api_test(parallel(), num_cycles=400)
+    parallel_seed_test(parallel, num_cycles=20)
 
 
 def test_agents_see_and_earn_what_the_environment_of_the_train_does():
@@ -219,10 +218,10 @@ def test_a_policy_by_name_drives_the_others(driven, own):
     alike = {name: settings[name] for name in ("actuator", "sensors", "line_condition", "window")}
     alike |= {"pantographs": BOTH["pantographs"], "distances": BOTH["distances"], "controlled": [1, 2]}
     alike["observation"] = "centred"
-    run = panto_env.simulate(**alike, speed_kmh=300.0, policy=policies, seed=3, distance=400.0)
+    run = panto_env.simulate(**alike, speed_kmh=300.0, policy=policies, seed=3, distance=250.0)
     for one, other in zip(env.unwrapped.trajectory.train, run.train, strict=True):
         count = min(len(one.contact_force), len(other.contact_force))
-        assert count > 1000
+        assert count > 700
         np.testing.assert_array_equal(one.frame_force[:count], other.frame_force[:count])
         np.testing.assert_array_equal(one.contact_force[:count], other.contact_force[:count])
 
@@ -253,14 +252,13 @@ def test_trains_pass_gymnasium_s_check_and_go_on_as_their_copies(driven):
     check_env(env, skip_render_check=True)
     env.reset(seed=1)
     action = np.full(env.action_space.shape, 0.1, dtype=np.float32)
-    for _ in range(150):
+    for _ in range(120):
         env.step(action)
-    twins = copy.deepcopy(env), pickle.loads(pickle.dumps(env))
-    for _ in range(50):
-        one, *others = (each.step(-action) for each in (env, *twins))
-        for other in others:
-            np.testing.assert_array_equal(one[0], other[0])
-            assert one[1] == other[1]
+    twin = pickle.loads(pickle.dumps(env))
+    for _ in range(20):
+        one, other = (each.step(-action) for each in (env, twin))
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1] == other[1]
 
 
 @pytest.mark.parametrize(

@@ -7,19 +7,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers.vector import DictInfoToList, NormalizeReward, RecordEpisodeStatistics
+from gymnasium.wrappers.vector import ClipAction, DictInfoToList, NormalizeReward, RecordEpisodeStatistics
 
 from panto_env import InputError
-from panto_env.envs import IDS
 from panto_env.plant.state import Row
 
-LIVELY = {
-    "sensors": "realistic",
-    "line_condition": "fair",
-    "speed_kmh": (200, 300),
-    "distance": 20.0,
-    "settle": 0.0,
-}
+LIVELY = {"sensors": "realistic", "line_condition": "fair", "speed_kmh": (200, 300)}
+LIVELY |= {"distance": 20.0, "settle": 0.0}
 MODES = list(AutoresetMode)
 
 
@@ -93,8 +87,10 @@ def check_alike(ours, theirs, steps, mode=AutoresetMode.NEXT_STEP, changes=None)
     return ends, lengths
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [*(("PantographStiffness-v0", mode) for mode in MODES), ("Pantograph-v0", AutoresetMode.NEXT_STEP)],
+)
 def test_native_vector_environment_answers_as_gymnasium_s_does(name, mode):
     """Observations, rewards, ends, and infos with their masks, over the ends of episodes."""
     ours, theirs = native(name, autoreset_mode=mode), of_singles(name, mode=mode)
@@ -127,36 +123,25 @@ def test_lanes_are_seeded_as_gymnasium_seeds_them(kind):
     state = [random.bit_generator.state for random in envs.np_random]
     envs.reset()
     assert envs.np_random_seed == (42, 43, 44)
-    envs.reset(seed=[7, None, np.int64(9)] if kind is None else [7, None, 9])
+    envs.reset(seed=[7, None, 9])
     assert envs.np_random_seed == (7, 43, 9)
     envs.reset(seed=42)
     assert [random.bit_generator.state for random in envs.np_random] == state
-    with pytest.raises((ValueError, AssertionError)):
-        envs.reset(seed=[1, 2])
     if kind is None:
         with pytest.raises(InputError, match="seed must be a whole number from 0 up, or a list of 3 such"):
             envs.reset(seed=[4, -1, 4])
         assert envs.np_random_seed == (42, 43, 44)
 
 
-@pytest.mark.parametrize(
-    "mask",
-    [
-        [True, False, True],
-        np.array([True]),
-        np.array([[True, True, True]]),
-        np.array([1, 1, 0]),
-        np.array([False, False, False]),
-        "all",
-    ],
-)
-def test_reset_mask_is_an_array_of_booleans_with_one_true(mask):
+def test_reset_mask_is_an_array_of_booleans_with_one_true():
     envs = native("PantographStiffness-v0")
     with pytest.raises(InputError, match="first reset must begin episodes in all lanes"):
         envs.reset(options={"reset_mask": np.array([True, True, False])})
     envs.reset(seed=0, options={"reset_mask": np.ones(3, bool)})
-    with pytest.raises(InputError, match="reset_mask must be 3 booleans, an array with one true or more"):
-        envs.reset(options={"reset_mask": mask})
+    odd = [True], [[True, True, True]], [1, 1, 0], [False, False, False]
+    for mask in (*map(np.array, odd), [True, False, True], "all"):
+        with pytest.raises(InputError, match="reset_mask must be 3 booleans, an array with one true or more"):
+            envs.reset(options={"reset_mask": mask})
 
 
 def test_masked_reset_leaves_the_other_lanes_and_the_user_s_options_alone():
@@ -210,9 +195,9 @@ def test_wrappers_that_read_infos_work():
         figures += [info["figures"]["mean"] for info in infos if "figures" in info]
     assert len(figures) == ends > 3
     assert np.all(np.array(figures) > 50)
-    envs = RecordEpisodeStatistics(native("PantographStiffness-v0"))
+    envs = ClipAction(RecordEpisodeStatistics(native("PantographStiffness-v0")))
     envs.reset(seed=0)
-    for action in actions_of(envs, 90):
+    for action in 3 * actions_of(envs, 90):
         infos = envs.step(action)[4]
         if "episode" in infos:
             np.testing.assert_array_equal(infos["_episode"], infos["_figures"])
@@ -233,9 +218,9 @@ def test_time_limit_of_the_vector_environment_is_gymnasium_s(mode):
         native("PantographStiffness-v0", max_episode_steps=0)
 
 
-@pytest.mark.parametrize("name", IDS)
-def test_options_are_of_one_episode_in_the_lanes_begun(name):
+def test_options_are_of_one_episode_in_the_lanes_begun():
     """What the single environment takes, another line or control interval even; autoreset forgets them."""
+    name = "PantographStiffness-v0"
     ours = native(name)
     changes = {
         4: {"speed_kmh": 250, "sensors": "ideal", "reset_mask": np.array([True, False, True])},
@@ -255,7 +240,6 @@ def test_options_that_are_not_valid_change_nothing():
         ({"sped_kmh": 200}, "Unknown option 'sped_kmh': did you mean 'speed_kmh'"),
         ({"speed_kmh": -5}, "speed must lie above 0"),
         ({"observation": "full"}, "would change the observation or action space"),
-        ({"num_envs": 4}, "Unknown option 'num_envs'"),
     ):
         with pytest.raises(InputError, match=message):
             envs.reset(seed=8, options=options)

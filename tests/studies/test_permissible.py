@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
 from panto_env.cli import make_app
-from panto_env.cli.permissible import parse_speeds
+from panto_env.cli.sweep import parse_speeds
 from panto_env.studies import write
 from panto_env.studies.permissible import PASSIVE, Scan, scan, study, verified
 from panto_env.studies.permissible.scan import WAVES, Broken, Pass
