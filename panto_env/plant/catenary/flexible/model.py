@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -198,7 +199,8 @@ class FlexibleCatenary:
         self.time_step = chosen.time_step
         lead = 0.5 * runs.train_length
         self.line = constants(data, shape, spans, numerics, chosen, own)._replace(lead=lead)
-        self.shapes = {None: shape}  # by lane, where each has tensions of its own; only for pictures
+        # By lane, where each has tensions of its own; only for pictures.
+        self.shapes: dict[int | None, StaticShape] = {None: shape}
         self.wires_per_collector = self.line.pairs
         touched, beta = tightest.contact_wire, data.damping.beta
         self.contact_gain = point_gain(touched, self.line.spacing, self.time_step, beta, own.lightest)
@@ -259,7 +261,9 @@ class FlexibleCatenary:
         if any(condition.tension_scatter > 0 for condition in conditions):
             self._designed = data
             beside = self.line.beside._replace(shape=np.repeat(self.line.beside.shape, lanes, axis=0))
-            own = {name: np.repeat(getattr(self.line, name), lanes, axis=0) for name in OF_TENSION}
+            own: dict[str, Any] = {
+                name: np.repeat(getattr(self.line, name), lanes, axis=0) for name in OF_TENSION
+            }
             self.line = self.line._replace(beside=beside, **own)
         self._tension = np.repeat(self._tension, rows, axis=0)
         self._write_defects(0, DrawnLine(first))

@@ -39,7 +39,7 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
         tables: Any = line.beside if pair else line
         of_shape = np.linspace(0.0, line.shape_length, tables.shape.shape[1])
         rest = np.interp(place, of_shape, tables.shape[min(lane, len(tables.shape) - 1)])
-        rise = np.zeros(len(x))
+        rise: Array = np.zeros(len(x))
         if tables.rise.shape[1]:
             row = min(lane, len(tables.rise) - 1)
             rise = Profile(tables.rise_breaks, tables.rise[row], line.rise_decay[row]).height(x)
