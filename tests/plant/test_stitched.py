@@ -54,6 +54,16 @@ def test_shape_at_rest_is_that_of_each_span_written_out():
     np.testing.assert_allclose(all_of_them.ropes[5].places, one.ropes[0].places + 5 * 65.0)
 
 
+def test_a_support_carries_messenger_stitch_wire_clamps_and_droppers():
+    line = line_of()
+    shape, stitch, droppers = hang(line), line.stitch_wire, line.droppers
+    mass = line.messenger_wire.mass * line.span_length + stitch.mass * stitch.length + 2 * stitch.clamp_mass
+    mass += shape.dropper_mass.sum() / 2 + len(droppers.sag) * droppers.messenger_clamp_mass
+    given_way = line.encumbrance - shape.messenger.height(np.zeros(1))[0]
+    carried = 9.81 * mass + shape.dropper_tension.sum()
+    assert given_way * line.support.stiffness == pytest.approx(carried, rel=1e-6)
+
+
 def test_stitch_wire_makes_the_elasticity_even():
     (_, stitched), (_, plain) = (elasticity(each, 100.0) for each in (line_of(), line_of(stitch_wire=None)))
     assert non_uniformity(stitched) < 0.4 * non_uniformity(plain)
