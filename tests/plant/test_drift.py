@@ -4,16 +4,23 @@ import gymnasium
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from panto_env import InputError, simulate
 from panto_env.backend import python_function
+from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
+from panto_env.estimation.estimate import estimate
+from panto_env.estimation.motion import measure
+from panto_env.metrics.compliance import largest_mean
 from panto_env.metrics.trajectory import Trajectory
 from panto_env.plant.functions import sine_of_turns
 from panto_env.plant.speed import ahead, draw_drift, largest_drift, largest_lag
+from panto_env.plant.state import Row
 
 from ..lanes import check_lanes_are_singles
+from ..pantograph_alone import means, replay
 
 NAMES = ("panto_env:Pantograph-v0", "panto_env:PantographStiffness-v0")
 DRIFT = {"speed_drift": 4.0}
@@ -97,19 +104,18 @@ def test_figures_kept_as_it_runs_are_those_of_the_record(line, tmp_path):
 
 def test_terms_of_an_episode_sum_to_its_figures_after_a_run_in():
     env = gymnasium.make(NAMES[0], **DRIFT, distance=200.0, settle=0.0, reward="paper1").unwrapped
-    for seed in range(3):
-        _, info = env.reset(seed=seed)
-        start, terms, ended = info["position"], np.zeros(2), False
-        while not ended:
-            *_, terminated, truncated, info = env.step(np.full(1, 0.1))
-            ended = terminated or truncated
-            told = info["reward_terms"]
-            terms += told["cost_function"], told["contact_loss"]
-        figures = info["figures"]
-        assert terms[0] == pytest.approx(figures["cost_function"], rel=1e-9)
-        assert terms[1] == pytest.approx(figures["contact_loss"], rel=0.02, abs=1e-9)
-        assert figures["distance"] == pytest.approx(info["position"] - start, abs=1e-6)
-        assert 200.0 <= figures["distance"] < 201.0
+    _, info = env.reset(seed=0)
+    start, terms, ended = info["position"], np.zeros(2), False
+    while not ended:
+        *_, terminated, truncated, info = env.step(np.full(1, 0.1))
+        ended = terminated or truncated
+        told = info["reward_terms"]
+        terms += told["cost_function"], told["contact_loss"]
+    figures = info["figures"]
+    assert terms[0] == pytest.approx(figures["cost_function"], rel=1e-9)
+    assert terms[1] == pytest.approx(figures["contact_loss"], rel=0.02, abs=1e-9)
+    assert figures["distance"] == pytest.approx(info["position"] - start, abs=1e-6)
+    assert 200.0 <= figures["distance"] < 201.0
 
 
 def test_without_drift_nothing_changes_and_nothing_is_drawn():
@@ -144,3 +150,140 @@ def test_sine_of_turns_is_good_enough_for_a_way():
     turns = np.linspace(0, 100, 7919)
     ours = [python_function(sine_of_turns)(each) for each in turns]
     np.testing.assert_allclose(ours, np.sin(2 * np.pi * turns), atol=1e-12)
+
+
+SPEED_KMH, DRIFT_KMH = 300.0, 10.0
+QUICK = {"speed_kmh": SPEED_KMH, "speed_drift": DRIFT_KMH}
+TWO_WIRES = {"catenary": "en50318-2002", "pantograph": "dsa380"}
+"""Both pantographs have 70 N of static force and 0.00097 N/(km/h)^2 of uplift."""
+EVEN = load_catenary("periodic-stiffness").model_copy(update={"stiffness_variation": 0.0})
+"""A spring that is the same everywhere."""
+
+
+def kmh_at(times, seed=0):
+    """Speed (km/h) of a run at times (s), from the sines of its drift."""
+    drift = draw_drift(DRIFT_KMH, 1.0, np.random.default_rng(seed))
+    amplitude, turns, phase = drift[1:].reshape(3, 3).T
+    angles = 2 * np.pi * (np.outer(times, turns) + phase)
+    return SPEED_KMH + np.cos(angles) @ (2 * np.pi * amplitude * turns)
+
+
+def lifts(times, seed=0):
+    """Static force and aerodynamic uplift (N) at times (s)."""
+    return 70.0 + 0.00097 * kmh_at(times, seed) ** 2
+
+
+def passive(given, seed=0):
+    """A passive run, and the pantograph's state at its start."""
+    task = Task(run_settings(given))
+    task.reset(0, np.random.default_rng(seed))
+    start = task.plant.run.table[0, 0, Row.STATE :][: task.plant.pantographs.sizes[0]].copy()
+    task.run_passively()
+    return task.trajectory(0), start
+
+
+def test_an_even_wire_carries_what_lifts_the_pantograph_at_its_present_speed():
+    """The drift is slow: all is nearly at rest."""
+    run = simulate(EVEN, "three-mass", **QUICK, distance=1600.0)
+    lift = lifts(run.time)
+    assert np.ptp(lift) > 15.0
+    carried = lift - 1.0 * run.frame  # less the spring of 1 N/m to the ground
+    assert run.contact_force == pytest.approx(carried, abs=0.3)
+    # Nor is there a jump at the start.
+    assert run.contact_force[0] == pytest.approx(carried[0], abs=1e-2)
+
+
+@pytest.mark.parametrize("line", [SIMPLE, TWO_WIRES])
+def test_the_motion_is_that_of_a_pantograph_alone_under_a_lift_that_follows_the_speed(line):
+    """The contact force is the run's own; SciPy's matrix exponential does the rest."""
+    run, start = passive(line | QUICK | {"distance": 900.0})
+    data = load_pantograph(line["pantograph"])
+    assert run.lift == pytest.approx(lifts(run.time), abs=1e-4)
+    states = replay(run, data, start)
+    n = len(data.masses)
+    for series, place in (("head", 0), ("frame", n - 1), ("head_velocity", n), ("frame_velocity", 2 * n - 1)):
+        assert getattr(run, series) == pytest.approx(means(states[:, place]), rel=1e-4, abs=1e-6), series
+
+
+def test_the_cost_function_counts_from_the_force_at_the_present_speed():
+    run, _ = passive({"catenary": EVEN, "pantograph": "three-mass", **QUICK, "distance": 700.0})
+    deviation = np.abs(run.contact_force - lifts(run.time))
+    assert run.summary("all").cost_function == pytest.approx(np.trapezoid(deviation, run.position), rel=1e-4)
+    assert np.trapezoid(np.abs(run.contact_force - run.nominal_force), run.position) > 1500.0
+    assert run.summary("all").cost_function < 150.0
+
+
+def test_a_required_mean_follows_the_speed_and_the_static_force_does_not():
+    given = {**TWO_WIRES, "speed_kmh": SPEED_KMH, "mean_force": "en50367"}
+    run, steady = simulate(**given, speed_drift=DRIFT_KMH), simulate(**given)
+    inside = run.inside()
+    required = np.mean([largest_mean(speed / 3.6, "AC") for speed in kmh_at(run.time)[inside].tolist()])
+    assert abs(required - largest_mean(SPEED_KMH / 3.6, "AC")) > 1.0
+    assert run.summary().mean == pytest.approx(required, abs=0.06)
+    assert run.nominal_force == pytest.approx(steady.nominal_force, abs=0.5)
+    # The limits are those of the speed over these spans.
+    mean, *_ = run.compliance()
+    assert mean.highest == pytest.approx(required, abs=0.1)
+
+
+def test_terms_of_the_reward_count_from_the_force_required_at_the_present_speed():
+    weights = {"cost_function": 0.0, "contact_loss": 0.0, "low_passed": 1.0, "mean_force": 0.0}
+    env = gymnasium.make("panto_env:PantographStiffness-v0", **SIMPLE, **QUICK, reward=weights).unwrapped
+    env.reset(seed=4)
+    told, cost, ended = [], [], False
+    while not ended:
+        *_, terminated, truncated, info = env.step(np.zeros(1))
+        told.append(info["reward_terms"]["low_passed"])
+        cost.append(info["reward_terms"]["cost_function"])
+        ended = terminated or truncated
+    run = env.trajectory
+    sections = butter(6, 20, fs=1 / run.time_step, output="sos")
+    filtered, _ = sosfilt(sections, run.contact_force, zi=sosfilt_zi(sections) * run.contact_force[0])
+    assert np.abs(run.lift - run.nominal_force).mean() > 5.0
+    expected = (((filtered - run.lift) / run.nominal_force) ** 2).reshape(len(told), -1).mean(axis=1)
+    # Within a control step the lift is taken as that of its end.
+    assert told == pytest.approx(expected, rel=2e-3, abs=1e-5)
+    assert sum(cost) == pytest.approx(run.summary("all").cost_function, rel=1e-3)
+
+
+def test_observed_nominal_force_and_centres_follow_the_speed():
+    given = {**SIMPLE, **QUICK, "observation": "centred", "distance": 600.0}
+    env = gymnasium.make("panto_env:PantographStiffness-v0", **given, history=1).unwrapped
+    env.reset(seed=0)
+    layout, pairs = env.context.layout, []
+    for _ in range(200):
+        seen, *_ = env.step(np.zeros(1))
+        lift, speed = layout.read(seen, "nominal force"), layout.read(seen, "speed")
+        pairs.append((lift - 70.0 - 0.00097 * (3.6 * speed) ** 2, lift))
+        assert layout.read(seen, "contact force") == pytest.approx(env.trajectory.contact_force[-1], rel=1e-5)
+    missed, lift = np.array(pairs).T
+    assert np.abs(missed).max() < 0.05
+    assert np.abs(lift - 157.3).mean() > 3.0
+
+
+def test_entries_normalised_by_speed_read_as_what_they_are():
+    given = {
+        **SIMPLE,
+        **QUICK,
+        "speed_kmh": (290.0, 310.0),
+        "normalise": (250.0, 350.0),
+        "distance": 400.0,
+    }
+    env = gymnasium.make("panto_env:PantographStiffness-v0", **given).unwrapped
+    env.reset(seed=0)
+    layout = env.context.layout
+    assert layout.entries[layout.index("contact force")].slope > 0.5
+    for _ in range(100):
+        seen, *_ = env.step(np.zeros(1))
+        assert layout.read(seen, "contact force") == pytest.approx(env.trajectory.contact_force[-1], abs=0.02)
+
+
+def test_an_estimator_knows_the_uplift_of_the_speed():
+    """A filter that took the mean speed's uplift would miss what differs from it: 5 N and more."""
+    run, _ = passive(TWO_WIRES | QUICK | {"distance": 1400.0, "time_step": 1e-3})
+    given = estimate(measure(run), load_pantograph("dsa380"))
+    true = np.interp(given.time, run.time, run.contact_force)
+    wrong = (given.force - true)[given.first :]
+    slow = np.convolve(wrong, np.ones(2000) / 2000, mode="valid")
+    assert np.abs(run.lift - run.nominal_force).max() > 8.0
+    assert np.abs(slow).max() < 1.0

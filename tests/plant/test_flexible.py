@@ -5,7 +5,6 @@ from panto_env import InputError, simulate
 from panto_env.backend import WIDTH, kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant import functions as interpolation
-from panto_env.plant.catenary.flexible import model
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD, STENCIL
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
@@ -107,28 +106,6 @@ def undamped(line):
     )
 
 
-@pytest.mark.slow
-@PRECISIONS
-def test_force_travelling_along_a_string_matches_the_closed_form(precision):
-    """From an anchor, d'Alembert and one image give w(vt, t) = F v t / (m c (c + v))."""
-    line = undamped(load_catenary("en50318-2002"))
-    string = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
-    limp = line.droppers.model_copy(update={"stiffness": 1e-6})
-    alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
-    step, speed, force = 1e-3, 300 / 3.6, 100.0
-    built = constants_of(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
-    bare = built._replace(shape=np.zeros_like(built.shape))
-    wire = at_rest(bare, 1, 1)
-    steps = 3000  # before the far anchor's reflection
-    heights = np.zeros(steps)
-    travel(bare, wire, 0.0, speed * step, force, heights, np.zeros(3))
-    time = step * (np.arange(steps) + 0.5)
-    wave = np.sqrt(string.tension / string.mass)
-    exact = force * speed * time / (string.mass * wave * (wave + speed))
-    assert np.abs(heights - exact).max() < 0.005 * exact.max()
-    assert (along(wire.displacement[0])[:, [PAD, -PAD]] == 0).all()  # the anchors
-
-
 @pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (3.0, 0.0), (0.0, 2e-3)])
 @pytest.mark.parametrize("waves", [1, 4])
 def test_a_wave_on_a_bare_wire_has_its_frequency_and_decay(alpha, beta, waves):
@@ -198,42 +175,32 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar, precis
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed", some_at_once([250.0, 300.0], [300.0]))
-def test_agrees_with_finite_elements(speed):
-    """Both converged: sigma within 2 %, the other figures within 2 N and 0.5 mm."""
-    line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
-    fine = {"spacing": 0.125, "time_step": 2.5e-4, "distance": 361.0} | WHOLE
-    run = simulate("en50318-2002", "en50318-2002", speed, **fine)
-    ours = run.summary((5, 6))
-    other = finite_element.simulate(line, pantograph, speed, element=0.5, time_step=5e-4, distance=361.0)
-    theirs = finite_element.figures(other)
-    assert ours.std == pytest.approx(theirs.std, rel=0.02)
-    assert ours.mean == pytest.approx(theirs.mean, abs=0.5)
-    assert ours.max == pytest.approx(theirs.maximum, abs=2.0)
-    assert ours.min == pytest.approx(theirs.minimum, abs=2.0)
-    # The finite-element run ends just past span 6: uplift is compared up to there.
-    seen = run.position < other.position[-1]
-    uplift = 1e3 * run.uplift[seen][:, 3:6].max()
-    assert uplift == pytest.approx(1e3 * other.uplift[:, 3:6].max(), abs=0.5)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "pantograph", "speed"),
     [
+        (EN, EN, 250.0),
+        (EN, EN, 300.0),
         ("benchmark-2015", "benchmark-2015", 300.0),
         ("shinkansen-simple", "identified-2dof", 300.0),
         ("beijing-tianjin", "dsa380", 300.0),
     ],
 )
-def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
+def test_agrees_with_finite_elements(line, pantograph, speed):
+    """Both converged: sigma within 2 %; on EN 50318's line the other figures within 2 N and 0.5 mm."""
     data = load_catenary(line)
     panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
-    distance = 6.1 * data.span_length
-    fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
-    ours = simulate(line, panto, speed, **fine).summary((5, 6))
-    other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
-    assert ours.std == pytest.approx(finite_element.figures(other).std, rel=0.02)
+    part, distance = (1 if line == EN else 2), 6.0167 * data.span_length
+    run = simulate(line, panto, speed, spacing=0.125, time_step=2.5e-4 / part, distance=distance, **WHOLE)
+    given = {"element": 0.5 / part, "time_step": 5e-4 / part, "distance": distance}
+    other = finite_element.simulate(data, panto, speed, **given)
+    ours, theirs = run.summary((5, 6)), finite_element.figures(other)
+    assert ours.std == pytest.approx(theirs.std, rel=0.02)
+    if line == EN:
+        assert ours.mean == pytest.approx(theirs.mean, abs=0.5)
+        assert (ours.max, ours.min) == pytest.approx((theirs.maximum, theirs.minimum), abs=2.0)
+        # The finite-element run ends just past span 6: uplift is compared up to there.
+        uplift = run.uplift[run.position < other.position[-1]][:, 3:6].max()
+        assert uplift == pytest.approx(other.uplift[:, 3:6].max(), abs=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -254,18 +221,6 @@ def test_droppers_go_slack_under_the_pantograph(reference_run):
     assert 0.001 < (reference_run.dropper_force == 0).mean() < 0.2
 
 
-def test_slackening_matters(monkeypatch):
-    """With droppers that push, sigma is far off: the model would fail EN 50318."""
-    honest = model.constants
-
-    def never_slack(*arguments):
-        line = honest(*arguments)
-        return line._replace(link_static=line.link_static + np.float32(1e6))
-
-    monkeypatch.setattr(model, "constants", never_slack)
-    assert simulate().summary((5, 6)).std > 45
-
-
 def test_wire_force_balance_in_the_mean(reference_run):
     """Over the run the mean contact force is the lift less what the lowest spring carries."""
     spans = slice(len(reference_run.time) // 3, None)
@@ -277,10 +232,11 @@ def test_first_lanes_advance_alone():
     """They have the forces that they have beside others, which stay as they are until it is their turn."""
     line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
 
+    speeds = np.array([200, 300, 250, 350]) / 3.6
+
     def batch():
         plant = Plant(line, Train.of(pantograph), lanes=4)
-        for lane, speed in enumerate([200 / 3.6, 300 / 3.6, 250 / 3.6, 350 / 3.6]):
-            plant.start(lane, speed)
+        plant.start(np.arange(4), speeds)
         return plant, plant.samples(801)
 
     whole, expected = batch()
@@ -296,8 +252,7 @@ def test_first_lanes_advance_alone():
     np.testing.assert_array_equal(plant.run.table[:, 2:], rest)
     with pytest.raises(InputError, match="not for 1600"):
         plant.advance_passively(800, samples, 2)
-    for lane in range(4):
-        plant.start(lane, [200 / 3.6, 300 / 3.6, 250 / 3.6, 350 / 3.6][lane])
+    plant.start(np.arange(4), speeds)
     plant.advance_passively(800, samples)  # all lanes again
     np.testing.assert_array_equal(samples.rows[1:], expected.rows[1:])
 

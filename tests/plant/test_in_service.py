@@ -17,42 +17,36 @@ NAME = "panto_env:Pantograph-v0"
 STILL = np.zeros(1, np.float32)
 
 
-def play(env, policy=None, seed=0, actions=None):
-    """Observations, infos and actions of an episode under a policy, under given actions, or under none."""
+def play(env, policy=None, seed=0):
+    """Observations and infos of an episode under a policy, or under none."""
     observation, info = env.reset(seed=seed)
     if policy is not None:
         policy.reset(env.unwrapped.context)
-    seen, infos, done, ended = [observation], [info], [], False
+    seen, infos, ended = [observation], [info], False
     while not ended:
-        step = len(done)
         action = STILL if policy is None else policy.act(observation).astype(np.float32)
-        if actions is not None:
-            action = actions[step] if step < len(actions) else STILL
         observation, _, *ends, info = env.step(action)
         ended = any(ends)
         seen.append(observation)
         infos.append(info)
-        done.append(action)
-    return np.array(seen), infos, done
+    return np.array(seen), infos
 
 
 def test_two_seeds_give_two_episodes():
-    env = gymnasium.make(NAME)
-    speeds, starts, stiffnesses = [], [], []
+    env, found = gymnasium.make(NAME), []
     for seed in range(4):
         _, info = env.reset(seed=seed)
-        speeds.append(info["speed_kmh"])
-        starts.append(info["position"])
-        stiffnesses.append(env.unwrapped.task.plant.pantographs.table.copy())
-    assert len(set(speeds)) == len(set(starts)) == 4
-    assert all(200 <= speed <= 300 for speed in speeds)
-    assert all(0 <= start <= 60 for start in starts)
-    assert not np.array_equal(stiffnesses[0], stiffnesses[1])
+        table = env.unwrapped.task.plant.pantographs.table.tobytes()
+        found.append((info["speed_kmh"], info["position"], table))
+    speeds, starts, tables = map(set, zip(*found, strict=True))
+    assert len(speeds) == len(starts) == len(tables) == 4
+    assert 200 <= min(speeds) <= max(speeds) <= 300
+    assert 0 <= min(starts) <= max(starts) <= 60
 
 
 def test_entries_have_a_mean_near_0_and_a_spread_near_1():
     env = gymnasium.make(NAME)
-    seen = np.concatenate([play(env, seed=seed)[0] for seed in range(12)])
+    seen = np.concatenate([play(env, seed=seed)[0] for seed in range(8)])
     entries = env.unwrapped.context.layout.entries
     for entry, values in zip(entries, seen.T, strict=True):
         # What tension a line has moves all of it up or down, by about a centimetre, a scale of both heights.
@@ -64,7 +58,7 @@ def test_entries_have_a_mean_near_0_and_a_spread_near_1():
 
 def test_the_force_is_read_relative_to_the_nominal_one():
     env = gymnasium.make(NAME, **BARE | {"observation": "centred", "distance": 120.0})
-    seen, infos, _ = play(env)
+    seen, infos = play(env)
     layout = env.unwrapped.context.layout
     read = [layout.read(observation, "contact force") for observation in seen]
     assert read == pytest.approx([info["contact_force"] for info in infos], rel=1e-5, abs=1e-3)
@@ -93,7 +87,7 @@ def test_the_bare_form_is_what_simulate_runs():
 
 def test_run_in_is_no_part_of_the_episode_s_figures():
     env = gymnasium.make(NAME, **BARE | {"run_in": 2.0, "distance": 120.0, "actuator": {"force_limit": 50.0}})
-    seen, infos, _ = play(env, find_policy("p"), seed=3)
+    seen, infos = play(env, find_policy("p"), seed=3)
     start, figures = infos[0]["position"], infos[-1]["figures"]
     assert 0 < start <= 120
     assert infos[-1]["position"] == pytest.approx(start + 120.0, abs=1.0)
@@ -112,7 +106,7 @@ def test_run_in_is_no_part_of_the_episode_s_figures():
 def test_run_in_leaves_an_episode_on_a_short_line():
     env = gymnasium.make(NAME, **BARE | {"run_in": 5.0, "spans": 3})
     for seed in range(5):
-        _, infos, _ = play(env, seed=seed)
+        _, infos = play(env, seed=seed)
         assert len(infos) > 1
         assert infos[-1]["position"] <= 180.0
 
@@ -140,22 +134,6 @@ def test_term_of_the_mean_force_is_that_of_a_low_passed_deviation():
         mean += share * (step - mean)
         expected.append(-2 * mean**2)
     assert rewards == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_tape_of_actions_is_worth_little_in_another_episode():
-    """It was worth as much as the policy while every episode was the same one."""
-    env, pd = gymnasium.make(NAME, distance=400.0), find_policy("pd")
-    ratios = []
-    for seed in range(4):
-        _, _, tape = play(env, pd, seed=seed + 100)
-        passive, own, played = (
-            play(env, policy, seed, actions)[1][-1]["figures"]["std"]
-            for policy, actions in ((None, None), (pd, None), (None, tape))
-        )
-        ratios.append((own / passive, played / passive))
-    own, played = np.mean(ratios, axis=0)
-    assert own < 0.95
-    assert played > own + 0.04
 
 
 def test_controls_of_a_benchmark():

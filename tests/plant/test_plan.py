@@ -4,8 +4,6 @@ The reference has x along the track, positions and wind positive to the outside 
 that is to the right, as here.
 """
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -77,7 +75,7 @@ def test_a_curve_to_the_right_is_one_to_the_left_in_a_mirror():
     assert right.forces[:, 1:-1] == pytest.approx(-left.forces[:, 1:-1], abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_any_plan_balances_and_its_wires_are_strings(seed):
     """What is given holds by itself: the sum of forces, and T y'' of the parabolas between droppers."""
     random = np.random.default_rng(seed)
@@ -103,14 +101,6 @@ def test_any_plan_balances_and_its_wires_are_strings(seed):
     for wire in range(2):
         second = (view.at(x + h, wire) - 2 * view.at(x, wire) + view.at(x - h, wire)) / h**2
         assert second[0] == pytest.approx(-view.load[wire, 5] / view.tensions[wire], rel=1e-6)
-
-
-def test_a_wire_alone_is_blown_as_a_string():
-    """Both wires in the same wind per tension move alike, so that droppers do nothing: q L^2 / 8 T."""
-    line = line_with({"stagger": (0.0,)})
-    q = 8.0
-    view = plan_view(line.layout(14), (q, q * line.messenger_wire.tension / line.contact_wire.tension))
-    assert view.at(np.array([450.0]))[0] == pytest.approx(q * 60**2 / 8 / line.contact_wire.tension, rel=1e-9)
 
 
 STRIPS = {
@@ -170,22 +160,6 @@ def run(line, speed, **settings):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("speed", "plan", "none", "arms"),
-    [
-        (250, ZIGZAG, 27.90, 27.44), (250, CURVE, 27.90, 28.90),
-        (300, {"stagger": (0.2, -0.2)}, 33.95, 34.75), (300, ZIGZAG, 33.95, 34.92),
-        (300, CURVE, 33.95, 35.87),
-    ],
-)  # fmt: skip
-def test_arms_change_a_run_as_in_the_reference_s_plane(speed, plan, none, arms):
-    """Ratios, since the two grids differ by up to 3 % in sigma at 300 km/h (the reference's own says so)."""
-    without = run(line_with(), speed)
-    found = run(line_with(plan, steady_arm=ARM), speed)
-    assert found.std / without.std == pytest.approx(arms / none, rel=0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
     ("speed", "plan", "waves", "whole"),
     [
         (250, {"stagger": (0.2, -0.2)}, False, 27.25),
@@ -198,15 +172,13 @@ def test_arms_change_a_run_as_in_the_reference_s_plane(speed, plan, none, arms):
 )
 def test_with_sideways_waves_a_run_is_the_reference_s_in_three_dimensions(speed, plan, waves, whole):
     """Against the reference without arms, as above. Without waves it is 6 % off at 300 km/h and 0.2 m."""
-    without = {250: 27.90, 300: 33.95}[speed]
-    found = (
-        run(line_with(plan | {"sideways_waves": waves}, steady_arm=ARM), speed).std
-        / run(line_with(), speed).std
-    )
-    assert found == pytest.approx(whole / without, rel=0.025)
+    expected = whole / {250: 27.90, 300: 33.95}[speed]
+    line = line_with(plan | {"sideways_waves": waves}, steady_arm=ARM)
+    found = run(line, speed).std / run(line_with(), speed).std
+    assert found == pytest.approx(expected, rel=0.025)
     if (speed, waves) == (300, True) and plan is not CURVE:
         still = run(line_with(plan, steady_arm=ARM), speed).std / run(line_with(), speed).std
-        assert abs(found - whole / without) < abs(still - whole / without)
+        assert abs(found - expected) < abs(still - expected)
 
 
 def test_waves_that_run_off_damp_and_do_not_hold():
@@ -251,29 +223,10 @@ def test_wind_of_a_condition_and_of_the_plan_are_the_same():
     assert in_wind(plain, 14, [LineCondition(side_wind=28.0)]) is plain
 
 
+@pytest.mark.filterwarnings("ignore")
 def test_a_plan_without_lengths_of_arms_changes_no_run():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        plain, planned = (
-            run(line, 250, line_condition="as-built") for line in (line_with(), line_with(ZIGZAG))
-        )
+    plain, planned = (run(line, 250, line_condition="as-built") for line in (line_with(), line_with(ZIGZAG)))
     assert plain == planned
-
-
-def test_unlike_arms_need_a_sequence():
-    plan = {"stagger": (0.3, -0.1)}
-    with pytest.raises(
-        InputError, match=r"pulled with .* and a line whose spans are all alike has equal ones"
-    ):
-        simulate(line_with({"stagger": (0.3, -0.3, -0.3)}, steady_arm=ARM), "dsa380", 250)
-    line = line_with({"stagger": (0.3, -0.3, -0.2)}, steady_arm=ARM, sequence=[{}] * 12, spans=12)
-    found = steady_arms(line.layout())
-    assert line.sequence
-    assert len(set(np.round(found.stiffness, 3))) > 2
-    assert simulate(line, "dsa380", 200, distance=480.0).summary((6, 7)).std > 0
-    assert (
-        steady_arms(line_with(plan, steady_arm=ARM).layout(5)).stiffness.std() < 1e-6
-    )  # 0.4 m from side to side
 
 
 @pytest.mark.parametrize(
@@ -291,43 +244,53 @@ def test_what_cannot_be_is_refused_by_name(changes, message):
         line_with(**changes)
 
 
-def test_an_arm_without_stagger_or_pull_is_refused_where_it_stands():
-    with pytest.raises(InputError, match=r"Support 1 of line .* has no stagger; give plan.stagger"):
-        simulate(line_with(steady_arm=ARM), "dsa380", 250)
-    with pytest.raises(InputError, match=r"is pulled with 13 N only and carries 74 N, .* slope by 80°"):
-        simulate(line_with({"stagger": (0.01, -0.01)}, steady_arm=ARM), "dsa380", 250)
-    masts = [{"stagger": 0.3 * (-1) ** k} for k in range(13)]
-    masts[5]["stagger"] = 0.299
-    masts[6]["stagger"] = 0.3
-    line = line_with(steady_arm=ARM, sequence=[{}] * 12, spans=12, masts=masts)
-    with pytest.raises(
-        InputError, match=r"The steady arm at support [67] of line .* give more stagger there"
+def in_sequence(count, **changes):
+    return line_with(steady_arm=ARM, sequence=[{}] * count, spans=count, **changes)
+
+
+def test_unlike_arms_need_a_sequence_and_stagger_and_pull():
+    masts = [{"stagger": 0.299 if k == 5 else 0.3 * (-1) ** k} for k in range(13)]
+    for line, message in (
+        (line_with(steady_arm=ARM), r"Support 1 of line .* has no stagger; give plan.stagger"),
+        (
+            line_with({"stagger": (0.01, -0.01)}, steady_arm=ARM),
+            r"is pulled with 13 N only and carries 74 N, .* slope by 80°",
+        ),
+        (
+            line_with({"stagger": (0.3, -0.3, -0.3)}, steady_arm=ARM),
+            r"pulled with .* and a line whose spans are all alike has equal ones",
+        ),
+        (in_sequence(12, masts=masts), r"The steady arm at support [67] of .* give more stagger there"),
     ):
-        steady_arms(line.layout())
-
-
-def test_lanes_in_unlike_winds_are_refused():
-    line = line_with(ZIGZAG, steady_arm=ARM)
+        with pytest.raises(InputError, match=message):
+            simulate(line, "dsa380", 250)
+    line, conditions = line_with(ZIGZAG, steady_arm=ARM), ("new", "new:side_wind=20")
     with pytest.raises(InputError, match="must have the same side_wind"):
-        simulate(line, "dsa380", 250, line_condition=("new", "new:side_wind=20"))
+        simulate(line, "dsa380", 250, line_condition=conditions)
+    line = in_sequence(12, plan={"stagger": (0.3, -0.3, -0.2)})
+    assert len(set(np.round(steady_arms(line.layout()).stiffness, 3))) > 2
+    assert simulate(line, "dsa380", 200, distance=480.0).summary((6, 7)).std > 0
+    aside = line_with({"stagger": (0.3, -0.1)}, steady_arm=ARM)  # 0.4 m from side to side
+    assert steady_arms(aside.layout(5)).stiffness.std() < 1e-6
 
 
-def test_a_run_tells_where_on_the_strips_the_wire_was():
-    found = strip_use(run_of := simulate(line_with(ZIGZAG), "dsa380", 250, distance=900.0))
-    assert found is not None
-    assert found.width == pytest.approx(0.6)
-    assert 0.8 < found.evenness <= 1
-    assert found.way.sum() == pytest.approx(1)
-    assert found.wear.sum() == pytest.approx(1)
-    assert strip_use(simulate(distance=900.0)) is None
+def test_a_run_tells_where_on_the_strips_the_wire_was_within_its_survey():
+    run_of = simulate(line_with(ZIGZAG), "dsa380", 250, distance=900.0)
     assert run_of.designed.line.plan.stagger == (0.3, -0.3)
+    surveyed = line_with(masts=[{"stagger": 0.3 * (-1) ** k} for k in range(13)], spans=12)
+    within = simulate(surveyed, "dsa380", 250, spans=12, distance=600.0)
+    for found in (strip_use(run_of), strip_use(within, (6, 8))):
+        assert found.width == pytest.approx(0.6)
+        assert 0.8 < found.evenness <= 1
+        assert found.way.sum() == pytest.approx(1)
+        assert found.wear.sum() == pytest.approx(1)
+    assert strip_use(simulate(surveyed, "dsa380", 250, spans=20, distance=900.0)) is None
+    assert strip_use(simulate(distance=900.0)) is None
 
 
 def test_overlapping_wires_have_the_plan_of_the_line():
-    spans = ({},) * 14
     overlap = {"first_span": 7, "rises": (0.1, 0.5)}
-    plan = {"stagger": (0.3, -0.3)}
-    line = line_with(plan, steady_arm=ARM, sequence=spans, spans=14, overlaps=(overlap,))
+    line = in_sequence(14, plan={"stagger": (0.3, -0.3)}, overlaps=(overlap,))
     parts = line.layout().tension_lengths
     assert [part.first_span for part in parts] == [0, 6]
     views = [plan_view(part.layout) for part in parts]
@@ -335,12 +298,3 @@ def test_overlapping_wires_have_the_plan_of_the_line():
     x = np.linspace(0, 840, 500)
     assert np.abs(contact_wire_at(line.layout(), x)).max() == pytest.approx(0.3, abs=1e-3)
     assert simulate(line, "dsa380", 200, distance=700.0).summary((8, 9)).std > 0
-
-
-def test_a_run_beyond_a_survey_has_no_wear_of_strips():
-    masts = [{"stagger": 0.3 * (-1) ** k} for k in range(13)]
-    line = line_with(masts=masts, spans=12)
-    within = strip_use(simulate(line, "dsa380", 250, spans=12, distance=600.0), (6, 8))
-    assert within is not None
-    assert within.width == pytest.approx(0.6)
-    assert strip_use(simulate(line, "dsa380", 250, spans=20, distance=900.0)) is None

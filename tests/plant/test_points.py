@@ -22,8 +22,7 @@ from panto_env.plant.numerics import Runs
 
 from ..documents import ROOT
 from . import test_flexible
-from .test_flexible import energy, swing, undamped, under_a_train
-from .test_wire_defects import defective
+from .test_flexible import energy, swing, undamped
 
 NAME = "en50318-2002"
 SPOT = {"name": "section insulator", "span": 3, "offset": 27.0, "mass": 8.0, "stiffness": 3000.0}
@@ -100,29 +99,6 @@ def test_mass_and_spring_of_a_point_take_part_in_the_line_s_energy(monkeypatch):
     kept, missing = (swing(data, 10, 150.0, 1e-3, False, each)[0] for each in (with_point, energy))
     assert kept < 1e-6
     assert missing > 1e-2
-
-
-@pytest.mark.parametrize("mass", [0.0, 8.0])
-def test_forces_and_uplift_agree_with_finite_elements(monkeypatch, mass):
-    """An insulator, or an anchor in mid-length: the run's figures within 3 % about it, and its peak."""
-    point = SPOT | {"mass": mass}
-    condition = LineCondition(hard_spots=[(3, 27.0, mass, 3000.0)])
-
-    def changed(data, spans, element):
-        return defective(data, spans, element, condition)
-
-    def run_of(**settings):
-        return simulate(**settings | {"catenary": with_points(point), "line_condition": "new"})
-
-    monkeypatch.setattr("tests.plant.test_flexible.simulate", run_of)
-    ours, theirs, *_ = under_a_train(monkeypatch, changed, "new", 200.0, 2.05 * 60, 241.0)
-    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.01)
-    assert ours.std() == pytest.approx(theirs.std(), rel=0.03)
-    assert ours.max() == pytest.approx(theirs.max(), rel=0.03)
-    monkeypatch.undo()
-    intact = simulate(catenary=NAME, speed_kmh=200.0, distance=241.0, spans=10)
-    without = np.interp(np.linspace(2.05 * 60, 240.0, 2000), intact.position, intact.contact_force)
-    assert (without - theirs).std() > 3 * (ours - theirs).std()
 
 
 @pytest.mark.parametrize(

@@ -79,18 +79,13 @@ def test_nodes_are_laid_out_and_found_again(kind):
     np.testing.assert_array_equal(segment, [0, 0, 0, 1, WIDTH - 1, WIDTH - 1])
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_ends_hold_what_the_neighbours_hold(kind):
-    _, x = random_wire(kind)
-    wanted = x.copy()
-    x[:PAD, 1:] = x[-PAD:, :-1] = 9.0
-    _share(x, ROWS)
-    np.testing.assert_array_equal(x, wanted)
-
-
-@pytest.mark.parametrize("count", [3, ROWS, ROWS + 3, 3 * ROWS])
+@pytest.mark.parametrize("count", [0, 3, ROWS, ROWS + 3, 3 * ROWS])
 def test_a_window_travels_by_any_number_of_nodes(count):
     values, x = random_wire()
+    wanted = x.copy()
+    x[:PAD, 1:] = x[-PAD:, :-1] = 9.0
+    _share(x, ROWS)  # ends hold what the neighbours hold
+    np.testing.assert_array_equal(x, wanted)
     _shift(x, ROWS, count)
     np.testing.assert_array_equal(along(x), np.append(values[count:], np.zeros(count)))
     kept = x.copy()
@@ -152,7 +147,7 @@ def test_any_window_that_has_not_travelled_gives_the_same_run():
     """However its segments lie to spans and droppers."""
     given = {"spans": 20, "distance": 55.0, "precision": "double"}
     reference = simulate(window=8, **given)
-    for window in (3, 4, 5, 7, 9, 12, 16, 0):
+    for window in (3, 5, 7, 12, 0):
         run = simulate(window=window, **given)
         assert np.abs(run.contact_force - reference.contact_force).max() < 1e-3, window
 

@@ -54,29 +54,14 @@ def test_shape_at_rest_is_that_of_each_span_written_out():
     np.testing.assert_allclose(all_of_them.ropes[5].places, one.ropes[0].places + 5 * 65.0)
 
 
-@pytest.mark.parametrize("line", [line_of(), written_out()], ids=["uniform", "written out"])
-def test_forces_are_in_balance_at_clamps_and_along_the_stitch_wire(line):
-    """By slopes, which the own weight of wires and ropes changes by a known amount."""
-    shape, k = hang(line), 0 if not line.sequence else 5
-    rope, stitch = shape.ropes[k], line.stitch_wire
-    slopes = np.diff(rope.heights) / np.diff(rope.places)  # each piece hangs in a parabola about that slope
-    weight = 9.81 * stitch.mass * np.diff(rope.places)
-    pulled = stitch.tension * np.diff(slopes) - (weight[1:] + weight[:-1]) / 2
-    number = np.flatnonzero(line.layout().stitches.carrying == k) if k else np.array([8, 9, 0, 1])
-    mass = shape.dropper_mass[number] / 2 + line.droppers.messenger_clamp_mass
-    np.testing.assert_allclose(pulled, shape.dropper_tension[number] + 9.81 * mass, rtol=1e-6)
-
-    place, messenger = rope.places[0], line.messenger_wire
-    place += 65.0 if place < 0 else 0.0
-    inside = messenger.tension - stitch.tension
-
-    def slope(x):  # bending has died out there
-        return float(np.diff(shape.messenger.height(np.array([x - 0.3, x + 0.3])))[0] / 0.6)
-
-    out = slope(place - 1.3) + 9.81 * messenger.mass * 1.3 / messenger.tension
-    beyond = slope(place + 1.3) - 9.81 * messenger.mass * 1.3 / inside
-    up = inside * beyond - messenger.tension * out + stitch.tension * slopes[0] - weight[0] / 2
-    assert up == pytest.approx(9.81 * stitch.clamp_mass, abs=0.2)
+def test_a_support_carries_messenger_stitch_wire_clamps_and_droppers():
+    line = line_of()
+    shape, stitch, droppers = hang(line), line.stitch_wire, line.droppers
+    mass = line.messenger_wire.mass * line.span_length + stitch.mass * stitch.length + 2 * stitch.clamp_mass
+    mass += shape.dropper_mass.sum() / 2 + len(droppers.sag) * droppers.messenger_clamp_mass
+    given_way = line.encumbrance - shape.messenger.height(np.zeros(1))[0]
+    carried = 9.81 * mass + shape.dropper_tension.sum()
+    assert given_way * line.support.stiffness == pytest.approx(carried, rel=1e-6)
 
 
 def test_stitch_wire_makes_the_elasticity_even():
@@ -94,10 +79,8 @@ def test_defects_at_rest_where_droppers_hang_from_stitch_wires():
     assert broken.tension[dropper] == 0
     assert broken.tension.sum() == pytest.approx(new.tension.sum(), rel=0.02)
     assert (broken.tension[[dropper - 1, dropper + 1]] > new.tension[[dropper - 1, dropper + 1]] + 5).all()
-    written = DefectiveLine(
-        written_out(spans=9).layout(9), LineCondition(miscut_droppers=((5, 9, 0.02),))
-    ).solve()
-    again = DefectiveLine(line.layout(9), LineCondition(miscut_droppers=((5, 9, 0.02),))).solve()
+    longer = LineCondition(miscut_droppers=((5, 9, 0.02),))
+    written, again = (DefectiveLine(each.layout(9), longer).solve() for each in (written_out(spans=9), line))
     np.testing.assert_allclose(written.tension[20:-20], again.tension[20:-20], atol=1e-4)
     assert again.tension[48] < hang(line).dropper_tension[8] - 3
 
@@ -159,28 +142,17 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     assert max(moved) > 0.2 * height
 
 
-@pytest.mark.parametrize("settings", [{}, {"window": 0}, {"line_condition": "as-built", "seed": 3}], ids=str)
+@pytest.mark.parametrize("settings", [{"window": 0}, {"line_condition": "as-built", "seed": 3}], ids=str)
 def test_uniform_and_written_out_lines_move_alike(settings):
     """The window travels; defects and other tensions are the same."""
-    runs = [
-        simulate(each, "dsa380", 300.0, distance=12 * 65.0, spans=SPANS, precision="double", **settings)
+    one, other = (
+        simulate(each, "dsa380", 300.0, distance=9 * 65.0, spans=SPANS, precision="double", **settings)
         for each in (line_of(), written_out())
-    ]
-    one, other = runs
+    )
     after = one.position > 130  # at the mirrored start droppers have other lengths
     np.testing.assert_allclose(other.contact_force[after], one.contact_force[after], atol=0.02)
     np.testing.assert_allclose(other.uplift, one.uplift, atol=1e-5)
     assert one.contact_force.std() > 10
-
-
-def test_a_slight_stitch_wire_without_droppers_changes_little():
-    """With hardly any tension and mass it takes nothing from the line."""
-    outside = {"positions": [5.0, 12.0, 20.0, 28.0, 37.0, 45.0, 53.0, 60.0], "sag": [0.0] * 8}
-    slight = {"length": 9.0, "tension": 500.0, "mass": 0.05}
-    lines = [line_of(droppers=outside, stitch_wire=stitch) for stitch in (slight, None)]
-    ours, plain = (simulate(each, "dsa380", 300.0, distance=780).summary((4, 10)) for each in lines)
-    assert ours.std == pytest.approx(plain.std, rel=0.02)
-    assert ours.max_uplift == pytest.approx(plain.max_uplift, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -207,7 +179,7 @@ def test_stitch_wires_that_reach_each_other_are_refused():
 def test_droppers_almost_at_places_of_a_stitched_line_hang_as_droppers_there():
     """Near mid-span, a clamp, or the least distance from it: up to 1e-5 m they were metres too long."""
     random = np.random.default_rng(7)
-    for _ in range(40):
+    for _ in range(12):
         span, half = float(random.uniform(48, 70)), float(random.uniform(6, 10))
         inner = np.linspace(half, span / 2, int(random.integers(3, 6)))  # the first at the clamp
         left = np.array([half - 4.5, half - 1.0, *inner])
@@ -215,25 +187,21 @@ def test_droppers_almost_at_places_of_a_stitched_line_hang_as_droppers_there():
         sag = [0.0] * len(places)
         stitch = STITCH_WIRE | {"length": 2 * half, "tension": float(random.uniform(2000, 4000))}
         moved = places + random.choice([-1, 1], len(places)) * 10.0 ** random.uniform(-15, -5, len(places))
-        shapes = [
-            hang(
-                line_of(span_length=span, droppers={"positions": x.tolist(), "sag": sag}, stitch_wire=stitch)
-            )
+        lines = [
+            line_of(span_length=span, droppers={"positions": x.tolist(), "sag": sag}, stitch_wire=stitch)
             for x in (places, moved)
         ]
-        np.testing.assert_allclose(shapes[1].dropper_length, shapes[0].dropper_length, atol=1e-5)
-        np.testing.assert_allclose(shapes[1].dropper_tension, shapes[0].dropper_tension, atol=1e-2)
-        line = line_of(
-            span_length=span, droppers={"positions": moved.tolist(), "sag": sag}, stitch_wire=stitch, spans=5
-        )
-        assert abs(DefectiveLine(line.layout(5), NEW).solve().rise).max() < 1e-9
+        there, near = map(hang, lines)
+        np.testing.assert_allclose(near.dropper_length, there.dropper_length, atol=1e-5)
+        np.testing.assert_allclose(near.dropper_tension, there.dropper_tension, atol=1e-2)
+        assert abs(DefectiveLine(lines[1].layout(5), NEW).solve().rise).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["re250-stitched", "re330-stitched"])
 def test_spans_of_another_length_keep_their_droppers_on_the_stitch_wire(name):
     """In a sequence, and where all spans are changed."""
     base = load_catenary(name)
-    for length in (40.0, 45.0, 50.0, 54.0, 55.0, 58.0, 60.0, 63.0, 64.0, 70.0, 75.0):
+    for length in (40.0, 54.0, 63.0, 75.0):
         line = changed(name, {"sequence": [{}, {}, *[{"span_length": length}] * 2, {}, {}]})
         hang(line)
         for droppers in (

@@ -20,6 +20,7 @@ from panto_env.plant.catenary.flexible.as_run import as_run, elasticity
 from panto_env.plant.catenary.flexible.defects import DefectiveLine
 from panto_env.plant.catenary.flexible.shape import GRAVITY
 from panto_env.plant.catenary.flexible.static import hang
+from panto_env.plant.catenary.flexible.whole_line import settle_line
 from panto_env.plant.line_condition import LineCondition
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
@@ -76,36 +77,31 @@ def test_droppers_of_each_wire_carry_it_and_nothing_else():
 
 
 def test_spans_one_by_one_hang_as_one_that_repeats():
-    uneven_one = changed(
-        CA, sequence=[{}] * CA.spans, end_support={"encumbrance": CA.encumbrance + 1e-6}, spans=CA.spans
-    )
-    ours, theirs = hang(uneven_one), hang(CA)
+    """But at the ends: a span is not its own mirror image."""
     x = np.linspace(240.0, 420.0, 500)
+    ours, theirs = settle_line(CA.model_copy(update={"spans": 12})), hang(CA)
     for (own, _), (other, _) in zip(ours.contacts, theirs.contacts, strict=True):
         np.testing.assert_allclose(own.height(x), other.height(x), atol=1e-6)
-    middle = slice(4 * 18, 7 * 18)
-    np.testing.assert_allclose(
-        ours.dropper_tension[middle], theirs.over(7).dropper_tension[middle], atol=1e-3
-    )
 
 
 def test_droppers_hold_the_wires_in_turn_unless_the_line_says_otherwise():
-    assert FAR.layout(2).held.tolist() == 2 * [0, 1] * 6
-    by_hand = changed(FAR, droppers=FAR.droppers.model_dump(exclude_none=True) | {"wire": [1, 2] * 6})
-    assert by_hand.layout(2).held.tolist() == FAR.layout(2).held.tolist()
-    lopsided = changed(FAR, droppers=FAR.droppers.model_dump(exclude_none=True) | {"wire": [1] * 9 + [2] * 3})
-    assert lopsided.layout(1).held.tolist() == [0] * 9 + [1] * 3
+    def held(wire):
+        droppers = FAR.droppers.model_dump(exclude_none=True) | {"wire": wire}
+        return changed(FAR, droppers=droppers).layout(2).held.tolist()
+
+    assert FAR.layout(2).held.tolist() == held([1, 2] * 6) == 2 * [0, 1] * 6
+    assert held([1] * 9 + [2] * 3) == 2 * ([0] * 9 + [1] * 3)
 
 
 SUNK = {"lost_contact_tension": 0.08, "lost_messenger_tension": 0.05, "raised_supports": [(10, 0.03)]}
 
 
-@pytest.mark.parametrize(("speed", "condition"), [(120.0, {}), (180.0, {}), (160.0, SUNK)])
-def test_wires_that_coincide_are_the_equivalent_wire(speed, condition):
+@pytest.mark.parametrize("condition", ["new", SUNK], ids=["new", "sunk"])
+def test_wires_that_coincide_are_the_equivalent_wire(condition):
     """Within 1 %, for droppers of a pair hang 0.1 m apart; each wire carries half."""
     one = equivalent()
     both = [
-        simulate(line, DSA, speed, distance=16 * 60.0, line_condition=condition or "new")
+        simulate(line, DSA, 180.0, distance=16 * 60.0, line_condition=condition)
         for line in (one, coinciding(one))
     ]
     ours, theirs = (run.summary((8, 14)) for run in reversed(both))
@@ -116,41 +112,41 @@ def test_wires_that_coincide_are_the_equivalent_wire(speed, condition):
     np.testing.assert_allclose(second, first, rtol=0.01)
 
 
+CUT_LONG = {"broken_droppers": [(3, 5), (3, 6)], "miscut_droppers": [(4, 3, 0.02), (4, 4, 0.02)]}
+
+
 @pytest.mark.parametrize(
     ("condition", "of_one"),
     [
         ({"lost_contact_tension": 0.1, "lost_messenger_tension": 0.05}, {}),
         ({"raised_supports": [(3, 0.05)]}, {}),
-        (
-            {"broken_droppers": [(3, 5), (3, 6)], "miscut_droppers": [(4, 3, 0.02), (4, 4, 0.02)]},
-            {"broken_droppers": [(3, 3)], "miscut_droppers": [(4, 2, 0.02)]},
-        ),
+        (CUT_LONG, {"broken_droppers": [(3, 3)], "miscut_droppers": [(4, 2, 0.02)]}),
     ],
+    ids=["lost tension", "raised support", "droppers"],
 )
 def test_a_line_at_rest_in_a_condition_is_that_of_the_equivalent_wire(condition, of_one):
-    """With arms that hold the wire."""
+    """With arms that hold the wire. So is its elasticity, whose force is shared by both wires."""
     one = equivalent()
-    whole = [
+    both, whole = (
         DefectiveLine(line.layout(6), LineCondition(**given))
         for line, given in ((coinciding(one), condition), (one, of_one or condition))
-    ]
+    )
     x = np.linspace(60.0, 300.0, 300)
-    ours, expected = whole[0].solve(), whole[1].rise(whole[1].solve()).height(x)
+    state, expected = both.solve(), whole.rise(whole.solve()).height(x)
     assert np.abs(expected).max() > 2e-3
     for wire in (0, 1):
-        risen = whole[0].rise(ours, wire).height(x)
+        risen = both.rise(state, wire).height(x)
         np.testing.assert_allclose(risen, expected, atol=0.02 * np.abs(expected).max())
+    ours, theirs = (elasticity(line, 100.0) for line in (coinciding(one), one))
+    np.testing.assert_allclose(np.interp(theirs[0], *ours), theirs[1], rtol=0.02)
 
 
-def test_ice_is_on_each_wire():
+def test_ice_is_on_each_wire_and_a_broken_dropper_lowers_the_one_that_it_held():
     line = changed(FAR, steady_arm={"mass": 1.0, "stiffness": 0.0})  # which carries none of it
     new, iced = (as_run(line, LineCondition(ice=ice), 100.0) for ice in (0.0, 0.2))
     assert [wire.mass for wire in iced.wires] == pytest.approx([0.89 + 0.2, 1.35 + 0.2])
     carried = [sum(each.static_force for each in run.droppers) for run in (new, iced)]
     assert carried[1] - carried[0] == pytest.approx(2 * 0.2 * GRAVITY * line.span_length, rel=1e-3)
-
-
-def test_a_broken_dropper_lowers_the_wire_that_it_held():
     whole = DefectiveLine(FAR.layout(6), LineCondition(broken_droppers=((3, 6),)))  # of the second wire
     rises = [whole.rise(whole.solve(), wire).height(np.array([2 * 60.0 + 27.5]))[0] for wire in (0, 1)]
     assert rises[1] < -0.01
@@ -163,19 +159,8 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     assert swing(data, 10, 300.0, height, goes_slack, uneven.energy)[0] < bar
 
 
-def test_a_window_about_the_train_gives_what_the_whole_line_does():
-    runs = [
-        simulate(FAR, DSA, 160.0, distance=1320.0, window=window).summary((10, 19)) for window in (0, None)
-    ]
-    for name in ("mean", "std", "max", "min", "max_uplift"):
-        assert getattr(runs[1], name) == pytest.approx(getattr(runs[0], name), rel=0.01), name
-
-
-def test_lanes_of_a_batch_equal_single_runs_bit_for_bit():
+def test_lanes_equal_single_runs_and_a_restarted_one_forgets_the_run_before():
     uneven.test_lanes_of_a_batch_equal_single_runs_bit_for_bit(CA)
-
-
-def test_restarted_lane_forgets_the_run_before():
     uneven.test_restarted_lane_forgets_the_run_before(CA)
 
 
@@ -184,7 +169,7 @@ def test_the_head_shares_its_force_between_the_wires():
     plant = Plant(changed(FAR, spans=16), Train.of(DSA), runs=Runs((160 / 3.6, 160 / 3.6)))
     plant.start(0, 160 / 3.6)
     samples, forces = plant.samples(1), []
-    while plant.position(0, plant.of(0, Row.STEP))[0] < 900.0:
+    while plant.position(0, plant.of(0, Row.STEP))[0] < 480.0:
         plant.advance_passively(1, samples)
         forces.append([plant.of(0, row) for row in (Row.FIRST_FORCE, Row.SECOND_FORCE, Row.CONTACT_FORCE)])
     first, second, total = np.array(forces).T
@@ -216,36 +201,41 @@ def test_a_run_starts_at_rest_where_the_wires_begin_at_unlike_heights(touched):
     assert (first > 0) == (touched == 2)
 
 
-def test_records_and_pictures_show_both_wires(tmp_path):
-    run = simulate(CA, DSA, 160.0, distance=1000.0)
+def test_records_show_both_wires_of_each_pantograph(tmp_path):
+    given = {"pantographs": [DSA, DSA], "distances": [60.0], "speed_kmh": 160.0, "distance": 800.0}
+    run = simulate(CA, **given)
     assert run.uplift.shape[1] == 2 * (run.alignment.spans - 1) == len(run.support_position)
     both = run.uplift[:, [11, 11 + run.alignment.spans - 1]].max(axis=0)
     assert abs(both[1] / both[0] - 1) > 1e-3
     run.save(tmp_path / "run.parquet")
     again = Trajectory.load(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(again.uplift, run.uplift)
     np.testing.assert_array_equal(again.support_position, run.support_position)
-    np.testing.assert_array_equal(again.second_force, run.second_force)
-    late = run.position > 120.0
-    first = run.contact_force - run.second_force
-    assert first[late].mean() == pytest.approx(run.second_force[late].mean(), rel=0.1)
-    assert (run.second_force >= 0).all()
-    assert (first >= -1e-9).all()
-    assert abs(first - run.second_force).max() > 10
+    for own, its in zip(run.train, again.train, strict=True):
+        for name in ("uplift", "second_force"):
+            np.testing.assert_array_equal(getattr(its, name), getattr(own, name))
+        first = own.contact_force - own.second_force
+        assert min(own.second_force.min(), first.min()) >= -1e-9
+        late = own.position > 120.0
+        assert first[late].mean() == pytest.approx(own.second_force[late].mean(), rel=0.1)
+        assert abs(first - own.second_force).max() > 10
     found = {number: uplift for number, _, uplift in Findings(run, "run.parquet").uplifts}
     assert found[12] == both.max()
-    near = (run.support_position >= 600.0) & (run.support_position <= 720.0)
+    alone = simulate(CA, DSA, 160.0, distance=800.0)
+    near = (alone.support_position >= 600.0) & (alone.support_position <= 720.0)
     assert near.sum() == 6
-    assert run.summary((11, 12)).max_uplift == run.uplift[:, near].max()
-    headings = table_of(run).headings
-    assert headings["uplift_0"] == "uplift at 60 m (m)"
-    assert headings["second_force"] == "second_force (N)"
-    assert headings[f"uplift_{run.alignment.spans - 1}"] == "uplift of wire 2 at 60 m (m)"
-
-    one = simulate("en50318-2002", DSA, 160.0, distance=700.0)
+    assert alone.summary((11, 12)).max_uplift == alone.uplift[:, near].max()
+    assert table_of(run).headings.items() >= {
+        ("uplift_0", "uplift at 60 m (m)"),
+        ("second_force", "second_force (N)"),
+        ("second_force@2", "second_force of pantograph 2 (N)"),
+        (f"uplift_{run.alignment.spans - 1}", "uplift of wire 2 at 60 m (m)"),
+    }
+    one = simulate("en50318-2002", DSA, 160.0, distance=60.0)
     assert one.second_force.size == 0
     assert "second_force" not in table_of(one).headings
 
+
+def test_a_view_and_a_plot_show_both_wires():
     plant = Plant(CA, Train.of(DSA), runs=Runs((44.0, 44.0)))
     plant.start(0, 44.0)
     plant.advance_passively(6000, plant.samples(1))
@@ -253,26 +243,10 @@ def test_records_and_pictures_show_both_wires(tmp_path):
     ((x, second),) = view.further
     np.testing.assert_array_equal(x, view.x)
     heights = [np.interp(view.droppers, x, each) for each in (view.contact, second)]
-    own = np.searchsorted(plant.model.droppers, view.droppers - 1e-9)
-    held = plant.model.layout.held[own]
+    held = plant.model.layout.held[np.searchsorted(plant.model.droppers, view.droppers - 1e-9)]
     np.testing.assert_allclose(view.bottoms, np.where(held == 0, *heights), atol=1e-9)
     assert np.abs(second - view.contact).max() > 1e-3
-
-
-def test_environments_and_policies_take_both_wires():
-    """Lanes as single ones; a policy that knows the line knows tension and mass of both together."""
-    settings = {"catenary": "ca-160", "pantograph": "dsa250", "speed_kmh": 160.0}
-    check_lanes_are_singles("Pantograph-v0", settings, steps=60, lanes=2)
-    one = twin.direct_current()
-    np.testing.assert_allclose(line_values(twin.two_wires(one)), line_values(one), rtol=1e-12)
-    both, equal = (mean_line(SimpleNamespace(catenary=line)) for line in (twin.two_wires(one), one))
-    assert both.damper == pytest.approx(equal.damper)
-    assert both.spring == pytest.approx(equal.spring)
-
-
-def test_a_plot_of_the_line_shows_both_wires():
-    figure = plot_line(check(CA, 100.0))
-    wires, contact, _ = figure.axes
+    wires, contact, _ = plot_line(check(CA, 100.0)).axes
     (second,) = (each for each in wires.lines if each.get_label() == "second contact wire")
     x, height = second.get_data()
     np.testing.assert_allclose(height, hang(CA).second.height(x), atol=1e-12)
@@ -280,11 +254,15 @@ def test_a_plot_of_the_line_shows_both_wires():
     assert any(np.allclose(each, 1e3 * height) for each in drawn)
 
 
-def test_elasticity_is_that_of_a_force_shared_by_both():
-    one = equivalent(steady_arm={"mass": 1.0, "stiffness": 200.0})
-    ours, theirs = (elasticity(line, 100.0) for line in (coinciding(one), one))
-    there = np.interp(theirs[0], *ours)
-    np.testing.assert_allclose(there, theirs[1], rtol=0.02)
+def test_environments_and_policies_take_both_wires():
+    """Lanes as single ones; a policy that knows the line knows tension and mass of both together."""
+    settings = {"catenary": "ca-160", "pantograph": "dsa250", "speed_kmh": 160.0}
+    check_lanes_are_singles("Pantograph-v0", settings, steps=30, lanes=2)
+    one = twin.direct_current()
+    np.testing.assert_allclose(line_values(twin.two_wires(one)), line_values(one), rtol=1e-12)
+    both, equal = (mean_line(SimpleNamespace(catenary=line)) for line in (twin.two_wires(one), one))
+    assert both.damper == pytest.approx(equal.damper)
+    assert both.spring == pytest.approx(equal.spring)
 
 
 @pytest.mark.parametrize(
@@ -321,19 +299,9 @@ def test_what_is_not_computed_with_two_wires_is_refused(changes, message):
         changed(CA, **changes)
 
 
-def test_defects_of_the_contact_wire_itself_are_refused():
-    for own in ({"hard_spots": [(4, 20.0, 1.0, 0.0)]}, {"worn_stretches": [(4, 10.0, 20.0, 0.1)]}):
-        with pytest.raises(
-            InputError, match=r"'ca-160' has two contact wires, on which hard_spots and worn_"
-        ):
-            simulate("ca-160", DSA, 160.0, line_condition=own)
-
-
-def test_a_train_s_record_has_the_force_on_each_wire_of_each_pantograph(tmp_path):
-    run = simulate(CA, pantographs=[DSA, DSA], distances=[60.0], speed_kmh=160.0, distance=700.0)
-    run.save(tmp_path / "run.parquet")
-    for own, again in zip(run.train, Trajectory.load(tmp_path / "run.parquet").train, strict=True):
-        assert len(own.second_force) == len(own.time)
-        np.testing.assert_array_equal(again.second_force, own.second_force)
-    headings = table_of(run).headings
-    assert headings["second_force@2"] == "second_force of pantograph 2 (N)"
+@pytest.mark.parametrize(
+    "own", [{"hard_spots": [(4, 20.0, 1.0, 0.0)]}, {"worn_stretches": [(4, 10.0, 20.0, 0.1)]}], ids=list
+)
+def test_defects_of_the_contact_wire_itself_are_refused(own):
+    with pytest.raises(InputError, match=r"'ca-160' has two contact wires, on which hard_spots and worn_"):
+        simulate("ca-160", DSA, 160.0, line_condition=own)

@@ -1,8 +1,7 @@
 """A line of many span lengths, through everything that asks where something is.
 
-Today's lines have spans of one length each. The line of periodic stiffness computes with any alignment
-that it is given, so that here it has many lengths; what is expected follows from the supports'
-positions alone.
+The line of periodic stiffness computes with any alignment that it is given, so that here it has many
+lengths; what is expected follows from the supports' positions alone.
 """
 
 import io
@@ -72,35 +71,6 @@ def test_a_train_that_runs_in_covers_whole_spans_of_its_own_lengths():
     k = int(drawn)
     way = SUPPORTS[k] + (drawn - k) * LENGTHS[k]
     assert task.plant.position(0, task.plant.of(0, 8))[0] == pytest.approx(way, abs=0.7)  # a control step
-
-
-def test_observation_and_odometer():
-    """The place is that of the own span; an odometer's error begins anew at each support."""
-    exact, wrong = (
-        Task(run_settings(WHOLE | {"sensors": sensors})) for sensors in ("ideal", "ideal:mast_jitter=0.5")
-    )
-    errors = []
-    for task in (exact, wrong):
-        task.reset(0, np.random.default_rng(1))
-    columns = [exact.layout.index(f"{name} of span position") for name in ("sine", "cosine")]
-    for step in range(1, 1100):
-        x = step * 0.01 * 250 / 3.6
-        if x > SUPPORTS[-1] - 1.0:
-            break
-        for task in (exact, wrong):
-            task.step(np.zeros((1, 1)))
-        seen, read = (
-            np.arctan2(*task.results.observation[0, columns]) / (2 * np.pi) for task in (exact, wrong)
-        )
-        assert np.mod(seen - share(x) + 0.5, 1) == pytest.approx(0.5, abs=1e-6)
-        k = int(np.searchsorted(SUPPORTS, x, side="right")) - 1
-        errors.append((k, (np.mod(read - seen + 0.5, 1) - 0.5) * LENGTHS[k]))
-    spans, metres = np.array(errors).T
-    per_span = np.array([metres[spans == k][1:].mean() for k in range(len(LENGTHS))])
-    spread = np.array([np.ptp(metres[spans == k][1:]) for k in range(len(LENGTHS))])
-    assert spread.max() < 1e-3  # m: constant from a support to the next
-    assert 0.25 < per_span.std() < 1.0  # about the 0.5 m that was asked for
-    assert len(np.unique(per_span.round(6))) == len(LENGTHS)
 
 
 def test_a_policy_is_in_step_with_the_spans():

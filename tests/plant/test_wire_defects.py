@@ -1,4 +1,4 @@
-"""Hard spots, worn stretches and lost tension: at rest and under a train against finite elements."""
+"""Hard spots, worn stretches, lost tension and ice: at rest and under a train against finite elements."""
 
 from dataclasses import replace
 
@@ -15,6 +15,7 @@ from panto_env.control.settings import run_settings
 from panto_env.metrics.low_pass import zero_phase_low_pass
 from panto_env.plant.catenary.flexible.defects import DefectiveLine, with_tension_left
 from panto_env.plant.catenary.flexible.resolution import HARD_SPOT_GRID
+from panto_env.plant.catenary.flexible.static import solve
 from panto_env.plant.catenary.flexible.wire_defects import RAMP, worn_depth
 from panto_env.plant.catenary.flexible.wires import rise_by_defects
 from panto_env.plant.line_condition import LineCondition
@@ -24,6 +25,7 @@ from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.system import _placement, build
 from ..marks import some_at_once
 from .test_flexible import under_a_train
+from .test_uneven import MIXED, line_of
 
 of_defects = python_function(rise_by_defects)
 EN50318, BENCHMARK = "en50318-2002", "benchmark-2015"
@@ -31,17 +33,19 @@ SPOT = {"hard_spots": [(3, 27.0, 8.0, 3000.0)]}
 WORN = {"worn_stretches": [(3, 10.5, 19.5, 0.2)]}
 LOST = {"lost_contact_tension": 0.1, "lost_messenger_tension": 0.15}
 BUMP = {"surface_bumps": [(3, 36.0, 4.0, 0.005)]}
+ICE = {"ice": 0.3}
 CONDITIONS = {
     "hard spot": SPOT,
     "worn stretch": WORN,
     "bump": BUMP,
     "lost tension": LOST,
-    "all": SPOT | WORN | BUMP | LOST,
+    "ice": ICE,
+    "all": SPOT | WORN | BUMP | LOST | ICE,
 }
 
 
 def without(system, data, condition, element):
-    """Matrices of mass and stiffness that a condition takes away, and the load of both at rest (N)."""
+    """Matrices of mass and stiffness that a condition takes away, and the load of it at rest (N)."""
     nodes, size = system.nodes, system.free.size
     mass, stiffness, load = 0 * system.mass, 0 * system.mass, np.zeros(size)
     for span, offset, length, share in condition.worn_stretches:
@@ -51,6 +55,13 @@ def without(system, data, condition, element):
         gone = data.contact_wire.model_copy(update={"mass": share * data.contact_wire.mass})
         mass = mass + place @ matrices(nodes[inside], gone)[1] @ place.T
         load += place @ uniform_load(nodes[inside], gone.mass * GRAVITY)
+    for first in (0, 2) if condition.ice else ():  # messenger, contact wire
+        place = _placement(size, 4 * np.arange(len(nodes))[:, None] + [first, first + 1])
+        coat = data.contact_wire.model_copy(update={"mass": condition.ice})
+        mass = mass - place @ matrices(nodes, coat)[1] @ place.T
+        load -= place @ uniform_load(nodes, condition.ice * GRAVITY)
+    if not condition.lost_contact_tension and not condition.lost_messenger_tension:
+        return mass, stiffness, load
     shape = static_shape(data, element)
     for wire, share, first, heights in (
         (data.contact_wire, condition.lost_contact_tension, 2, (shape.contact, shape.contact_slope)),
@@ -155,8 +166,7 @@ def test_worn_depth_of_half_a_wire_is_its_radius():
     assert 4 / 3 * np.sqrt(2 * np.sqrt(section / np.pi) * thin**3) == pytest.approx(0.01 * section, rel=0.02)
 
 
-@pytest.mark.parametrize("accuracy", ["full", "fast"])
-def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
+def test_a_grid_as_usual_carries_a_section_insulator():
     """Low-passed forces beside those of a fine grid, as a share of what the spot does to them.
 
     The head is thrown off for 25 ms and lands a little early or late: there most of the 5 % arise.
@@ -165,7 +175,7 @@ def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
     runs = [
         simulate(speed_kmh=250.0, line_condition=condition, distance=300.0, spans=8, **how)
         for condition, how in (
-            (spot, {"accuracy": accuracy}),
+            (spot, {}),
             (spot, {"spacing": 0.1, "time_step": 2e-4}),
             ("new", {"spacing": 0.1, "time_step": 2e-4, "window": 0}),
         )
@@ -182,10 +192,9 @@ def test_a_grid_as_usual_carries_a_section_insulator(accuracy):
 )
 def test_a_defect_of_no_size_changes_nothing(defects):
     """But rounding: what carries a line out of its design is there, with zeros in it."""
+    zeros = {"hard_spots": (0.0, 0.0), "worn_stretches": (0.0,), "surface_bumps": (0.0,)}
     none = {
-        key: [(*row[:-2], 0.0, 0.0) if key == "hard_spots" else (*row[:-1], 0.0) for row in value]
-        if isinstance(value, list)
-        else 0.0
+        key: [(*row[: -len(zeros[key])], *zeros[key]) for row in value] if key in zeros else 0.0
         for key, value in defects.items()
     }
     given = {"distance": 300.0, "window": 0, "spacing": HARD_SPOT_GRID}
@@ -201,10 +210,9 @@ def test_lanes_share_what_is_wrong_with_the_wires_and_draw_the_rest():
         batch.reset(lane, np.random.default_rng(lane))
     batch.run_passively()
     alone = [simulate(seed=seed, **settings) for seed in range(2)]
-    for lane in range(2):
-        run = batch.trajectory(lane)
-        np.testing.assert_array_equal(run.contact_force, alone[lane].contact_force)
-        np.testing.assert_array_equal(run.dropper_force, alone[lane].dropper_force)
+    for run, single in zip(map(batch.trajectory, range(2)), alone, strict=True):
+        np.testing.assert_array_equal(run.contact_force, single.contact_force)
+        np.testing.assert_array_equal(run.dropper_force, single.dropper_force)
     assert (alone[0].contact_force - alone[1].contact_force).std() > 1.0
 
 
@@ -251,3 +259,24 @@ def test_a_window_that_travels_is_refused_where_the_wire_is_not_even():
     with pytest.raises(InputError, match=r"computed as a whole, .* leave out window=8, or set it to 0"):
         simulate(line_condition=WORN, window=8)
     assert simulate(line_condition=WORN, distance=200.0).settings["window"] == 10
+
+
+def test_spans_that_differ_bear_ice_as_finite_elements_say():
+    data, condition, spans = line_of(MIXED), LineCondition(ice=0.6), len(MIXED)
+    other, line = defective(data, spans, 0.1, condition), DefectiveLine(data.layout(spans), condition)
+    state, begins = line.solve(), data.alignment().supports
+    ours = solve(with_tension_left(data, condition)).contact.height(other.nodes)
+    ours = ours + line.rise(state).height(other.nodes)
+    inner = (other.nodes > begins[3]) & (other.nodes < begins[-4])
+    np.testing.assert_allclose(ours[inner], other.static[inner, 0], atol=5e-4)
+    droppers = data.layout().positions
+    own = (droppers > begins[3]) & (droppers < begins[-4])
+    np.testing.assert_allclose(state.tension[own], other.dropper_tension[own], atol=0.5)
+
+
+def test_ice_under_which_a_line_cannot_hang_is_refused():
+    said = r"would differ by 0.\d+ m in height, more than 0.5 m, in this line_c"
+    with pytest.raises(InputError, match=said):
+        simulate(EN50318, speed_kmh=100.0, line_condition={"ice": 3.0}, distance=100.0)
+    with pytest.raises(InputError, match=r"must not differ in .* ice or temp"):
+        simulate(line_condition=["new", {"ice": 0.3}])

@@ -230,9 +230,7 @@ class FlexibleLine(NamedTuple):
     link_weight: Array  # (sets, 4, WIDTH): of the four nodes
     link_move: Array  # (sets, ends times 4, WIDTH): displacement of the nodes in a step by 1 N (m/N)
     link_pull: Array  # (sets, 3, WIDTH): change of tension by extension at three times, newest first (N/m)
-    link_room: (
-        Array  # (sets, WIDTH): designed distance of its ends; the wires touch once they approach by it (m)
-    )
+    link_room: Array  # (sets, WIDTH): designed distance of its ends, at which the wires touch (m)
     link_set: Index  # (links,): set of each of the window's links, in the order along the line
     link_segment: Index  # (links,): its segment
     link_static: Array  # (rows, links of the window or the line): static tension (N)
@@ -252,9 +250,7 @@ class FlexibleWire(NamedTuple):
     increment: Array  # (lanes, wires, rows + 2 PAD, WIDTH): d, over the last step (m)
     travelled: Index  # (lanes,): strides that the window has travelled
     # Of the window's nodes; one for all lanes where the window's masses are the same all along the line.
-    inertia: (
-        Array  # (1 or lanes, wires, rows, WIDTH): bare wire's mass over the node's; no rows where all are 1
-    )
+    inertia: Array  # (1 or lanes, wires, rows, WIDTH): bare wire's mass over node's; no rows where all are 1
     mobility: Array  # (1 or lanes, wires, rows + 2 PAD, WIDTH): displacement in one step by 1 N (m/N)
     # Contact points are those of all collectors with the first pair of wires, then with the second one.
     contact_row: Index  # (lanes, contacts): row of the first of the four nodes about a contact point

@@ -52,8 +52,7 @@ def elasticity(
         places = _places(layout.spans[0], 0.0, line.span_length)
         whole = DefectiveLine(layout, condition, tensions, places.tolist())
         return places, _lifts(whole, places + SPANS_OF_ELASTICITY // 2 * line.span_length, force)
-    found: list[tuple[Array, Array]] = []
-    layout = line.layout()
+    found, layout = list[tuple[Array, Array]](), line.layout()
     for span, (begin, end) in zip(layout.spans[1:-1], pairwise(layout.supports[1:-1]), strict=True):
         places = _places(span, begin, end)
         lifts = np.zeros(len(places))
@@ -64,7 +63,8 @@ def elasticity(
                 whole = DefectiveLine(part.layout, condition, tensions, own.tolist())
                 lifts[used] = _lifts(whole, own, force)
         found.append((places, lifts))
-    return np.concatenate([x for x, _ in found]), np.concatenate([lifts for _, lifts in found])
+    every, lifted = map(np.concatenate, zip(*found, strict=True))
+    return every, lifted
 
 
 def per_span(places: Array, lifts: Array) -> list[Array]:

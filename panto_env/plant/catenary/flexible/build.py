@@ -66,8 +66,7 @@ def constants(
     grid = on_grid(layout, shape, per_stride, x, resolution.time_step, own)
     real = np.float32 if numerics.precision == "single" else np.float64
     rows = per_stride * window // WIDTH
-    masts_of_window = per_stride * np.arange(1, window) if not differ else np.zeros(0, dtype=np.int64)
-    mast_row, mast_segment = places(masts_of_window, rows)
+    mast_row, mast_segment = places(per_stride * np.arange(1, 1 if differ else window), rows)
     kept = rows * WIDTH + 1 + 2 * PAD  # nodes of the first window
     inertia, mobility = grid.inertia[:, :kept], grid.mobility[:, :kept].copy()
     mobility[:, -PAD - 1 :] = 0.0
@@ -112,9 +111,8 @@ class Sets:
     def __init__(self, wires: Index, node: Index, rows: int) -> None:
         """wires: (things, ends) that each hangs on; node: (things,), the first one's number."""
         row, self.segment = places(node, rows)
-        found: dict[tuple[int, ...], int] = {}  # by row, wires, and how many are in the segment already
-        self.number = np.zeros(len(node), dtype=np.int64)
-        there: Counter[tuple[int, ...]] = Counter()
+        found = dict[tuple[int, ...], int]()  # by row, wires, and how many are in the segment already
+        self.number, there = np.zeros(len(node), dtype=np.int64), Counter[tuple[int, ...]]()
         for k, place in enumerate(zip(row.tolist(), *wires.T.tolist(), strict=True)):
             own = (*place, int(self.segment[k]))
             self.number[k] = found.setdefault((*place, there[own]), len(found))
@@ -134,19 +132,19 @@ def _in_equal_rows(grid: OnGrid, differ: bool, rows: int, real: Any) -> dict[str
 
     differ: whether spans do. All is scattered then.
     """
-    its = those = slice(0, 0) if differ else slice(None)
+    some = slice(0, 0) if differ else slice(None)
     springs, links, yielding = grid.springs, grid.links, grid.spring_yield
-    held = Sets(springs.wire[its, None], grid.at_springs.first[its] + 1, rows)
-    joined = Sets(links.wires[those], grid.at_links.first[those], rows)
+    held = Sets(springs.wire[some, None], grid.at_springs.first[some] + 1, rows)
+    joined = Sets(links.wires[some], grid.at_links.first[some], rows)
     pull = yielding * springs.levels / (1 + springs.levels[:, :1] * yielding)
 
     def of_links(values: Array, empty: float = 0.0) -> Array:
-        return joined.of(values[those], real, empty)
+        return joined.of(values[some], real, empty)
 
     return {
         "spring_wire": held.wires[:, 0],
         "spring_row": held.row,
-        "spring_pull": held.of(pull[its], real),
+        "spring_pull": held.of(pull[some], real),
         "link_wire": joined.wires,
         "link_row": joined.row,
         "link_weight": of_links(grid.at_links.weights),
@@ -169,36 +167,27 @@ class Tensioned(NamedTuple):
 
 def of_tension(data: FlexibleCatenaryData, shape: StaticShape, dx: float, step: float) -> Tensioned:
     """Constants that depend on tension, for a grid of spacing ``dx`` (m) and a time step (s)."""
-    damping, wires = data.damping, data.wires * data.layout().pairs
+    damping, layout = data.damping, data.layout()
+    wires = data.wires * layout.pairs
     settle = 1.0 + damping.alpha * step / 2
-    keep = (1.0 - damping.alpha * step / 2) / settle
-    stencil = [
-        [
-            *second_differences(stencil_weights(wire, dx, step, damping.beta)) / settle,
-            keep,
-            damping.beta / step,
-            QUIET,
-        ]
-        for wire in wires
-    ]
+    damped = (1.0 - damping.alpha * step / 2) / settle, damping.beta / step, QUIET
+    weights = [second_differences(stencil_weights(wire, dx, step, damping.beta)) for wire in wires]
     courant = np.array([wire.wave_speed for wire in wires]) * step / dx
-    heights, beside = _heights(data, shape)
-    return Tensioned(
-        shape=heights,
-        beside=beside,
-        stencil=np.array(stencil),
-        absorbing=(courant - 1) / (courant + 1),
-    )
-
-
-def _heights(data: FlexibleCatenaryData, shape: StaticShape) -> tuple[Array, Array]:
-    """Tables of the static height of the contact wire, (n,), and of that beside it, or none."""
     if isinstance(shape.contact, Profile):
         breaks, _, _, repeats = own = shape.contact
         at = _table(data.period, tuple(breaks.tolist()), repeats)
-        return own.height_at(at), np.zeros(0) if shape.second is None else shape.second.height_at(at)
-    layout, table = data.layout(), _table_places(data.period)
-    return heights_of_pair(layout, shape, 0, table), heights_of_pair(layout, shape, 1, table)
+        heights, beside = (
+            own.height_at(at),
+            np.zeros(0) if shape.second is None else shape.second.height_at(at),
+        )
+    else:
+        heights, beside = (heights_of_pair(layout, shape, k, _table_places(data.period)) for k in (0, 1))
+    return Tensioned(
+        shape=heights,
+        beside=beside,
+        stencil=np.array([[*each / settle, *damped] for each in weights]),
+        absorbing=(courant - 1) / (courant + 1),
+    )
 
 
 @remembered
@@ -218,8 +207,11 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
     sets, springs = len(line.link_row) + apart[0], len(line.spring_row) + apart[1]
     each, contacts = lanes if line.scattered.mobility.size else 1, collectors * line.pairs
 
-    def of_links(value: float) -> Array:
-        return np.full((lanes, sets, WIDTH), value, dtype=real)
+    def at_contacts(kind: Any = float) -> Any:
+        return np.zeros((lanes, contacts), dtype=kind)
+
+    def of_links() -> Array:
+        return np.zeros((lanes, sets, WIDTH), dtype=real)
 
     wire = FlexibleWire(
         # The leapfrog reads and writes both side by side. Were they at the same place of a page, a processor
@@ -229,21 +221,21 @@ def at_rest(line: FlexibleLine, lanes: int, collectors: int) -> FlexibleWire:
         travelled=np.zeros(lanes, dtype=np.int64),
         inertia=np.repeat(line.inertia[None], each, axis=0),
         mobility=np.repeat(line.mobility[None], each, axis=0),
-        contact_row=np.zeros((lanes, contacts), dtype=np.int64),
-        contact_segment=np.zeros((lanes, contacts), dtype=np.int64),
+        contact_row=at_contacts(int),
+        contact_segment=at_contacts(int),
         contact_weight=np.zeros((lanes, contacts, 4)),
-        contact_missing=np.zeros((lanes, contacts)),
-        unmoved_height=np.zeros((lanes, contacts)),
-        pressed=np.zeros((lanes, contacts)),
-        near_missing=np.zeros((lanes, contacts)),
+        contact_missing=at_contacts(),
+        unmoved_height=at_contacts(),
+        pressed=at_contacts(),
+        near_missing=at_contacts(),
         near_set=np.full((lanes, contacts), -1),
-        near_segment=np.zeros((lanes, contacts), dtype=np.int64),
-        near_gap=np.zeros((lanes, contacts), dtype=real),
+        near_segment=at_contacts(int),
+        near_gap=at_contacts(real),
         spring_past=np.zeros((lanes, springs, WIDTH), dtype=real),
-        extension=of_links(0.0),
-        change=of_links(0.0),
-        static=of_links(1.0),  # where there is no link, none is ever slack
-        gap=of_links(0.0),
+        extension=of_links(),
+        change=of_links(),
+        static=np.ones((lanes, sets, WIDTH), dtype=real),  # where there is no link, none is ever slack
+        gap=of_links(),
         scattered=own,
         gusts=still(line.air, line.rows, lanes, real),
     )

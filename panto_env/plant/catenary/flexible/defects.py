@@ -15,7 +15,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -32,25 +33,6 @@ from .schema import FlexibleCatenaryData
 from .shape import GRAVITY, HELD, Beams, Profile, add_to_band, beams_of, joined, places_in_band, solve_band
 from .static import StaticShape, solve
 from .wire_defects import WireDefects, locate
-
-
-class _Arms(NamedTuple):
-    """Steady arms of a line as it was designed: at its supports, or one for all."""
-
-    places: Array  # (arms,): m
-    stiffness: Array  # (arms,): N/m
-    heights: Array  # (contact wires side by side, arms): of these there (m)
-    holding: Any  # (arms,): whether each holds the wire
-
-
-class Misfit(NamedTuple):
-    """Differences of a line that has lost tension, or bears ice, from one that was designed for that."""
-
-    too_long: Array  # (droppers of the spans that repeat,): excess length of the droppers (m)
-    lighter: Array  # (droppers,): missing weight of each half of a dropper (N)
-    # (contact wires side by side, supports between two spans, or one for all): additional upward force of
-    # steady arms (N)
-    lift: Array
 
 
 def with_tension_left(
@@ -84,23 +66,12 @@ def shape_left(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> St
     return replace(solve(left), dropper_mass=was.dropper_mass, dropper_stiffness=was.dropper_stiffness)
 
 
-def misfit(designed: FlexibleCatenaryData, left: FlexibleCatenaryData) -> Misfit:
-    """How a line with its real droppers and steady arms differs from the shape of ``shape_left``."""
-    was, now = solve(designed), solve(left)
-    stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
-    arms = _arms(designed)
-    lift: Any = arms.stiffness * (arms.heights - [wire.height(arms.places) for wire, _ in now.contacts])
-    for its_lift, (_, force), (_, its_force) in zip(lift, was.contacts, now.contacts, strict=True):
-        its_lift[arms.holding] += force - its_force
-    return Misfit(
-        too_long=was.dropper_length - now.dropper_length + stretch,
-        lighter=GRAVITY * (now.dropper_mass - was.dropper_mass) / 2,
-        lift=lift[:, 1:-1] if designed.sequence else lift,
-    )
-
-
 @remembered
-def _arms(designed: FlexibleCatenaryData) -> _Arms:
+def _arms(designed: FlexibleCatenaryData) -> tuple[Array, Array, Array, Any]:
+    """Steady arms as designed: places (m), stiffness (N/m), heights of each contact wire (m), which hold it.
+
+    (arms,) each: at all supports, or one for all where spans are alike.
+    """
     layout = designed.layout(1)
     holding = [span.steady_arm.holds_wire for span in layout.spans]
     stiffness = steady_arms(layout).stiffness
@@ -108,8 +79,7 @@ def _arms(designed: FlexibleCatenaryData) -> _Arms:
         holding.append(holding[-1])
         stiffness = np.append(stiffness, stiffness[-1])
     x = np.array(layout.supports[: len(holding)])
-    heights = np.array([wire.height(x) for wire, _ in solve(designed).contacts])
-    return _Arms(x, stiffness, heights, np.array(holding))
+    return x, stiffness, np.array([wire.height(x) for wire, _ in solve(designed).contacts]), np.array(holding)
 
 
 BROKEN_GAP = 1e6  # m that the ends of a broken dropper may part before it pulls: never
@@ -166,9 +136,7 @@ class DefectiveLine:
             divided = [_divided(span, own, nodes, begin) for span, begin in begins]
         else:
             divided = [_divided(each[0], own, [*nodes, *(stitches.clamps % data.span_length)])] * len(each)
-        firsts = np.cumsum(
-            [0, *(len(lengths) for _, lengths, _ in divided)]
-        )  # numbers of the supports' nodes
+        firsts = np.cumsum([0, *(len(lengths) for _, lengths, _ in divided)])  # numbers of supports' nodes
         number = np.arange(firsts[-1] + 1)
         hung = np.concatenate([first + ours for first, (*_, ours) in zip(firsts, divided, strict=False)])
         self._ends = per_node * hung[:, None] + [0, 2]  # of the droppers
@@ -232,10 +200,7 @@ class DefectiveLine:
     def _stitch(self, messenger: Wire) -> None:
         places, stitches, lengths, size = self._places, self._stitches, self._lengths, self._size
         above = self._unknowns + 2 * (MESSENGER - CONTACT)
-        tensions = messenger.tension - stitches.deficit(places, places + lengths)
-        for tension in np.unique(np.round(tensions, 6)):
-            which = np.flatnonzero(np.round(tensions, 6) == tension)
-            thinner = messenger.model_copy(update={"tension": float(tension)})
+        for which, thinner in stitches.thinned(messenger, places, places + lengths):
             stiffness = Beams(thinner, lengths[which]).stiffness
             add_to_band(self._band, places_in_band(above[which], size), stiffness)
         unused = np.ones(size, dtype=bool)
@@ -260,12 +225,18 @@ class DefectiveLine:
             self._load[self._height_at(spot.position)] -= GRAVITY * spot.mass
         self._load[self._masts] += self._arm_lift
         self._error = self._miscut
-        if left is not self._data:
-            fit = misfit(self._data, left)
-            self._error = self._miscut + np.tile(fit.too_long, self._times)
-            self._load[self._ends] += np.tile(fit.lighter, self._times)[:, None]
-            for at, lift in zip(self._contacts, fit.lift, strict=True):
-                self._load[self._masts + at] += lift
+        if left is not self._data:  # real droppers and arms are unlike those of the shape of ``shape_left``
+            was, now = solve(self._data), solve(left)
+            stretch = now.dropper_tension * (1 / was.dropper_stiffness - 1 / now.dropper_stiffness)
+            too_long = was.dropper_length - now.dropper_length + stretch
+            lighter = GRAVITY * (now.dropper_mass - was.dropper_mass) / 2  # each half of a dropper
+            self._error = self._miscut + np.tile(too_long, self._times)
+            self._load[self._ends] += np.tile(lighter, self._times)[:, None]
+            places, stiffness, heights, holding = _arms(self._data)
+            for k, ((_, force), (wire, its_force)) in enumerate(zip(was.contacts, now.contacts, strict=True)):
+                lift = stiffness * (heights[k] - wire.height(places))  # of steady arms, in addition
+                lift[holding] += force - its_force
+                self._load[self._masts + self._contacts[k]] += lift[1:-1] if self._data.sequence else lift
 
     def _height_at(self, position: float) -> int:
         """Number of the unknown that is the contact wire's height at the node nearest to a position (m)."""
@@ -281,25 +252,20 @@ class DefectiveLine:
         added to those of the condition. pushed: position (m) of a node of the contact wire, and an upward
         force (N) on it; on each of two half of it.
         """
-        error = self._error if scatter is None else self._error + scatter
-        load = self._load
+        error, load = self._error if scatter is None else self._error + scatter, self._load.copy()
         if heights is not None:
-            load = load.copy()
             load[self._lifted] += self._support_stiffness * heights
         if pushed is not None:
-            load = load.copy()
             for at in self._contacts:
                 load[self._height_at(pushed[0]) + at] += pushed[1] / len(self._contacts)
         taut = ~self._broken
-        rounds = 0
-        while True:
+        for rounds in count(1):
             change = self._solve_linear(taut, error, load)
             contact, messenger = change[self._ends].T
             pull = self._static + self._stiffness * (messenger - contact - error)  # were it always taut
             wrong = np.flatnonzero(~self._broken & (np.where(taut, -pull, pull) > SLIGHT))
             if len(wrong) == 0:
                 break
-            rounds += 1
             turned = wrong if rounds <= ROUNDS else wrong[-1:]
             taut[turned] = ~taut[turned]
         gap = np.where(self._broken, BROKEN_GAP, np.maximum(-pull, 0.0) / self._stiffness)

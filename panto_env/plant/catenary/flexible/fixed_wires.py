@@ -63,6 +63,8 @@ def _solve(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float,
     without = condition.model_copy(update={"ice": 0.0, "temperature": 0.0})
     begun = [wire.tension for wire in with_tension_left(data, without).wires]
     fixed = [k for k, wire in enumerate(data.wires) if wire.axial_stiffness is not None]
+    both = zip(data.wires, begun, strict=True)
+    stretch = [(wire.axial_stiffness or 0.0) / tension for wire, tension in both]
     before = _slack(data, without, UNCHANGED)
 
     def factors(shares: Array) -> tuple[float, float]:
@@ -73,12 +75,8 @@ def _solve(data: FlexibleCatenaryData, condition: LineCondition) -> tuple[float,
         """By how much each fixed wire has too much tension for its length, relative to its tension."""
         shares = np.maximum(shares, [LOWEST_TENSION / begun[k] for k in fixed])
         slack = _slack(data, condition, factors(shares))
-        over = []
-        for k, share in zip(fixed, shares, strict=True):
-            wire, stretch = data.wires[k], float(data.wires[k].axial_stiffness or 0.0) / begun[k]
-            longer = slack[k] - before[k] - wire.expansion * condition.temperature
-            over.append(share - 1 - stretch * longer)
-        return np.array(over)
+        longer = slack - before - [wire.expansion * condition.temperature for wire in data.wires]
+        return np.array([share - 1 - stretch[k] * longer[k] for k, share in zip(fixed, shares, strict=True)])
 
     result = root(excess, np.ones(len(fixed)), tol=1e-10)
     low = [k for k, share in zip(fixed, result.x, strict=True) if share * begun[k] <= LOWEST_TENSION]

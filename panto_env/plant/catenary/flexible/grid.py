@@ -244,11 +244,6 @@ def carrying_grid(data: FlexibleCatenaryData, speed: float) -> float:
     if speed >= wire.wave_speed:
         return 0.0
     carried = 2 * math.pi / wave_ahead(wire, speed, CARRIED_HZ) / CARRIED_NODES
-    return min(carried, _clamp_grid(data, speed))
-
-
-def _clamp_grid(data: FlexibleCatenaryData, speed: float) -> float:
-    wire, mass = data.contact_wire, max(data.layout(1).of_droppers("contact_clamp_mass"))
-    number = wave_ahead(wire, speed, CLAMP_HZ)
+    mass, number = max(data.layout(1).of_droppers("contact_clamp_mass")), wave_ahead(wire, speed, CLAMP_HZ)
     share = (2 * math.pi * CLAMP_HZ + speed * number) * mass / (2 * wire.impedance)
-    return math.sqrt(CLAMP_ERROR / share) / number if share > 0 else math.inf
+    return min(carried, math.sqrt(CLAMP_ERROR / share) / number if share > 0 else math.inf)

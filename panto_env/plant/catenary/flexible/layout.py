@@ -8,8 +8,10 @@ of every second tension length form one pair of wires on the grid.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,9 +21,8 @@ from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...alignment import Alignment
 from ..schema import FEWEST_SPANS, Wire
-from .parts import CLOSEST, SAME, Droppers, Overlap, Span, StitchWire, nearer
+from .parts import CLOSEST, SAME, Droppers, EndSupport, Overlap, Span, StitchWire, nearer
 from .spans import in_sequence, valid
-from .two_wires import hung
 
 if TYPE_CHECKING:
     from .schema import FlexibleCatenaryData
@@ -94,6 +95,12 @@ class Stitches(NamedTuple):
             total += tension * np.clip(np.minimum(end, last) - np.maximum(begin, first), 0, None)
         return np.asarray(total / (end - begin))
 
+    def thinned(self, wire: Wire, begin: Array, end: Array) -> Iterator[tuple[Index, Wire]]:
+        """Pieces of the messenger, from ``begin`` to ``end`` (m), (n,), of each tension, and such a wire."""
+        tensions = np.round(wire.tension - self.deficit(begin, end), 6)
+        for tension in np.unique(tensions).tolist():
+            yield np.flatnonzero(tensions == tension), wire.model_copy(update={"tension": tension})
+
     def as_wire(self, number: int) -> Wire:
         """A stitch wire, which is a rope: it does not resist bending."""
         return Wire(tension=float(self.tension[number]), mass=float(self.mass[number]), bending_stiffness=0.0)
@@ -137,27 +144,25 @@ class Layout:
         """
         if not self.line.overlaps:
             return self._in_spans
-        found = dict[int, Dropper]()
-        for part in self.tension_lengths:
-            found |= {
-                k: own._replace(
-                    span=part.first_span + own.span, position=part.begin + own.position, pair=part.pair
-                )
-                for k, own in zip(part.droppers.tolist(), part.layout.droppers, strict=True)
-            }
-        count = Counter[int]()
-        for k in range(len(found)):
-            count[found[k].span] += 1
-            found[k] = found[k]._replace(number=count[found[k].span])
-        return tuple(found[k] for k in range(len(found)))
+        found = {
+            k: (part.first_span + own.span, part.begin + own.position, part.pair, own)
+            for part in self.tension_lengths
+            for k, own in zip(part.droppers.tolist(), part.layout.droppers, strict=True)
+        }
+        numbers = [count(1) for _ in range(len(self.spans) + 1)]
+        return tuple(
+            own._replace(span=span, number=next(numbers[span]), position=position, pair=pair)
+            for _, (span, position, pair, own) in sorted(found.items())
+        )
 
     @cached_property
     def _in_spans(self) -> tuple[Dropper, ...]:
         """The droppers of all spans, if no wires overlapped."""
+        wires = self.line.contact_wires
         return tuple(
             Dropper(k, number, begin + place, place, sag, span.droppers, wire)
             for k, (begin, span) in enumerate(zip(self.supports, self.spans, strict=False), start=1)
-            for number, (place, sag, wire) in enumerate(hung(span.droppers, self.line.contact_wires), start=1)
+            for number, (place, sag, wire) in enumerate(span.droppers.hung(wires), start=1)
         )
 
     @cached_property
@@ -168,9 +173,7 @@ class Layout:
     @cached_property
     def held(self) -> Index:
         """Number, from 0, of the contact wire side by side that each dropper holds, (droppers,)."""
-        if self.line.overlaps:
-            return np.zeros(len(self.droppers), dtype=np.int64)
-        return np.array([dropper.pair for dropper in self.droppers])
+        return np.array([0 if self.line.overlaps else dropper.pair for dropper in self.droppers])
 
     @cached_property
     def _numbers(self) -> dict[tuple[int, int], int]:
@@ -206,27 +209,22 @@ class Layout:
             end = supports[-1]
             return (TensionLength(self, 0, 0.0, end, (0.0, end), np.arange(len(self.droppers)), 0),)
         self._check_overlaps()
-        begins = [0, *(overlap.first_span - 1 for overlap in overlaps)]
-        ends = [*(overlap.first_span - 1 + overlap.spans for overlap in overlaps), len(self.spans)]
-        across = (overlap.first_span - 1 + overlap.spans // 2 for overlap in overlaps)
-        limits = [0.0, *((supports[span] + supports[span + 1]) / 2 for span in across), supports[-1]]
-        each = [
-            self._own_line(number, *given)
-            for number, given in enumerate(
-                zip(begins, ends, (None, *overlaps), (*overlaps, None), strict=True), start=1
-            )
-        ]
-        spans = [
-            np.array([first + dropper.span for dropper in own.droppers])
-            for first, own in zip(begins, each, strict=True)
-        ]
-        order = np.argsort(np.concatenate(spans), kind="stable")
-        numbers = np.split(np.argsort(order), np.cumsum([len(own) for own in spans])[:-1])
+        firsts = [overlap.first_span - 1 for overlap in overlaps]
+        begins, ends = [0, *firsts], [*(k + each.spans for k, each in zip(firsts, overlaps, strict=True))]
+        ends.append(len(self.spans))
+        across = [k + each.spans // 2 for k, each in zip(firsts, overlaps, strict=True)]
+        limits = [0.0, *((supports[k] + supports[k + 1]) / 2 for k in across), supports[-1]]
+        of_each = zip(begins, ends, (None, *overlaps), (*overlaps, None), strict=True)
+        each = [self._own_line(number, *given) for number, given in enumerate(of_each, start=1)]
+        both = zip(begins, each, strict=True)
+        spans = [first + dropper.span for first, layout in both for dropper in layout.droppers]
+        numbers = np.argsort(np.argsort(spans, kind="stable"))  # along the line
+        own = np.split(numbers, np.cumsum([len(layout.droppers) for layout in each])[:-1])
         return tuple(
             TensionLength(
-                own, first, supports[first], supports[last], (limits[k], limits[k + 1]), numbers[k], k % 2
+                layout, first, supports[first], supports[last], (limits[k], limits[k + 1]), own[k], k % 2
             )
-            for k, (own, first, last) in enumerate(zip(each, begins, ends, strict=True))
+            for k, (layout, first, last) in enumerate(zip(each, begins, ends, strict=True))
         )
 
     def _check_overlaps(self) -> None:
@@ -278,19 +276,18 @@ class Layout:
         heights: list[float] = (self.contact_heights[first : last + 1] + rise).tolist()
         for table, height in zip(tables, heights, strict=False):
             table["contact_height"] = height
-        end: dict[str, Any] = {}
+        end: dict[str, Any] = {"encumbrance": self.encumbrances[last], "contact_height": heights[-1]}
         if line.end_support is not None and last == len(self.spans):
-            end = line.end_support.model_dump(include={"stitch_wire"}, exclude_none=True)
-        changes: dict[str, Any] = {
+            end |= line.end_support.model_dump(include={"stitch_wire"}, exclude_none=True)
+        table = line.model_dump(exclude=NOT_OF_ITS_OWN, exclude_none=True) | {
             "name": f"{line.name}, tension length {number}",
             "sequence": tables,
-            "end_support": end | {"encumbrance": self.encumbrances[last], "contact_height": heights[-1]},
+            "end_support": end,
             "masts": line.masts[first : last + 1],
         }
         if line.plan is not None:
-            changes["plan"] = line.plan.from_support(first)
-        kept = line.model_dump(exclude=NOT_OF_ITS_OWN, exclude_none=True)
-        return valid(type(line), kept | changes, f"An overlap of line '{line.name}'").layout()
+            table["plan"] = line.plan.from_support(first)
+        return valid(type(line), table, f"An overlap of line '{line.name}'").layout()
 
     @cached_property
     def stitches(self) -> Stitches:
@@ -300,22 +297,15 @@ class Layout:
         """
         found = [*(span.stitch_wire for span in self.spans), stitch_at_end(self.line, self.spans[-1])]
         wires = {k: wire for k, wire in enumerate(found) if wire is not None and wire.length > 0}
+        rows = [(wire.length / 2, wire.tension, wire.mass, wire.clamp_mass) for wire in wires.values()]
+        half, tension, mass, clamp_mass = np.array(rows).reshape(-1, 4).T.copy()
+        support = np.array(list(wires), dtype=np.int64)
         place = np.array([self.supports[k] for k in wires])
-        half = np.array([wire.length / 2 for wire in wires.values()])
         x = np.array([dropper.position for dropper in self._in_spans])
         begin, end, carrying = place - half, place + half, np.full(len(x), -1)
         for number in range(len(wires)):
             carrying[(x > begin[number] + SAME) & (x < end[number] - SAME)] = number
-        stitches = Stitches(
-            np.array(list(wires), dtype=np.int64),
-            begin,
-            end,
-            np.array([wire.tension for wire in wires.values()]),
-            np.array([wire.mass for wire in wires.values()]),
-            np.array([wire.clamp_mass for wire in wires.values()]),
-            np.zeros(len(wires), dtype=np.int64),
-            carrying,
-        )
+        stitches = Stitches(support, begin, end, tension, mass, clamp_mass, 0 * support, carrying)
         _check_stitches(self.line, stitches, x)
         return stitches
 
@@ -364,21 +354,16 @@ def layout_of(line: FlexibleCatenaryData, spans: int) -> Layout:
         one = Span.model_construct(**{name: getattr(line, name) for name in names})  # valid in the line
         return Layout(line, (one,) * spans, (0.0,) * (spans + 1), (line.encumbrance,) * (spans + 1))
     each = in_sequence(line)
-    end, last = line.end_support, each[-1]
-    height = last.contact_height if end is None or end.contact_height is None else end.contact_height
-    encumbrance = last.encumbrance if end is None or end.encumbrance is None else end.encumbrance
-    return Layout(
-        line,
-        each,
-        (*(span.contact_height for span in each), height),
-        (*(span.encumbrance for span in each), encumbrance),
-    )
+    end, last = line.end_support or EndSupport(), each[-1]
+    height = last.contact_height if end.contact_height is None else end.contact_height
+    encumbrance = last.encumbrance if end.encumbrance is None else end.encumbrance
+    heights = (*(span.contact_height for span in each), height)
+    return Layout(line, each, heights, (*(span.encumbrance for span in each), encumbrance))
 
 
 def stitch_at_end(line: FlexibleCatenaryData, last: Span) -> StitchWire | None:
     """Stitch wire at the last support of a line with this last span."""
-    end = line.end_support
-    return last.stitch_wire if end is None or end.stitch_wire is None else end.stitch_wire
+    return (line.end_support or EndSupport()).stitch_wire or last.stitch_wire
 
 
 def _rise(table: dict[str, Any], span: Span, overlap: Overlap, entering_wire: bool) -> None:

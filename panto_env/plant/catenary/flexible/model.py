@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +26,8 @@ from .layout import Layout, TensionLength
 from .plan import in_wind
 from .points import with_points
 from .resolution import resolution, spans_of_train
-from .schema import FlexibleCatenaryData
+from .schema import INSTEAD, FlexibleCatenaryData
 from .static import StaticShape, hang
-from .two_wires import check_condition
 from .view import view_of
 from .wire_defects import locate
 
@@ -136,7 +136,7 @@ def _on_wire(part: TensionLength, layout: Layout, condition: LineCondition) -> L
     return condition.model_copy(update=own)
 
 
-DESIGNED = -1  # key, instead of a lane's number, of the shape of all lanes without a shape of their own
+OF_TENSION = ("shape", "stencil", "absorbing")  # tables of a line that depend on its wires' tension
 Own = tuple[StaticShape, Tensioned, DefectiveParts]
 """What depends on tensions: shape, stencil, and the line with its defects."""
 
@@ -145,9 +145,7 @@ class FlexibleCatenary:
     """Tensioned beams with droppers between them; a run starts at the line's first anchor."""
 
     massless = False
-    contact_share = (
-        0.5  # the wire's mean over a step is then as far from its height at mid-step as the head's
-    )
+    contact_share = 0.5  # the wire's mean over a step is as far from its height at mid-step as the head's
 
     def __init__(
         self,
@@ -171,7 +169,13 @@ class FlexibleCatenary:
                 "leave out spans, or give a shorter distance."
             )
         given, runs = runs.conditions, with_points(data, runs, spans)
-        condition = of_wires(runs.conditions)
+        condition = runs.conditions[0]
+        if any(each.of_wires != condition.of_wires for each in runs.conditions):
+            raise InputError(
+                "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
+                "worn_stretches, surface_bumps, lost_contact_tension, lost_messenger_tension, ice or "
+                "temperature; make a separate run for each."
+            )
         self.data = data = designed = in_wind(data, spans, runs.conditions)
         self._fixed = contact, messenger = tensions_of_fixed(designed, condition)
         data = with_tension_left(designed, condition, self._fixed)
@@ -179,8 +183,13 @@ class FlexibleCatenary:
         if data is not designed:
             shape = shape_left(designed, data)
         self.layout = layout = data.layout(spans)
-        for each in runs.conditions:
-            check_condition(designed, each)
+        if designed.contact_wires > 1 and any(
+            each.hard_spots or each.worn_stretches for each in runs.conditions
+        ):
+            raise InputError(
+                f"Line '{data.name}' has two contact wires, on which hard_spots and worn_stretches are not "
+                f"computed; leave them out, or give {INSTEAD}."
+            )
         own = locate(designed.layout(spans), condition)
         self.wave_speed = data.wave_speed
         error = max(each.largest_tension_error for each in runs.conditions)
@@ -190,12 +199,13 @@ class FlexibleCatenary:
         self.time_step = chosen.time_step
         lead = 0.5 * runs.train_length
         self.line = constants(data, shape, spans, numerics, chosen, own)._replace(lead=lead)
-        self._shapes = {DESIGNED: shape}  # by lane, where each has tensions of its own; only for pictures
+        # By lane, where each has tensions of its own; only for pictures.
+        self.shapes: dict[int | None, StaticShape] = {None: shape}
         self.wires_per_collector = self.line.pairs
         touched, beta = tightest.contact_wire, data.damping.beta
         self.contact_gain = point_gain(touched, self.line.spacing, self.time_step, beta, own.lightest)
-        about_one = self.line.window - spans_of_train(data, runs)
-        window = about_one if about_one >= FEWEST_SPANS else 0
+        window = self.line.window - spans_of_train(data, runs)  # about one pantograph
+        window = window if window >= FEWEST_SPANS else 0
         self.grid: Mapping[str, float] = {"spacing": self.line.spacing, "window": window}
         self.alignment = alignment = layout.alignment
         self.length = alignment.length
@@ -213,7 +223,7 @@ class FlexibleCatenary:
         self._defective: dict[LineCondition, DefectiveParts] = {}
         self._lines_differ = False
         if any(condition.defective for condition in runs.conditions) or designed.arms_in_wind:
-            self._make_defective(designed, spans, given, runs.conditions, lanes)
+            self._make_defective(designed, given, runs.conditions, lanes)
         if data is not designed:
             both = zip(designed.layout(spans).tension_lengths, layout.tension_lengths, strict=True)
             for (was, now), line in zip(both, self._defective[given[0]].lines, strict=True):
@@ -234,14 +244,14 @@ class FlexibleCatenary:
     def _make_defective(
         self,
         data: FlexibleCatenaryData,
-        spans: int,
         conditions: Sequence[LineCondition],
         pointed: Sequence[LineCondition],
         lanes: int,
     ) -> None:
         """conditions: of the runs; pointed: the same with the line's points."""
+        layout = data.layout(self.alignment.spans)
         self._defective = {
-            each: DefectiveParts(data.layout(spans), with_its_points, self._fixed)
+            each: DefectiveParts(layout, with_its_points, self._fixed)
             for each, with_its_points in zip(conditions, pointed, strict=True)
         }
         first = conditions[0]
@@ -250,44 +260,36 @@ class FlexibleCatenary:
         self.line = self._defective[first].with_tables(self.line, rows)
         if any(condition.tension_scatter > 0 for condition in conditions):
             self._designed = data
-            self.line = self.line._replace(
-                shape=np.repeat(self.line.shape, lanes, axis=0),
-                stencil=np.repeat(self.line.stencil, lanes, axis=0),
-                absorbing=np.repeat(self.line.absorbing, lanes, axis=0),
-                beside=self.line.beside._replace(shape=np.repeat(self.line.beside.shape, lanes, axis=0)),
-            )
+            beside = self.line.beside._replace(shape=np.repeat(self.line.beside.shape, lanes, axis=0))
+            own: dict[str, Any] = {
+                name: np.repeat(getattr(self.line, name), lanes, axis=0) for name in OF_TENSION
+            }
+            self.line = self.line._replace(beside=beside, **own)
         self._tension = np.repeat(self._tension, rows, axis=0)
         self._write_defects(0, DrawnLine(first))
 
     def _write_defects(self, row: int, drawn: DrawnLine) -> None:
-        if self._designed is None:
-            defective = self._defective[drawn.condition]
-        else:
+        defective = self._defective[drawn.condition]
+        if self._designed is not None:
             key = drawn.condition, drawn.tensions
             if self._latest is None or self._latest[0] != key:
-                self._latest = key, self._tensioned(self._designed, drawn)
+                tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]
+                left = with_tension_left(self._designed, drawn.condition, tensions)
+                shape = shape_left(self._designed, left)
+                if drawn.tensions != (1.0, 1.0):
+                    defective = defective.with_tensions(tensions)
+                tensioned = of_tension(left, shape, self.line.spacing, self.time_step)
+                self._latest = key, (shape, tensioned, defective)
             shape, tensioned, defective = self._latest[1]
-            self._write_tension(row, shape, tensioned)
+            self.shapes[row] = shape
+            self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
+            # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
+            self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
+            self.line.beside.shape[row] = tensioned.beside
+            if shape.second is not None:
+                begin = self.start_point.height + self.start_point.apart
+                self.line.beside.shape[row] -= tensioned.beside[0] - begin
         self._tension[row] = defective.write(self.line, row, drawn.scatter, drawn.heights)
-
-    def _tensioned(self, designed: FlexibleCatenaryData, drawn: DrawnLine) -> Own:
-        tensions = drawn.tensions[0] * self._fixed[0], drawn.tensions[1] * self._fixed[1]
-        own = with_tension_left(designed, drawn.condition, tensions)
-        shape = shape_left(designed, own)
-        defective = self._defective[drawn.condition]
-        if drawn.tensions != (1.0, 1.0):
-            defective = defective.with_tensions(tensions)
-        return shape, of_tension(own, shape, self.line.spacing, self.time_step), defective
-
-    def _write_tension(self, row: int, shape: StaticShape, tensioned: Tensioned) -> None:
-        self.line.stencil[row], self.line.absorbing[row] = tensioned.stencil, tensioned.absorbing
-        self._shapes[row] = shape
-        # The anchor keeps its height, so that a run starts at rest; it would differ by 0.3 mm at most.
-        self.line.shape[row] = tensioned.shape - (tensioned.shape[0] - self.start_point.height)
-        self.line.beside.shape[row] = tensioned.beside
-        if shape.second is not None:
-            begin = self.start_point.height + self.start_point.apart
-            self.line.beside.shape[row] -= tensioned.beside[0] - begin
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
         """Put one lane's wires at rest, on the line ``drawn``; a force (N) at the anchor moves no wire."""
@@ -306,18 +308,3 @@ class FlexibleCatenary:
     def view(self, lane: int, begin: float, end: float) -> LineView:
         """Present shape of one lane's line within the window about the train."""
         return view_of(self, lane, begin, end)
-
-    def shape_of(self, lane: int) -> StaticShape:
-        """Static shape of one lane's line, without defects of its droppers and supports."""
-        return self._shapes.get(lane, self._shapes[DESIGNED])
-
-
-def of_wires(conditions: Sequence[LineCondition]) -> LineCondition:
-    """A condition with the wire defects that all conditions share. Raises InputError where they differ."""
-    if len({condition.of_wires for condition in conditions}) > 1:
-        raise InputError(
-            "All lines drawn from share their wires, so conditions must not differ in hard_spots, "
-            "worn_stretches, surface_bumps, lost_contact_tension, lost_messenger_tension, ice or "
-            "temperature; make a separate run for each."
-        )
-    return conditions[0]

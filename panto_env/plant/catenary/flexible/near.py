@@ -118,11 +118,10 @@ def near_droppers(
     parts = np.linspace(0.0, 1.0, PLACES)
     between = missing_between(data.contact_wire, dx, step, data.damping.beta, parts, REACH)
     place, pair, cells = grid.links.position / dx, grid.links.wires[:, LOWER] // 2, strides * per_stride + 1
-    if strides:
-        order, period = np.concatenate(grid.along), 0
-    else:
-        order = np.flatnonzero(place < per_stride - 1e-9)
-        period, cells = len(order), per_stride
+    order, period = np.concatenate(grid.along), 0
+    if not strides:
+        order, cells = np.flatnonzero(place < per_stride - 1e-9), per_stride
+        period = len(order)
     place, pair = place[order], pair[order]
     # A dropper is near cells on both sides, which may lie in the spans before and after.
     number = np.full((int(pair.max(initial=0)) + 1, cells), NONE)

@@ -69,25 +69,17 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
     per_stride: nodes of a span. x: positions of the nodes from node -PAD on (m). step: s.
     """
     each, line, dx = part.layout.spans[1:], part.layout.line, float(x[PAD + 1])
-    masts: Array
+    masts: Array = 1.0 * per_stride * np.arange(1, len(each) + 1)
     if line.one_by_one:
         masts = part.begin / dx + np.array(part.layout.supports[1:-1]) / dx
-    else:
-        masts = 1.0 * per_stride * np.arange(1, len(each) + 1)
     arms = steady_arms(part.layout)
     moving = arms.in_motion(line.plan is not None and line.plan.sideways_waves)
-    levels = [
-        level
-        for stiffness, damping, span in zip(*(values[1:].tolist() for values in moving), each, strict=True)
-        for level in (
-            spring_levels(stiffness, damping, step),
-            spring_levels(span.support.stiffness, span.support.damping, step),
-        )
-    ]
+    supports = [(span.support.stiffness, span.support.damping) for span in each]
+    at_masts = np.stack([np.transpose(moving)[1:], np.array(supports)], axis=1).reshape(-1, 2)
     spots = defects.springs_of_nodes(x, dx)
     hard = np.flatnonzero(spots)
-    held = [spring_levels(stiffness, 0.0, step) for stiffness in spots[hard].tolist()]
-    masses = np.array([(mass, 0.0) for mass in arms.mass[1:].tolist()]).reshape(-1)
+    stiffness, damping = np.append(at_masts, np.outer(spots[hard], [1.0, 0.0]), axis=0).T
+    masses = np.outer(arms.mass[1:], [1.0, 0.0]).reshape(-1)
     begin, end = part.in_use
     used = (masts * dx >= begin - dx) & (masts * dx <= end + dx)
     return Springs(
@@ -95,19 +87,9 @@ def _springs_of(part: TensionLength, per_stride: int, x: Array, step: float, def
         number=np.where(used, part.first_span + np.arange(len(each)), -1),
         wire=part.wire + np.append(np.tile(np.array([CONTACT, MESSENGER]), len(each)), 0 * hard + CONTACT),
         place=np.append(np.repeat(masts, 2), hard - PAD),
-        levels=np.array([*levels, *held]).reshape(-1, 3),
+        levels=spring_levels(stiffness, damping, step, np.full(len(stiffness), 0.25)),
         mass=np.append(masses, np.zeros(len(hard))),
     )
-
-
-def _of_second_wire(first: Springs) -> Springs:
-    """The same steady arms on a second contact wire: under its messenger, which is none, is no support.
-
-    Its uplift is recorded behind that of the first wire at all masts.
-    """
-    levels = first.levels.copy()
-    levels[1::2] = 0.0
-    return first._replace(number=first.number + first.masts, wire=first.wire + 2, levels=levels)
 
 
 def _joined_springs(each: Sequence[Springs]) -> Springs:
@@ -119,10 +101,8 @@ def _joined_springs(each: Sequence[Springs]) -> Springs:
     )
     some = [(each[k], slice(2 * n, 2 * n + 2)) for _, _, k, n in masts]
     some += [(own, slice(2 * own.masts, None)) for own in each]
-    wire, place, levels, mass = (
-        np.concatenate([np.asarray(own[k])[which] for own, which in some]) for k in range(2, 6)
-    )
-    return Springs(len(masts), np.array([number for _, number, _, _ in masts]), wire, place, levels, mass)
+    arrays = (np.concatenate([np.asarray(own[k])[which] for own, which in some]) for k in range(2, 6))
+    return Springs(len(masts), np.array([number for _, number, _, _ in masts]), *arrays)
 
 
 def _links_of(layout: Layout, shape: StaticShape) -> Links:
@@ -167,8 +147,7 @@ class StitchGrid(NamedTuple):
     @property
     def missing_yield(self) -> Array:
         """Compliance that the stitch wire lacks between two nodes (m/N), (links,): its kink is narrower."""
-        on = self.node >= 0
-        lacking = np.zeros(len(self.node))
+        on, lacking = self.node >= 0, np.zeros(len(self.node))
         k = self.stitches.carrying[on]
         lacking[on] = (self.share * (1 - self.share))[on] * self.spacing[k] / self.stitches.tension[k]
         return lacking
@@ -193,12 +172,12 @@ def stitch_grid(layout: Layout, links: Links, x: Array, step: float) -> StitchGr
     """
     data, stitches = layout.line, layout.moving
     count, dx = len(stitches.support), float(x[1] - x[0])
-    none, settle = np.zeros((0, 1)), 1.0 + data.damping.alpha * step / 2
-    hung = np.full(len(links.position), -1)
+    settle, hung = 1.0 + data.damping.alpha * step / 2, np.full(len(links.position), -1)
     if not count:
-        nothing, nodes = np.zeros(0), np.zeros((layout.pairs, len(x)))
-        nowhere = Nodes.about(nothing)
-        return StitchGrid(stitches, 0, nothing, nowhere, none, none, nothing, hung, 0.0 * hung, nodes)
+        none, nothing, nodes = np.zeros((0, 1)), np.zeros(0), np.zeros((layout.pairs, len(x)))
+        return StitchGrid(
+            stitches, 0, nothing, Nodes.about(nothing), none, none, nothing, hung, 0.0 * hung, nodes
+        )
     length = stitches.end - stitches.begin
     speed = np.sqrt(stitches.tension / stitches.mass)
     quickest = speed * step * np.sqrt(1 + 2 * data.damping.beta / step) / MOST_COURANT
@@ -284,8 +263,13 @@ def on_grid(
         _springs_of(part, per_stride, x, step, its_own) for part, its_own in zip(parts, defects, strict=True)
     ]
     if data.contact_wires > 1:
+        # The second wire has the same arms; under its messenger, which is none, is no support. Its uplift is
+        # recorded behind that of the first wire at all masts.
         (arms,) = held_by
-        held_by = [arms, _of_second_wire(arms)]
+        levels = arms.levels.copy()
+        levels[1::2] = 0.0
+        number, wire = arms.number + arms.masts, arms.wire + 2
+        held_by.append(arms._replace(number=number, wire=wire, levels=levels))
     springs = _joined_springs(held_by)
     over = shape.over(len(layout.spans))
     links = _links_of(layout, over)
@@ -357,12 +341,9 @@ def _held(parts: Sequence[TensionLength], wires: int, x: Array) -> Any:
     """Whether nodes of wires are beyond their anchors, (wires, nodes); those of the line's ends move."""
     if len(parts) == 1:
         return np.zeros((wires, len(x)), dtype=bool)
-    held = np.ones((wires, len(x)), dtype=bool)
-    for number, part in enumerate(parts):
-        inside = np.ones(len(x), dtype=bool)
-        if number > 0:
-            inside &= x > part.begin + (x[1] - x[0]) / 2
-        if number < len(parts) - 1:
-            inside &= x < part.end - (x[1] - x[0]) / 2
+    held, half = np.ones((wires, len(x)), dtype=bool), (x[1] - x[0]) / 2
+    for part in parts:
+        inside = (x > part.begin + half) | (part is parts[0])
+        inside &= (x < part.end - half) | (part is parts[-1])
         held[part.wire : part.wire + 2, inside] = False
     return held

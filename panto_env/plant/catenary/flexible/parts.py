@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ....base.arrays import Array, Index
 from ....base.settings import Between, Settings, comma_hint
@@ -17,6 +17,7 @@ CLOSEST = 0.1  # least distance between two droppers, or between one and a suppo
 SAME = 1e-3
 """Places along a line that are no farther from each other are one (m). No line is set out more exactly, and
 shorter elements of a wire lose all digits: of one of 1e-6 m droppers became metres too long."""
+S = TypeVar("S", bound=Any)  # with span_length and droppers
 Clamp = Annotated[float, Between(0, 10, "kg")]
 
 
@@ -97,6 +98,12 @@ class Droppers(Settings):
             raise ValueError("give either stiffness or axial_stiffness, and only one of them")
         return self
 
+    def hung(self, contact_wires: int) -> list[tuple[float, float, int]]:
+        """Place and sag (m) of each, and number, from 0, of the contact wire that it holds."""
+        wires = self.wire or [1 + k % contact_wires for k in range(len(self.positions))]
+        each = zip(self.positions, self.sag, wires, strict=True)
+        return [(place, sag, wire - 1) for place, sag, wire in each]
+
 
 class Support(Settings):
     """What holds the messenger wire at a mast."""
@@ -172,6 +179,16 @@ class Published(Settings):
     non_uniformity: Annotated[float, Between(0, 100, "%")] | None = Field(None, description="published (%)")
 
 
+def check_inside(span: S) -> S:
+    """Raise ValueError unless the droppers of a span, or of a line whose spans are alike, hang within it."""
+    last, length = span.droppers.positions[-1], span.span_length
+    if last >= length:
+        raise ValueError(f"dropper at {last} m lies outside the span of {length} m")
+    if nearer(length - last, CLOSEST):
+        raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")
+    return span
+
+
 Encumbrance: TypeAlias = Annotated[float, Between(0.05, 10, "m")]
 ContactHeight: TypeAlias = Annotated[float, Between(-2, 2, "m")]
 
@@ -192,17 +209,22 @@ class Span(Settings):
     steady_arm: SteadyArm
     stitch_wire: StitchWire | None = Field(None, description="at the span's first support, or none")
 
-    @model_validator(mode="after")
-    def _droppers_in_span(self) -> Self:
-        check_inside(self.droppers.positions, self.span_length)
-        return self
+    _droppers_in_span = model_validator(mode="after")(check_inside)
+
+
+HEADS = (1.6, 1.95)  # widths of collector heads (m)
+TIGHTEST = 100.0  # radius of a curve (m); half of it is left to trams
+
+
+def _of_a_curve(radius: float) -> float:
+    if abs(radius) < TIGHTEST:
+        raise ValueError(f"radius must be {TIGHTEST:g} m or more to either side, not {radius:g} m")
+    return radius
 
 
 Stagger: TypeAlias = Annotated[float, Between(-1, 1, "m")]
-Radius: TypeAlias = Annotated[float, Between(-1e5, 1e5, "m")]
+Radius: TypeAlias = Annotated[float, Between(-1e5, 1e5, "m"), AfterValidator(_of_a_curve)]
 Cant: TypeAlias = Annotated[float, Between(-0.3, 0.3, "m")]
-HEADS = (1.6, 1.95)  # widths of collector heads (m)
-TIGHTEST = 100.0  # radius of a curve (m); half of it is left to trams
 
 
 class Plan(Settings):
@@ -242,11 +264,6 @@ class Plan(Settings):
         1.6, description="width of the collector heads for which the line is built (m): 1.6 or 1.95"
     )
 
-    @field_validator("radius")
-    @classmethod
-    def _no_turn_on_the_spot(cls, value: float | None) -> float | None:
-        return check_radius(value)
-
     @field_validator("head_width")
     @classmethod
     def _of_a_known_head(cls, value: float) -> float:
@@ -265,13 +282,6 @@ class Plan(Settings):
         return self.model_copy(update=turned)
 
 
-def check_radius(radius: float | None) -> float | None:
-    """A radius of the track (m). Raises ValueError for a tighter curve than ``TIGHTEST``."""
-    if radius is not None and abs(radius) < TIGHTEST:
-        raise ValueError(f"radius must be {TIGHTEST:g} m or more to either side, not {radius:g} m")
-    return radius
-
-
 class Mast(Settings):
     """What a survey says of the mast at a support, and of the track in the span that begins there."""
 
@@ -285,11 +295,6 @@ class Mast(Settings):
         None, description="of the track, positive to the right (m); none where it is straight"
     )
     cant: Cant | None = Field(None, description="of the track (m)")
-
-    @field_validator("radius")
-    @classmethod
-    def _no_turn_on_the_spot(cls, value: float | None) -> float | None:
-        return check_radius(value)
 
 
 class EndSupport(Settings):
@@ -333,12 +338,3 @@ class Overlap(Settings):
     def spans(self) -> int:
         """Number of spans over which both pairs of wires hang."""
         return 2 * len(self.rises) - 1
-
-
-def check_inside(positions: Sequence[float], span_length: float) -> None:
-    """Raise ValueError unless droppers at rising positions (m) hang within a span of a length (m)."""
-    last = positions[-1]
-    if last >= span_length:
-        raise ValueError(f"dropper at {last} m lies outside the span of {span_length} m")
-    if nearer(span_length - last, CLOSEST):
-        raise ValueError(f"dropper at {last} m must be {CLOSEST} m or more from the support")

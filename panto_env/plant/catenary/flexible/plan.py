@@ -17,7 +17,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from ....base.arrays import Array
 from ....base.checksums import remembered
 from ....base.errors import InputError
 from ...line_condition import LineCondition
-from ..schema import Wire
 from .blown import AIR_DENSITY, DRAG, diameter
 from .layout import Layout
 from .parts import Mast, Plan
@@ -39,21 +39,28 @@ REPEATS = 14  # spans in which the arms of a line whose spans are all alike are 
 
 
 class PulledArm(NamedTuple):
-    """A steady arm as a pendulum: a length l, pulled with F and carrying V, slopes with tan = V / F.
+    """A steady arm as a pendulum, or several, whose values are then arrays.
 
-    Its stiffness is ``F / a (1 + tan^2) + (T / L_before + T / L_behind) tan^2`` with a = l cos: it swings
-    about its hinge, and moves the contact wire sideways.
+    A length l, pulled with F and carrying V, slopes with tan = V / F. Its stiffness is ``F / a (1 + tan^2) +
+    (T / L_before + T / L_behind) tan^2`` with a = l cos: it swings about its hinge, and moves the contact
+    wire sideways.
     """
 
-    pull: float  # N, positive where it pulls the wire towards its own side
-    slope: float  # tan of its angle to the horizontal (-)
-    stiffness: float  # vertical, on the contact wire (N/m)
-    mass: float  # that moves with the contact wire (kg)
-    lift: float  # of the contact wire, by what a wind adds to its pull (N)
+    pull: Any  # N, positive where it pulls the wire towards its own side
+    slope: Any  # tan of its angle to the horizontal (-); nan, as the pull, where the plan was not needed
+    stiffness: Any  # vertical, on the contact wire, at rest (N/m)
+    mass: Any  # that moves with the contact wire (kg)
+    lift: Any = 0.0  # upward force on the contact wire, by what a wind adds to its pull (N)
     # Share of the stiffness by which the contact wire resists sideways (N/m), and what it is instead where it
     # lets waves run off: a damper ``2 sqrt(T m) tan^2`` (N s/m), the impedance of both sides
-    sideways: float = 0.0
-    radiation: float = 0.0
+    sideways: Any = 0.0
+    radiation: Any = 0.0
+
+    def in_motion(self, waves: bool) -> tuple[Array, Array]:
+        """Stiffness (N/m) and damping (N s/m) in motion; waves: as ``Plan.sideways_waves``."""
+        if waves:
+            return self.stiffness - self.sideways, self.radiation
+        return self.stiffness, np.zeros_like(self.stiffness)
 
 
 @dataclass(frozen=True)
@@ -160,12 +167,8 @@ def wind_loads(line: FlexibleCatenaryData, speed: float, ice: float = 0.0) -> tu
     Their diameters are those of their mass as copper, with ice (kg/m), as ``blown`` has them.
     """
     pressure = AIR_DENSITY * DRAG * speed * abs(speed) / 2
-    wires: Sequence[Wire] = line.wires
-    contact, messenger = (
-        pressure * diameter(wire.model_copy(update={"mass": wire.mass + ice}), strand, ice)
-        for wire, strand in zip(wires, (False, True), strict=True)
-    )
-    return contact, messenger
+    iced = [wire.model_copy(update={"mass": wire.mass + ice}) for wire in line.wires]
+    return pressure * diameter(iced[0], False, ice), pressure * diameter(iced[1], True, ice)
 
 
 def loads_in(line: FlexibleCatenaryData, condition: LineCondition) -> tuple[float, float]:
@@ -221,11 +224,11 @@ def pulled_arms(layout: Layout) -> list[PulledArm]:
     else:
         weight[:] = solve(line).arm_force
     found = list[PulledArm]()
-    for k, (before, behind) in enumerate(zip(layout.spans[:-1], layout.spans[1:], strict=True)):
+    for k, (before, behind) in enumerate(pairwise(layout.spans)):
         arm, force = behind.steady_arm, float(still[k])
         pull = float(math.copysign(1, force) * now[k])
         if arm.length is None:
-            found.append(PulledArm(pull, math.nan, arm.stiffness or 0.0, arm.mass, 0.0))
+            found.append(PulledArm(pull, math.nan, arm.stiffness or 0.0, arm.mass))
             continue
         carried = float(weight[k + 1]) + GRAVITY * (arm.mass / 2 + arm.clamp_mass)
         angle = math.atan2(carried, abs(force))
@@ -240,44 +243,26 @@ def pulled_arms(layout: Layout) -> list[PulledArm]:
         sideways = wire.tension * (1 / before.span_length + 1 / behind.span_length) * slope**2
         stiffness = pull / (arm.length * math.cos(angle)) * (1 + slope**2) + sideways
         mass, lift = arm.mass / 3 + arm.clamp_mass, slope * (pull - abs(force))
-        radiation = 2 * wire.impedance * slope**2
-        found.append(PulledArm(pull, slope, stiffness, mass, lift, sideways, radiation))
+        found.append(PulledArm(pull, slope, stiffness, mass, lift, sideways, 2 * wire.impedance * slope**2))
     return found
 
 
-class SteadyArms(NamedTuple):
-    """Steady arms at the first support of each span of a line of one tension length."""
+def steady_arms(layout: Layout) -> PulledArm:
+    """Steady arms at the first support of each span of a line of one tension length, (spans,).
 
-    stiffness: Array  # vertical, on the contact wire, at rest (N/m)
-    mass: Array  # that moves with the contact wire (kg)
-    lift: Array  # upward force on the contact wire in a wind, as ``PulledArm`` has it (N)
-    sideways: Array  # as ``PulledArm`` has it (N/m)
-    radiation: Array  # likewise (N s/m)
-
-    def in_motion(self, waves: bool) -> tuple[Array, Array]:
-        """Stiffness (N/m) and damping (N s/m) in motion; waves: as ``Plan.sideways_waves``."""
-        if waves:
-            return self.stiffness - self.sideways, self.radiation
-        return self.stiffness, np.zeros_like(self.stiffness)
-
-
-def steady_arms(layout: Layout) -> SteadyArms:
-    """Steady arms of a line of one tension length, those with a length by the plan.
-
-    That at the line's first support is as the next one; there anchors hold the wires. Raises InputError as
-    ``pulled_arms``, and for unlike arms of a line whose spans are all alike.
+    Those with a length are by the plan. That at the line's first support is as the next one; there anchors
+    hold the wires. Raises InputError as ``pulled_arms``, and for unlike arms of a line whose spans are alike.
     """
     return _arms_of(layout.line, len(layout.spans))  # equal layouts may be of lines with unlike plans
 
 
 @remembered
-def _arms_of(line: FlexibleCatenaryData, spans: int) -> SteadyArms:
+def _arms_of(line: FlexibleCatenaryData, spans: int) -> PulledArm:
     layout = line.layout(spans)
-    stiffness = np.array([span.steady_arm.stiffness or 0.0 for span in layout.spans])
-    mass = np.array([span.steady_arm.mass for span in layout.spans])
     if not line.arms_by_plan:
-        return SteadyArms(stiffness, mass, *np.zeros((3, spans)))
-    if line.sequence:
+        arms = [span.steady_arm for span in layout.spans]
+        found = [PulledArm(math.nan, math.nan, arm.stiffness or 0.0, arm.mass) for arm in arms]
+    elif line.sequence:
         found = pulled_arms(layout)
         found = [found[0], *found]
     else:
@@ -290,7 +275,7 @@ def _arms_of(line: FlexibleCatenaryData, spans: int) -> SteadyArms:
                 "evenly, or the spans as a sequence."
             )
         found = [middle[0]] * spans
-    return SteadyArms(*(np.array([getattr(arm, name) for arm in found]) for name in SteadyArms._fields))
+    return PulledArm(*np.array(found).T.copy())
 
 
 def in_still_air(line: FlexibleCatenaryData) -> FlexibleCatenaryData:

@@ -33,13 +33,7 @@ from .grid import carrying_grid, finest_stable, nodes_per_span, stable
 from .plan import pulled_arms
 from .schema import FlexibleCatenaryData
 
-STEPS = (
-    (0.2, 1e-2 / 14),
-    (0.45, 1e-2 / 8),
-    (0.7, 1e-2 / 6),
-    (0.86, 1e-2 / 8),
-    (1.0, 1e-2 / 14),
-)
+STEPS = ((0.2, 1e-2 / 14), (0.45, 1e-2 / 8), (0.7, 1e-2 / 6), (0.86, 1e-2 / 8), (1.0, 1e-2 / 14))
 """Up to a share of the wave speed: a time step (s) that is short enough for one pantograph."""
 STEPS_OF_TRAINS = ((0.2, 1e-2 / 14), (0.7, 1e-2 / 8), (0.86, 1e-2 / 12), (1.0, 1e-2 / 16))
 """The same for several, the second of which loses contact earlier."""
@@ -114,27 +108,20 @@ one, on a coarser grid if necessary."""
 FAST_SAMPLES_PER_WAVE = 3
 
 
-class Required(NamedTuple):
-    """The coarsest discretisation that is fine enough."""
-
-    spacing: float  # of the grid, at most (m)
-    time_step: float  # at most (s)
-
-
 class Resolution(NamedTuple):
-    """Discretisation of a line."""
+    """Discretisation of a line; the coarsest one that is fine enough, where one is required."""
 
     spacing: float  # of the grid (m)
     time_step: float  # s
-    window: int  # spans computed about the train; 0: the whole line
+    window: int = 0  # spans computed about the train; 0: the whole line
 
 
 def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Resolution:
     """Grid, time step and window: the given ones, or those for the accuracy, stable together.
 
     Warns where they are coarser than required for figures within the bounds that ``fine_enough`` states, and
-    where no default is fine enough. Raises InputError where grid and step
-    are not stable together, or waves of the wire are too short for the step.
+    where no default is fine enough. Raises InputError where grid and step are not stable together, or waves
+    of the wire are too short for the step.
     """
     found, cautions = _chosen(data, numerics, runs)
     for caution in cautions:
@@ -144,13 +131,12 @@ def resolution(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> Re
 
 @remembered
 def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple[Resolution, tuple[str, ...]]:
-    fast = numerics.accuracy == "fast"
+    fast, cautions = numerics.accuracy == "fast", list[str]()
     required = _fast(data, runs) if fast else fine_enough(data, runs, numerics.time_step)
     found = _stable(data, numerics, runs, required)
     runs.check_wave(found.time_step)
-    cautions = (
-        [] if fast else [*_coarse(data, found, required, runs), *_not_carried(data, found, required, runs)]
-    )
+    if not fast:
+        cautions += _coarse(data, found, required, runs)
     if runs.hard_contact:
         cautions.append(
             f"A contact stiffer than {HARD_STIFFNESS / 1e3:g} kN/m, or more damped than {HARD_DAMPING:g} "
@@ -168,7 +154,7 @@ def _chosen(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> tuple
     return found, tuple(cautions)
 
 
-def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None = None) -> Required:
+def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None = None) -> Resolution:
     """The coarsest grid and the longest step, stable or not, that give figures within these bounds.
 
     time_step: the given one (s), if any, on whose grid the figures are. Beside a grid of 0.06 to 0.1 m sigma,
@@ -200,7 +186,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
         longest = min(longest, LIMP_STEP)
     spacing = min(spacing, max(carrying_grid(data, quick), FINEST_GRID))
     if data.layout().stitched:
-        spacing = min(spacing, next(grid for share, grid in STITCHED_GRIDS if quick <= share * wave_speed))
+        spacing = min(spacing, _by_share(STITCHED_GRIDS, quick, wave_speed))
     needed = [_by_clamps(data)]
     if runs.train_length and data.sequence and np.ptp(data.alignment().lengths) > 0:
         needed.append(TRAIN_ON_UNLIKE_SPANS)
@@ -211,7 +197,7 @@ def fine_enough(data: FlexibleCatenaryData, runs: Runs, time_step: float | None 
     step = min(time_step or longest, runs.whole_part(longest))
     near_limit = finest_stable(data.wires, data.damping.beta, data.stride, _margin(data, runs, step) * step)
     fine = _by_share(FINE, quick, wave_speed)
-    return Required(min(spacing, max(near_limit, fine), COARSEST), longest)
+    return Resolution(min(spacing, max(near_limit, fine), COARSEST), longest)
 
 
 def _by_share(table: tuple[tuple[float, float], ...], speed: float, wave_speed: float) -> float:
@@ -222,11 +208,10 @@ def _by_share(table: tuple[tuple[float, float], ...], speed: float, wave_speed: 
 def _margin(data: FlexibleCatenaryData, runs: Runs, step: float) -> float:
     """How many times as long a step must be stable on the grid of this one (s)."""
     slow, quick = (speed / data.contact_wire.wave_speed for speed in runs.speeds)
-    margin = next(margin for share, margin in MARGINS if quick <= share or share == 1)
+    margin = _by_share(MARGINS, quick, 1.0)
     if slow <= MARGINS[1][0]:
         margin = max(margin, MARGINS[1][1])
-    damped = min(1 + PER_DAMPING * data.damping.beta / step, MOST_DAMPED)
-    return max(margin, damped)
+    return max(margin, min(1 + PER_DAMPING * data.damping.beta / step, MOST_DAMPED))
 
 
 def _heavy(data: FlexibleCatenaryData) -> bool:
@@ -236,26 +221,21 @@ def _heavy(data: FlexibleCatenaryData) -> bool:
 
 def _by_clamps(data: FlexibleCatenaryData) -> tuple[float, float]:
     """Grid (m) and time step (s) that the heaviest of the droppers' clamps requires."""
-    heaviest = max(
-        max(span.droppers.contact_clamp_mass, span.droppers.messenger_clamp_mass)
-        for span in data.layout(1).spans
-    )
-    grid, step = next(fine for mass, *fine in CLAMPS if heaviest <= mass)
-    return grid, step
+    droppers = [span.droppers for span in data.layout(1).spans]
+    heaviest = max(max(each.contact_clamp_mass, each.messenger_clamp_mass) for each in droppers)
+    return next((grid, step) for mass, grid, step in CLAMPS if heaviest <= mass)
 
 
-def _fast(data: FlexibleCatenaryData, runs: Runs) -> Required:
-    longer, shorter = FAST_STEPS
-    slow, quick = runs.speeds
-    wave_speed = data.contact_wire.wave_speed
-    spacing = _by_share(FAST_GRIDS, quick, wave_speed)
+def _fast(data: FlexibleCatenaryData, runs: Runs) -> Resolution:
+    (longer, shorter), (slow, quick) = FAST_STEPS, runs.speeds
+    spacing = _by_share(FAST_GRIDS, quick, data.contact_wire.wave_speed)
     spacing = min(spacing, max(slow / FAST_NODES_HZ, FINEST_GRID))
     if np.isfinite(runs.shortest_wave):
         spacing = min(spacing, FAST_GRIDS[-1][1])
     spacing = min(spacing, 2 * _by_clamps(data)[0])
     grid = data.stride / nodes_per_span(data, spacing)
     step = longer if stable(data, grid, longer, _lightest(runs)) else shorter
-    return Required(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
+    return Resolution(spacing, min(step, runs.wave_step(FAST_SAMPLES_PER_WAVE)))
 
 
 def _lightest(runs: Runs) -> float:
@@ -263,7 +243,7 @@ def _lightest(runs: Runs) -> float:
     return 1 - max(worn, default=0.0)
 
 
-def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Required) -> Resolution:
+def _stable(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs, required: Resolution) -> Resolution:
     """A stable resolution, with a whole number of nodes per span and of steps per control interval."""
     span, given = data.stride, numerics.spacing
     lightest, window = _lightest(runs), window_of(data, numerics, runs)
@@ -291,34 +271,33 @@ def spans_of_train(data: FlexibleCatenaryData, runs: Runs) -> int:
     return math.ceil(runs.train_length / data.stride)
 
 
-def _coarse(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> list[str]:
-    """The expected error, from 1 % on: third order in the grid and second order in the step."""
+def _coarse(data: FlexibleCatenaryData, found: Resolution, required: Resolution, runs: Runs) -> list[str]:
+    """What a grid or step means that is coarser than required, or that carries no waves ahead of a train.
+
+    The expected error, from 1 % on, is of third order in the grid and of second order in the step.
+    """
     grid, step = found.spacing / required.spacing, found.time_step / required.time_step
-    if max(grid, step) < 1.01:
-        return []
-    error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
     slow, quick = (to_kmh(speed) for speed in runs.speeds)
-    speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
-    return [
-        f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser than "
-        f"line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
-        f"{1e3 * required.time_step:.3g} ms): "
-        f"the standard deviation may be wrong by up to about {error:.0f} %, other figures by more."
-    ]
-
-
-def _not_carried(data: FlexibleCatenaryData, found: Resolution, required: Required, runs: Runs) -> list[str]:
-    """What a grid as fine as required means where it does not carry the waves ahead of the fastest train."""
-    carrying, quick = carrying_grid(data, runs.speeds[1]), runs.speeds[1]
-    if found.spacing <= REACH * carrying or found.spacing > 1.01 * required.spacing:
-        return []
-    force, loss = NOT_CARRIED
-    return [
-        f"At {to_kmh(quick):.0f} km/h, {100 * quick / data.contact_wire.wave_speed:.0f} % of the wave speed, "
-        f"the waves ahead of a train need a grid of {carrying:.2g} m on line '{data.name}'; on the "
-        f"{found.spacing:.3g} m in use standard deviation, maximum and minimum may be wrong by up to about "
-        f"{force} %, the contact-loss ratio by {loss} points. Give a smaller spacing."
-    ]
+    cautions = []
+    if max(grid, step) >= 1.01:
+        error = max(grid, 1.0) ** 3 - 1 + max(step, 1.0) ** 2
+        speeds = f"{quick:.0f} km/h" if slow == quick else f"{slow:.0f} to {quick:.0f} km/h"
+        cautions.append(
+            f"A grid of {found.spacing:.3g} m and a time step of {1e3 * found.time_step:.3g} ms are coarser "
+            f"than line '{data.name}' needs at {speeds} ({required.spacing:.3g} m, "
+            f"{1e3 * required.time_step:.3g} ms): the standard deviation may be wrong by up to about "
+            f"{error:.0f} %, other figures by more."
+        )
+    carrying, share = carrying_grid(data, runs.speeds[1]), runs.speeds[1] / data.contact_wire.wave_speed
+    if REACH * carrying < found.spacing <= 1.01 * required.spacing:
+        force, loss = NOT_CARRIED
+        cautions.append(
+            f"At {quick:.0f} km/h, {100 * share:.0f} % of the wave speed, the waves ahead of a train need a "
+            f"grid of {carrying:.2g} m on line '{data.name}'; on the {found.spacing:.3g} m in use standard "
+            f"deviation, maximum and minimum may be wrong by up to about {force} %, the contact-loss ratio "
+            f"by {loss} points. Give a smaller spacing."
+        )
+    return cautions
 
 
 ENOUGH = ((0.25, 32), (0.4, 24), (0.66, 16), (0.82, 8), (1.0, 4))
@@ -344,7 +323,7 @@ def _enough_spans(wires: tuple[Wire, Wire], runs: Runs, stitched: bool = False, 
     share = runs.speeds[0] / max(wire.wave_speed for wire in wires)
     if stitched and share < STITCHED_SHARE:
         return STITCHED
-    enough = next((spans for limit, spans in ENOUGH if share <= limit), ENOUGH[-1][1])
+    enough = int(_by_share(ENOUGH, share, 1.0))
     return max(enough, UNLIKE) if (stitched or unlike) and share <= UNLIKE_SHARE else enough
 
 
@@ -398,48 +377,42 @@ SIDEWAYS_ERROR = 6
 contact wire moves sideways: 5.8 % at 300 km/h where arms slope by 15 degrees, 2.6 % at 10."""
 
 
-def warn_of_sideways_waves(data: FlexibleCatenaryData, runs: Runs) -> None:
-    """Warn where steady arms slope so much that fast trains would send waves sideways along the wire."""
-    waves = data.plan is not None and data.plan.sideways_waves
-    if waves or not data.arms_by_plan or to_kmh(runs.speeds[1]) <= SIDEWAYS:
-        return
-    slopes = [arm.slope for part in data.layout().tension_lengths for arm in pulled_arms(part.layout)]
-    steepest = math.degrees(math.atan(np.nanmax(slopes)))
-    if steepest > STEEP_ARM:
-        warnings.warn(
-            f"Steady arms of line '{data.name}' slope by up to {steepest:.0f}°, and the contact wire's "
-            f"sideways waves, which they cause above {SIDEWAYS:g} km/h, are left out: the standard deviation "
-            f"may be too large by up to about {SIDEWAYS_ERROR} %; give plan.sideways_waves = true.",
-            AccuracyWarning,
-            stacklevel=3,
-        )
-
-
 def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) -> None:
-    """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires."""
-    wires, window = _loaded(data, runs).wires, numerics.window
+    """As ``CatenaryKind.warn_if_short``; also of slow trains on a line with stitch wires.
+
+    And where steady arms slope so much that fast trains would send waves sideways along the wire.
+    """
+    wires, window, cautions = _loaded(data, runs).wires, numerics.window, []
     if numerics.accuracy != "full":
         return
     enough = _enough_spans(wires, runs)
     if window and window < enough:
         error = next(percent for spans, percent in ERRORS if window >= spans)
-        warnings.warn(
+        cautions.append(
             f"A window of {window} spans is too short at {to_kmh(runs.speeds[0]):.0f} km/h, where "
             f"{enough} are needed: standard deviation, maximum and minimum may be wrong by up to about "
-            f"{error} %; leave out window.",
-            AccuracyWarning,
-            stacklevel=3,
+            f"{error} %; leave out window."
         )
-    warn_of_sideways_waves(data, runs)
+    waves = data.plan is not None and data.plan.sideways_waves
+    if data.arms_by_plan and not waves and to_kmh(runs.speeds[1]) > SIDEWAYS:
+        slopes = [arm.slope for part in data.layout().tension_lengths for arm in pulled_arms(part.layout)]
+        steepest = math.degrees(math.atan(np.nanmax(slopes)))
+        if steepest > STEEP_ARM:
+            cautions.append(
+                f"Steady arms of line '{data.name}' slope by up to {steepest:.0f}°, and the contact wire's "
+                f"sideways waves, which they cause above {SIDEWAYS:g} km/h, are left out: the standard "
+                f"deviation may be too large by up to about {SIDEWAYS_ERROR} %; give plan.sideways_waves = "
+                "true."
+            )
     limit = STITCHED_SHARE * max(wire.wave_speed for wire in wires)
     if window is None and data.layout().stitched and runs.speeds[0] < limit:
-        warnings.warn(
+        cautions.append(
             f"Waves travel far along a line with stitch wires: below {to_kmh(limit):.0f} km/h the standard "
             f"deviation may be wrong by up to about {STITCHED_ERROR} % in the default window of {STITCHED} "
-            "spans; give window=0 for the whole line.",
-            AccuracyWarning,
-            stacklevel=3,
+            "spans; give window=0 for the whole line."
         )
+    for caution in cautions:
+        warnings.warn(caution, AccuracyWarning, stacklevel=3)
 
 
 def _loaded(data: FlexibleCatenaryData, runs: Runs) -> FlexibleCatenaryData:

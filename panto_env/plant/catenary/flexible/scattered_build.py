@@ -39,32 +39,15 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     links[LINK.ROOM] = 1.0  # a slot without a link has none that could be slack
     if grid is None:
         none, bare = np.zeros(0, dtype=np.int64), np.zeros((2, 0))
-        without = [
+        no_masts, no_links = (
             _along(none[:, None], np.zeros((0, len(empty))), empty, none, none) for empty in (masts, links)
-        ]
-        return Scattered(
-            inertia=bare.astype(real),
-            mobility=bare,
-            masts=without[0],
-            links=without[1],
-            hung=without[1],
-            stitches=without[0],
-            upper=none,
-            carrying=none,
-            deficit=bare[:1].astype(real),
-            stiff_arms=False,
         )
+        things = no_masts, no_links, no_links, no_masts
+        return Scattered(bare.astype(real), bare, *things, none, none, bare[:1].astype(real), False)
     inertia = grid.inertia if (grid.inertia != 1).any() else grid.inertia[:, :0]
     at_links = grid.at_links
-    of_links = np.concatenate(
-        [
-            at_links.weights,
-            grid.move.reshape(-1, 2 * NODES),
-            grid.pull,
-            grid.room[:, None],
-        ],
-        axis=1,
-    )
+    move = grid.move.reshape(-1, 2 * NODES)
+    of_links = np.concatenate([at_links.weights, move, grid.pull, grid.room[:, None]], axis=1)
     # Kernels take the upper wire to be the one behind the lower one. The messenger comes before a second
     # contact wire, so for its droppers both change places, and all forces and displacements their sign.
     turned = grid.links.wires[:, UPPER] < grid.links.wires[:, LOWER]
@@ -86,7 +69,7 @@ def scattered(grid: OnGrid | None, real: Any) -> Scattered:
     carrying, deficit = grid.links.stitch[hung], ropes.deficit * grid.slope_mobility[MESSENGER::2]
     stitches = _stitches(grid, real)
     of_links[hung, HUNG.UPPER : HUNG.MOVE] = ropes.shares[hung]
-    of_links[hung, HUNG.MOVE : LINK.PULL] = grid.move.reshape(-1, 2 * NODES)[hung, : NODES + 2]
+    of_links[hung, HUNG.MOVE : LINK.PULL] = move[hung, : NODES + 2]
     at_hung = at_links.first[hung]
     return Scattered(
         inertia=np.ascontiguousarray(inertia, dtype=real),
@@ -222,10 +205,8 @@ def begin_window(line: FlexibleLine, wire: FlexibleWire, lane: int) -> None:
 def slots_of_links(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, Index, Index]:
     """Number along the line, set and segment of each link in a lane's window, in no order."""
     numbers, slots, first = [], [], len(line.link_row)
-    for things, here in (
-        (line.scattered.links, wire.scattered.links),
-        (line.scattered.hung, wire.scattered.hung),
-    ):
+    along, held = line.scattered, wire.scattered
+    for things, here in ((along.links, held.links), (along.hung, held.hung)):
         own, sets = np.flatnonzero(here.number[lane] >= 0), here.node.shape[1]
         numbers.append(things.number[here.number[lane][own]])
         slots.append((first + own % max(sets, 1), own // max(sets, 1)))
@@ -247,10 +228,9 @@ def present(line: FlexibleLine, wire: FlexibleWire, lane: int) -> tuple[Index, A
 
 def rope_nodes(line: FlexibleLine, wire: FlexibleWire, lane: int) -> Iterator[tuple[int, Array]]:
     """Number of each stitch wire in a lane's window, and displacements of its nodes (m); 0 at its clamps."""
-    own = wire.scattered
+    own, number = wire.scattered, wire.scattered.stitches.number[lane]
     sets = own.stitches.node.shape[1]
     moved = own.displacement[lane] + 0.5 * own.increment[lane]
-    for slot in np.flatnonzero(own.stitches.number[lane] >= 0).tolist():
-        nodes = len(moved) // sets
-        number = int(own.stitches.number[lane, slot])
-        yield number, moved[slot % sets * nodes : (slot % sets + 1) * nodes, slot // sets]
+    nodes = len(moved) // max(sets, 1)
+    for slot in np.flatnonzero(number >= 0).tolist():
+        yield int(number[slot]), moved[slot % sets * nodes : (slot % sets + 1) * nodes, slot // sets]

@@ -34,7 +34,6 @@ from .parts import (
 )
 from .points import Point
 from .spans import laid_out
-from .two_wires import check_contact_wires
 
 __all__ = [
     "CLOSEST",
@@ -49,6 +48,8 @@ __all__ = [
     "Support",
 ]
 
+INSTEAD = "contact_wires = 1, with one equivalent wire of twice the mass, tension and bending stiffness"
+"""What else to give where two contact wires are not computed."""
 SEQUENCE = {"span_types", "sequence", "end_support", "overlaps"}  # values of a line whose spans differ
 
 
@@ -137,7 +138,7 @@ class FlexibleCatenaryData(CatenaryData):
         if isinstance(end, Mapping) and isinstance(given, Mapping) and isinstance(own, Mapping):
             table["end_support"] = {**end, "stitch_wire": {**own, **given}}
         line = handler(table)
-        check_contact_wires(line)
+        _check_contact_wires(line)
         if not line.sequence:
             if line.span_types or line.end_support is not None or line.overlaps:
                 raise InputError(
@@ -160,10 +161,7 @@ class FlexibleCatenaryData(CatenaryData):
         }
         return handler(kept | one)
 
-    @model_validator(mode="after")
-    def _droppers_in_span(self) -> Self:
-        check_inside(self.droppers.positions, self.span_length)
-        return self
+    _droppers_in_span = model_validator(mode="after")(check_inside)
 
     @model_validator(mode="after")
     def _points_in_spans(self) -> Self:
@@ -276,3 +274,35 @@ class FlexibleCatenaryData(CatenaryData):
         arms = steady_arms(in_still_air(self).layout(1).tension_lengths[0].layout)
         arm = float(arms.stiffness[0] - omega**2 * arms.mass[0])
         return messenger / (contact + messenger), abs(arm) / math.hypot(arm, 2 * omega * contact)
+
+
+def _check_contact_wires(line: FlexibleCatenaryData) -> None:
+    """Raise InputError for what does not go with a line's number of contact wires."""
+    name, spans = f"line '{line.name}'", line.layout(1).spans
+    if line.contact_wires == 1:
+        if any(span.droppers.wire is not None for span in spans):
+            raise InputError(
+                f"The droppers of {name} have a wire each, but it has one contact wire; give "
+                "contact_wires = 2, or leave out droppers.wire."
+            )
+        return
+    for number, span in enumerate(spans, start=1):
+        if len({wire for *_, wire in span.droppers.hung(2)}) < 2:
+            raise InputError(
+                f"In span {number} of {name} the droppers hold one of its two contact wires only; give both "
+                "some in droppers.wire."
+            )
+    stitched = line.stitch_wire is not None or any(span.stitch_wire is not None for span in spans)
+    wires = {
+        "stitch wires": stitched,
+        "overlaps": bool(line.overlaps),
+        "a plan": line.plan is not None or any(mast.stagger is not None for mast in line.masts),
+        "steady arms whose length is given": line.arms_by_plan,
+        "wires that are fixed at both ends": any(wire.axial_stiffness is not None for wire in line.wires),
+    }
+    for what, there in wires.items():
+        if there:
+            raise InputError(
+                f"Two contact wires are not computed with {what}, which {name} has; leave these out, or give "
+                f"{INSTEAD}."
+            )

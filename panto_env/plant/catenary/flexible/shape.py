@@ -29,20 +29,15 @@ SHARPEST = 1e-12  # m over which a wire without bending stiffness rounds a kink,
 _LOWER = np.tril_indices(4)  # rows and columns of the lower half of an element's matrix
 
 
-class Located(NamedTuple):
-    """Positions on the pieces of a profile."""
-
-    span: Index  # (n,): number of the span, from 0
-    piece: Index  # (n,): number of the piece in the span
-    left: Array  # (n,): distance from its beginning (m)
-    right: Array  # (n,): distance from its end (m)
+Located = tuple[Index, Index, Array, Array]
+"""Positions on a profile: numbers of the span and of its piece, from 0, and distances from its ends (m)."""
 
 
 def located(breaks: Array, x: Array, repeats: bool) -> Located:
     """Positions x (m), (n,), along a line; breaks, repeats: as ``Profile`` has them."""
     span, local = np.divmod(x, breaks[-1]) if repeats else (0 * x, x)
     k = np.clip(np.searchsorted(breaks, local, side="right") - 1, 0, len(breaks) - 2)
-    return Located(span.astype(int), k, local - breaks[k], breaks[k + 1] - local)
+    return span.astype(int), k, local - breaks[k], breaks[k + 1] - local
 
 
 class Profile(NamedTuple):
@@ -167,50 +162,31 @@ class PeriodicWire:
         self.breaks, nodes = breaks, len(breaks) - 1
         self.beams = beams_of(wire, tuple(np.diff(breaks).tolist()))
         self._bulge = self.beams.bulge(np.full(nodes, -GRAVITY * wire.mass))
-        self._ring = ring = _ring_of(nodes, tuple(held.tolist()))
-        size = 2 * nodes
-        stiffness: Any = np.bincount(ring.in_matrix, self.beams.stiffness.ravel(), size**2)
+        size, self._held = 2 * nodes, 2 * held
+        self._unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
+        self._free = np.delete(np.arange(size), self._held)
+        in_matrix = (size * self._unknowns[:, :, None] + self._unknowns[:, None, :]).ravel()
+        stiffness: Any = np.bincount(in_matrix, self.beams.stiffness.ravel(), size**2)
         self._stiffness = stiffness.reshape(size, size)
         loads = self.beams.end_loads(self._bulge)
-        self._weight: Any = np.bincount(ring.unknowns.ravel(), loads.ravel(), size)
-        self._among_free = self._stiffness[ring.among_free]
+        self._weight: Any = np.bincount(self._unknowns.ravel(), loads.ravel(), size)
 
     def hang(self, heights: Array, forces: Array) -> tuple[Array, Array]:
         """Unknowns of the wire with held nodes at ``heights`` (m), and the upward forces (N) that hold them.
 
         forces: further upward forces at all nodes (N), (n,).
         """
-        load, state = self._weight.copy(), np.zeros(len(self._weight))
-        held, free = self._ring.held, self._ring.free
+        load, state, free = self._weight.copy(), np.zeros(len(self._weight)), self._free
         load[::2] += forces
-        state[held] = heights
-        state[free] = np.linalg.solve(self._among_free, (load - self._stiffness @ state)[free])
-        return state, (self._stiffness @ state - load)[held]
+        state[self._held] = heights
+        among_free = self._stiffness[np.ix_(free, free)]
+        state[free] = np.linalg.solve(among_free, (load - self._stiffness @ state)[free])
+        return state, (self._stiffness @ state - load)[self._held]
 
     def profile(self, state: Array) -> Profile:
         """Height along the wire, by its unknowns."""
-        pieces = self.beams.pieces(state[self._ring.unknowns], self._bulge)
+        pieces = self.beams.pieces(state[self._unknowns], self._bulge)
         return Profile(self.breaks, pieces, self.beams.decay)
-
-
-class _Ring(NamedTuple):
-    """Numbers of a periodic wire's unknowns."""
-
-    unknowns: Index  # (elements, 4): of each element
-    in_matrix: Index  # (16 elements,): where their stiffness lies in the whole matrix, read row after row
-    held: Index  # those that are given
-    free: Index  # all others
-    among_free: tuple[Any, ...]  # index of the matrix's part between free ones
-
-
-@remembered
-def _ring_of(nodes: int, held: tuple[int, ...]) -> _Ring:
-    """held: numbers of the held nodes."""
-    size, given = 2 * nodes, 2 * np.array(held)
-    unknowns = (2 * np.arange(nodes)[:, None] + np.arange(4)) % size
-    in_matrix = (size * unknowns[:, :, None] + unknowns[:, None, :]).ravel()
-    free = np.delete(np.arange(size), given)
-    return _Ring(unknowns, in_matrix, given, free, np.ix_(free, free))
 
 
 class LongWire:
@@ -246,9 +222,8 @@ class LongWire:
         right[[1, -1]] += self._slopes
         state = solve_band(band, right)
         pulled = np.zeros(len(state))
-        np.add.at(
-            pulled, self._unknowns, np.einsum("eij,ej->ei", self.beams.stiffness, state[self._unknowns])
-        )
+        forces = np.einsum("eij,ej->ei", self.beams.stiffness, state[self._unknowns])
+        np.add.at(pulled, self._unknowns, forces)
         pulled[::2] += self._springs * state[::2]
         return state, (pulled - load)[2 * held]
 
@@ -309,15 +284,13 @@ class StaticShape:
 
     def over(self, spans: int) -> StaticShape:
         """The same with arrays of the droppers of so many spans."""
-        times = spans // self.spans
-        return replace(
-            self,
-            dropper_tension=np.tile(self.dropper_tension, times),
-            dropper_length=np.tile(self.dropper_length, times),
-            dropper_stiffness=np.tile(self.dropper_stiffness, times),
-            dropper_mass=np.tile(self.dropper_mass, times),
-            spans=spans,
-        )
+        arrays: dict[str, Any] = {
+            name: np.tile(getattr(self, name), spans // self.spans) for name in OF_DROPPERS
+        }
+        return replace(self, **arrays, spans=spans)
+
+
+OF_DROPPERS = ("dropper_tension", "dropper_length", "dropper_stiffness", "dropper_mass")
 
 
 def joined(layout: Layout, shapes: Sequence[StaticShape]) -> StaticShape:
@@ -326,20 +299,15 @@ def joined(layout: Layout, shapes: Sequence[StaticShape]) -> StaticShape:
     limits = np.array([part.in_use[0] for part in parts[1:]])
     begins, whole = np.array([part.begin for part in parts]), (0.0, parts[-1].end)
 
-    def of_droppers(name: str) -> Array:
-        values = np.zeros(len(layout.droppers))
-        for part, shape in zip(parts, shapes, strict=True):
+    arrays: dict[str, Any] = {name: np.zeros(len(layout.droppers)) for name in OF_DROPPERS}
+    for part, shape in zip(parts, shapes, strict=True):
+        for name, values in arrays.items():
             values[part.droppers] = getattr(shape, name)
-        return values
-
     return StaticShape(
         contact=InUse(limits, begins, tuple(shape.contact for shape in shapes), whole),
         messenger=InUse(limits, begins, tuple(shape.messenger for shape in shapes), whole),
         arm_force=np.zeros(0),
-        dropper_tension=of_droppers("dropper_tension"),
-        dropper_length=of_droppers("dropper_length"),
-        dropper_stiffness=of_droppers("dropper_stiffness"),
-        dropper_mass=of_droppers("dropper_mass"),
+        **arrays,
         spans=len(layout.spans),
         ropes=tuple(
             Rope(part.begin + rope.places, rope.heights, part.wire)
@@ -351,9 +319,8 @@ def joined(layout: Layout, shapes: Sequence[StaticShape]) -> StaticShape:
 
 def profiles(layout: Layout, shape: StaticShape) -> list[tuple[TensionLength, Profile, Profile]]:
     """Each tension length with its contact wire and its messenger at rest, along itself."""
-    wires = [
-        wire.profiles if isinstance(wire, InUse) else (wire,) for wire in (shape.contact, shape.messenger)
-    ]
+    both = shape.contact, shape.messenger
+    wires = [wire.profiles if isinstance(wire, InUse) else (wire,) for wire in both]
     return list(zip(layout.tension_lengths, *wires, strict=True))
 
 

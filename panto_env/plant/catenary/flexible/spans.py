@@ -105,34 +105,22 @@ def in_sequence(line: FlexibleCatenaryData) -> tuple[Span, ...]:
 
     Raises InputError, naming the type or the span, for one that cannot be.
     """
-    own = {
-        "span_length": line.span_length,
-        "encumbrance": line.encumbrance,
-        "droppers": line.droppers.model_dump(exclude_none=True),
-        "support": line.support.model_dump(),
-        "steady_arm": line.steady_arm.model_dump(),
-    }
-    if line.stitch_wire is not None:
-        own["stitch_wire"] = line.stitch_wire.model_dump()
+    own = line.model_dump(include={*Span.model_fields}, exclude_none=True)
     types = {
         name: _changed(own, changes, f"type '{name}' in span_types")
         for name, changes in line.span_types.items()
     }
-    return tuple(
-        _of_sequence(item, f"span {number} of the sequence", own, types)
-        for number, item in enumerate(line.sequence, start=1)
-    )
-
-
-def _of_sequence(item: str | Table, where: str, own: Table, types: Mapping[str, Span]) -> Span:
-    changes = {"type": item} if isinstance(item, str) else dict(item)
-    name = changes.pop("type", None)
-    if name is not None and (not isinstance(name, str) or name not in types):
-        known = suggest(str(name), list(types)) if types else "it has none"
-        raise InputError(f"The type '{name}' of {where} is not in span_types: {known}.")
-    if name is not None and not changes:
-        return types[name]
-    return _changed(own if name is None else types[name].model_dump(exclude_none=True), changes, where)
+    found = list[Span]()
+    for number, item in enumerate(line.sequence, start=1):
+        changes = {"type": item} if isinstance(item, str) else dict(item)
+        where = f"span {number} of the sequence"
+        name = changes.pop("type", None)
+        if name is not None and (not isinstance(name, str) or name not in types):
+            known = suggest(str(name), list(types)) if types else "it has none"
+            raise InputError(f"The type '{name}' of {where} is not in span_types: {known}.")
+        table = own if name is None else types[name].model_dump(exclude_none=True)
+        found.append(types[name] if name is not None and not changes else _changed(table, changes, where))
+    return tuple(found)
 
 
 def _changed(own: Table, changes: Any, where: str) -> Span:

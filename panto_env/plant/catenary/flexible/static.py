@@ -161,59 +161,39 @@ def _check_droppers(layout: Layout, shape: StaticShape) -> None:
 
 def _settle(layout: Layout) -> StaticShape:
     """The static shape of a span that repeats."""
-    line, x, sag = layout.line, layout.positions, np.array([dropper.sag for dropper in layout.droppers])
-    messenger = line.messenger_wire
+    line, x, below = layout.line, layout.positions, -np.array([dropper.sag for dropper in layout.droppers])
     breaks = np.concatenate([[0.0], x, [line.span_length]])
     hung, support = np.arange(1, len(breaks) - 1), np.array([0])  # nodes
-    lifts = np.zeros(len(x))
-    lower: list[tuple[Profile, float]] = []
-    for wire in range(line.contact_wires):
-        own = np.flatnonzero(layout.held == wire)
-        held, heights = hung[own], -sag[own]
-        if line.steady_arm.holds_wire:
-            held, heights = np.append(held, support), np.append(heights, 0.0)
-        hanging = PeriodicWire(line.contact_wire, breaks, held)
-        contact, forces = hanging.hang(heights, np.zeros(len(breaks) - 1))
+    arms = support if line.steady_arm.holds_wire else support[:0]
+    lifts, contacts = np.zeros(len(x)), list[tuple[Profile, float]]()
+    for number in range(line.contact_wires):
+        own = np.flatnonzero(layout.held == number)
+        lower = PeriodicWire(line.contact_wire, breaks, np.append(hung[own], arms))
+        contact, forces = lower.hang(np.append(below[own], 0.0 * arms), np.zeros(len(breaks) - 1))
         lifts[own] = forces[: len(own)]
-        lower.append((hanging.profile(contact), float(forces[len(own) :].sum())))
-    upper, stitched = PeriodicWire(messenger, breaks, support), _stitched(layout)
+        contacts.append((lower.profile(contact), float(forces[len(own) :].sum())))
+    wire, stiffness, found = line.messenger_wire, line.support.stiffness, layout.stitches
+    if len(found.support):
+        half = line.span_length / 2
+        rope = StitchedMessenger(
+            wire,
+            found.some(slice(1), np.minimum(found.carrying, 0)),
+            np.where(x > half, x - line.span_length, x),
+            np.zeros(1),
+            np.array([stiffness]),
+            (-half, half),
+            None,
+        )
+        top = np.array([line.encumbrance])
+        return cut_droppers(layout, contacts, lifts, below, rope, lambda pulled: rope.hang(top, -pulled))
+    upper = PeriodicWire(wire, breaks, support)
 
-    def hang(pulled: Array) -> tuple[Array, Array]:
-        """Unknowns above droppers that pull down (N), and heights of the droppers' upper ends (m)."""
-        if stitched is not None:
-            above = stitched.hang(np.array([line.encumbrance]), -pulled)
-            return above, above[stitched.tops]
-        carried = messenger.mass * GRAVITY * line.span_length + pulled.sum()
-        top = np.array([line.encumbrance - carried / line.support.stiffness])
-        above, _ = upper.hang(top, np.append(0.0, -pulled))
+    def hang_upper(pulled: Array) -> tuple[Array, Array]:
+        carried = wire.mass * GRAVITY * line.span_length + pulled.sum()
+        above, _ = upper.hang(np.array([line.encumbrance - carried / stiffness]), np.append(0.0, -pulled))
         return above, above[2 * hung]
 
-    above, droppers = cut_droppers(layout, lifts, -sag, hang)
-    return StaticShape(
-        lower[0][0],
-        upper.profile(above) if stitched is None else stitched.profile(above),
-        lower[0][1],
-        *droppers,
-        ropes=() if stitched is None else stitched.shapes(above),
-        second=lower[-1][0] if lower[1:] else None,
-        second_arm_force=lower[-1][1],
-    )
-
-
-def _stitched(layout: Layout) -> StitchedMessenger | None:
-    found, x, line = layout.stitches, layout.positions, layout.line
-    if not len(found.support):
-        return None
-    half = line.span_length / 2
-    return StitchedMessenger(
-        line.messenger_wire,
-        found.some(slice(1), np.minimum(found.carrying, 0)),
-        np.where(x > half, x - line.span_length, x),
-        np.zeros(1),
-        np.array([line.support.stiffness]),
-        (-half, half),
-        None,
-    )
+    return cut_droppers(layout, contacts, lifts, below, upper, hang_upper)
 
 
 HEADINGS = {
@@ -267,12 +247,8 @@ def as_rows(droppers: Sequence[RestingDropper]) -> list[dict[str, Any]]:
 
     Numbers of spans are among them only where spans differ, those of contact wires where there are two.
     """
-    rows = [each._asdict() for each in droppers]
-    for key in ("span", "wire"):
-        if not any(row[key] > 1 for row in rows):
-            for row in rows:
-                del row[key]
-    return rows
+    left_out = [key for key in ("span", "wire") if all(getattr(each, key) == 1 for each in droppers)]
+    return [{k: v for k, v in each._asdict().items() if k not in left_out} for each in droppers]
 
 
 def droppers_at_rest(line: Any) -> list[RestingDropper]:

@@ -28,13 +28,7 @@ from .arrays import CONTACT, LINK, LOWER, MESSENGER, UPPER, FlexibleLine
 from .blown import blow
 from .links import begin_uneven, difference, follow_links, pull_links, pull_uneven, stretch_of_hung
 from .near import come_near_dropper, leave_droppers, rise_by_dropper
-from .scattered import (
-    at_line_end,
-    displacement_at,
-    record_scattered,
-    stretch_at,
-    take_window,
-)
+from .scattered import at_line_end, displacement_at, record_scattered, stretch_at, take_window
 from .wires import (
     about,
     apply_springs,

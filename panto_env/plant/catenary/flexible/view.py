@@ -33,15 +33,24 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
     inside = (x >= begin) & (x <= end)
     x, moved = x[inside], moved[:, inside]
     place = x if data.sequence else model.alignment.place(x)
-    shape = model.shape_of(lane)
+    shape = model.shapes.get(lane, model.shapes[None])
     contacts, messengers = [], []
     for pair in range(line.pairs):
         tables: Any = line.beside if pair else line
         of_shape = np.linspace(0.0, line.shape_length, tables.shape.shape[1])
         rest = np.interp(place, of_shape, tables.shape[min(lane, len(tables.shape) - 1)])
-        contacts.append(rest + _rise(line, tables, lane, x) + moved[2 * pair + CONTACT])
-        if pair == 0 or data.overlaps:
-            messengers.append(_messenger(model, shape, pair, x, place) + moved[2 * pair + MESSENGER])
+        rise: Array = np.zeros(len(x))
+        if tables.rise.shape[1]:
+            row = min(lane, len(tables.rise) - 1)
+            rise = Profile(tables.rise_breaks, tables.rise[row], line.rise_decay[row]).height(x)
+        contacts.append(rest + rise + moved[2 * pair + CONTACT])
+        if data.overlaps:
+            above = heights_of_pair(model.layout, shape, pair, x, MESSENGER)
+            messengers.append(above + moved[2 * pair + MESSENGER])
+        elif pair == 0:
+            heights = messenger_heights(shape)
+            above = np.interp(place, np.linspace(0.0, line.shape_length, len(heights)), heights)
+            messengers.append(above + moved[MESSENGER])
         else:
             messengers.append(messengers[0])
     used = np.zeros(len(x), dtype=int)
@@ -70,20 +79,6 @@ def view_of(model: FlexibleCatenary, lane: int, begin: float, end: float) -> Lin
         further=tuple(further),
         slack=tension <= 0,
     )
-
-
-def _rise(line: Any, tables: Any, lane: int, x: Array) -> Array:
-    if not tables.rise.shape[1]:
-        return np.zeros(len(x))
-    row = min(lane, len(tables.rise) - 1)
-    return Profile(tables.rise_breaks, tables.rise[row], line.rise_decay[row]).height(x)
-
-
-def _messenger(model: FlexibleCatenary, shape: StaticShape, pair: int, x: Array, place: Array) -> Array:
-    if model.data.overlaps:
-        return heights_of_pair(model.layout, shape, pair, x, MESSENGER)
-    heights = messenger_heights(shape)
-    return np.interp(place, np.linspace(0.0, model.line.shape_length, len(heights)), heights)
 
 
 @lru_cache(maxsize=64)
@@ -125,14 +120,13 @@ def _ends(
     messengers: list[Array],
     ropes: dict[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    layout = model.layout
+    layout, (tops, bottoms) = model.layout, np.zeros((2, len(number)))
     own = np.array([layout.droppers[k].pair for k in number.tolist()], dtype=int)
     carrying = layout.moving.carrying[number]
-    tops, bottoms = np.zeros(len(number)), np.zeros(len(number))
-    for k in range(len(contacts)):
+    for k in range(len(contacts) if len(x) else 0):
         ours = own == k
-        tops[ours] = np.interp(droppers[ours], x, messengers[k]) if len(x) else 0.0
-        bottoms[ours] = np.interp(droppers[ours], x, contacts[k]) if len(x) else 0.0
+        tops[ours] = np.interp(droppers[ours], x, messengers[k])
+        bottoms[ours] = np.interp(droppers[ours], x, contacts[k])
     for k, (places, heights) in ropes.items():
         tops[carrying == k] = np.interp(droppers[carrying == k], places, heights)
     return tops, bottoms

@@ -8,7 +8,8 @@ messenger carries its tension less the stitch wire's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..schema import Wire
 from .layout import Layout, Stitches
 from .parts import index_at, places_of
 from .schema import FlexibleCatenaryData
-from .shape import GRAVITY, HELD, Beams, LongWire, Profile, Rope, StaticShape
+from .shape import GRAVITY, HELD, Beams, LongWire, PeriodicWire, Profile, Rope, StaticShape
 
 
 class StitchedMessenger:
@@ -42,11 +43,11 @@ class StitchedMessenger:
         """
         from scipy.sparse.linalg import splu  # slow to import
 
-        first, last = ends
+        (first, last), self._repeats = ends, slopes is None
         own = stitches.carrying < 0
         clamps = stitches.clamps[(stitches.clamps > first) & (stitches.clamps < last)]
         self.breaks = places_of(ends, [*supports, *clamps, *x[own]])
-        count = len(self.breaks) - (slopes is None)
+        count = len(self.breaks) - self._repeats
         self._height = 2 * (np.arange(len(self.breaks)) % count)  # unknown of each node
         self._size = 2 * count
         self._held: list[tuple[int, float]] = []  # unknowns that are given, and their values
@@ -58,18 +59,14 @@ class StitchedMessenger:
             [self._height[:-1], self._height[:-1] + 1, self._height[1:], self._height[1:] + 1]
         )
         lengths = np.diff(self.breaks)
-        tensions = wire.tension - stitches.deficit(self.breaks[:-1], self.breaks[1:])
         self._decay = np.zeros(len(lengths))
-        for tension in np.unique(np.round(tensions, 6)):
-            which = np.flatnonzero(np.round(tensions, 6) == tension)
-            beams, bulge = self._add(
-                wire.model_copy(update={"tension": float(tension)}), lengths[which], unknowns.T[which]
-            )
+        for which, thinner in stitches.thinned(wire, self.breaks[:-1], self.breaks[1:]):
+            beams, bulge = self._add(thinner, lengths[which], unknowns.T[which])
             self._decay[which] = beams.decay
             self._pieces.append((which, unknowns.T[which], beams, bulge))
-        self.tops: Any = np.zeros(len(x), dtype=np.int64)
-        """Unknown that is the height of each dropper's upper end, (droppers,)."""
-        self.tops[own] = self._at(x[own])
+        # Unknown that is the height of each dropper's upper end, (droppers,)
+        self._tops: Any = np.zeros(len(x), dtype=np.int64)
+        self._tops[own] = self._at(x[own])
         self.ropes: list[tuple[Array, Any]] = []
         """Places of each stitch wire's nodes (m), and the unknowns that are their heights."""
         for k in range(len(stitches.support)):
@@ -82,7 +79,8 @@ class StitchedMessenger:
         self._springs = springs
         if slopes is not None:
             self._held += [(1, slopes[0]), (self._height[-1] + 1, slopes[1])]
-            self._loads.append((self._height[[0, -1]], tensions[[0, -1]] * np.array([-1.0, 1.0]) * slopes))
+            tensions = wire.tension - stitches.deficit(self.breaks[[0, -2]], self.breaks[[1, -1]])
+            self._loads.append((self._height[[0, -1]], tensions * np.array([-1.0, 1.0]) * slopes))
         self._weight = np.zeros(self._size)
         for numbers, forces in self._loads:
             np.add.at(self._weight, numbers, forces)
@@ -107,7 +105,7 @@ class StitchedMessenger:
         heights = self._size + 2 * np.arange(len(places))
         self._size += 2 * len(places)
         slope = heights + 1
-        self.tops[hung] = heights[1:-1]
+        self._tops[hung] = heights[1:-1]
         for node, clamped, gradient in ((0, begin > first, 0), (-1, end < last, 1)):
             if clamped:
                 self._held.append((heights[node], 0.0))  # of no use: it is the messenger's
@@ -129,36 +127,34 @@ class StitchedMessenger:
         held = np.array([number for number, _ in self._held], dtype=np.int64)
         on_diagonal = np.concatenate([self.masts, held])
         added = np.concatenate([self._springs, np.full(len(held), HELD)])
-        return coo_array(
-            (
-                np.append(values, added),
-                (np.append(rows, on_diagonal), np.append(columns, on_diagonal)),
-            ),
-            shape=(self._size, self._size),
-        ).tocsc()
+        places = np.append(rows, on_diagonal), np.append(columns, on_diagonal)
+        return coo_array((np.append(values, added), places), shape=(self._size, self._size)).tocsc()
 
-    def hang(self, tops: Array, forces: Array) -> Array:
-        """Unknowns with supports, unloaded, at ``tops`` (m), (n,), and upward forces on droppers (N)."""
+    def hang(self, tops: Array, forces: Array) -> tuple[Array, Array]:
+        """Unknowns, and heights of the droppers' upper ends (m), with upward forces on droppers (N).
+
+        tops: heights of the supports without load (m), (n,).
+        """
         load = self._weight.copy()
-        np.add.at(load, self.tops, forces)
+        np.add.at(load, self._tops, forces)
         np.add.at(load, self.masts, self._springs * tops)
         for number, value in self._held:
             load[number] = HELD * value
-        return np.asarray(self._solve(load))
+        state = self._solve(load)
+        return state, state[self._tops]
 
     def shapes(self, state: Array) -> tuple[Rope, ...]:
         """The stitch wires, by the unknowns."""
         return tuple(Rope(places, state[heights]) for places, heights in self.ropes)
 
-    def profile(self, state: Array, repeats: bool = True) -> Profile:
+    def profile(self, state: Array) -> Profile:
         """Height along the messenger, by the unknowns; one that repeats begins at the support at 0."""
         pieces = np.zeros((len(self.breaks) - 1, 5))
         for which, unknowns, beams, bulge in self._pieces:
             pieces[which] = beams.pieces(state[unknowns], bulge)
-        if not repeats:
+        if not self._repeats:
             return Profile(self.breaks, pieces, self._decay, repeats=False)
-        turn = int(index_at(self.breaks, 0.0))
-        order = np.roll(np.arange(len(pieces)), -turn)
+        order = np.roll(np.arange(len(pieces)), -int(index_at(self.breaks, 0.0)))
         lengths = np.diff(self.breaks)[order]
         return Profile(np.append(0.0, np.cumsum(lengths)), pieces[order], self._decay[order])
 
@@ -170,15 +166,20 @@ SETTLED, USABLE = 1e-12, 1e-9
 
 
 def cut_droppers(
-    layout: Layout, lift: Array, lower: Array, hang: Callable[[Array], tuple[Array, Array]]
-) -> tuple[Array, tuple[Array, Array, Array, Array]]:
-    """Unknowns of the messenger, and tension, length, stiffness and mass of the droppers of ``StaticShape``.
+    layout: Layout,
+    contacts: Sequence[tuple[Profile, float | Array]],
+    lifts: Array,
+    below: Array,
+    messenger: PeriodicWire | LongWire | StitchedMessenger,
+    hang: Callable[[Array], tuple[Array, Array]],
+) -> StaticShape:
+    """The static shape of a line, its contact wires given with the forces that hold them at steady arms (N).
 
-    lift: upward forces that hold the contact wire at the droppers (N); lower: its heights there (m). hang:
-    the messenger's unknowns and heights at the droppers (m) by what these pull down with (N). Raises
-    InputError where the lengths do not settle.
+    lifts: forces that hold them at the droppers (N), upward like the others; below: their heights there (m).
+    hang: the messenger's unknowns and heights at the droppers (m) by what these pull down with (N). Raises
+    InputError where the droppers' lengths do not settle.
     """
-    stiffness, elastic, per_length, below, over = map(
+    stiffness, elastic, per_length, clamp, over = map(
         layout.of_droppers,
         ("stiffness", "axial_stiffness", "mass", "contact_clamp_mass", "messenger_clamp_mass"),
     )
@@ -186,9 +187,9 @@ def cut_droppers(
     length = np.array([layout.spans[dropper.span - 1].encumbrance for dropper in layout.droppers])
     for _ in range(MOST_ROUNDS):
         mass = per_length * length
-        tension = lift + GRAVITY * (mass / 2 + below)
+        tension = lifts + GRAVITY * (mass / 2 + clamp)
         above, tops = hang(tension + GRAVITY * (mass / 2 + over))
-        loaded = tops - lower
+        loaded = tops - below
         new = np.where(by_length, loaded / (1 + tension / elastic), loaded - tension / stiffness)
         change, length = np.abs(new - length).max(), new
         if change < SETTLED:
@@ -198,7 +199,19 @@ def cut_droppers(
             f"The static shape of line '{layout.line.name}' does not settle in {MOST_ROUNDS} rounds: its "
             "droppers or clamps are too heavy for its wires; give less mass, or more tension."
         )
-    return above, (tension, length, np.where(by_length, elastic / length, stiffness), mass)
+    (first, arm_force), (second, second_arm_force) = contacts[0], contacts[-1]
+    return StaticShape(
+        first,
+        messenger.profile(above),
+        arm_force,
+        tension,
+        length,
+        np.where(by_length, elastic / length, stiffness),
+        mass,
+        ropes=messenger.shapes(above) if isinstance(messenger, StitchedMessenger) else (),
+        second=second if contacts[1:] else None,
+        second_arm_force=second_arm_force,
+    )
 
 
 def settle_line(line: FlexibleCatenaryData) -> StaticShape:
@@ -215,52 +228,34 @@ def settle_line(line: FlexibleCatenaryData) -> StaticShape:
 
     at_supports = (*spans, spans[-1])
     holding = np.flatnonzero([span.steady_arm.holds_wire for span in at_supports])
-    lower_heights = np.interp(x, supports, heights) - [dropper.sag for dropper in layout.droppers]
-    hanging = LongWire(line.contact_wire, breaks, _end_slopes(supports, heights), np.zeros(len(breaks)))
-    lifts, lower = np.zeros(len(x)), list[tuple[Profile, Array]]()
-    for wire in range(line.contact_wires):
-        own = np.flatnonzero(layout.held == wire)
-        held = np.concatenate([hung[own], masts[holding]])
-        wanted = np.append(lower_heights[own], heights[holding])
-        contact, forces = hanging.hang(held, wanted, np.zeros(len(breaks)))
+    below = np.interp(x, supports, heights) - [dropper.sag for dropper in layout.droppers]
+    lower = LongWire(line.contact_wire, breaks, _end_slopes(supports, heights), np.zeros(len(breaks)))
+    lifts, contacts = np.zeros(len(x)), list[tuple[Profile, Array]]()
+    for number in range(line.contact_wires):
+        own = np.flatnonzero(layout.held == number)
+        held, wanted = np.append(hung[own], masts[holding]), np.append(below[own], heights[holding])
+        contact, forces = lower.hang(held, wanted, np.zeros(len(breaks)))
         lifts[own] = forces[: len(own)]
-        lower.append((hanging.profile(contact), forces[len(own) :]))
-
+        contacts.append((lower.profile(contact), forces[len(own) :]))
     springs = np.zeros(len(breaks))
     springs[masts] = [span.support.stiffness for span in at_supports]
     springs[[0, -1]] /= 2
-    slopes, stitches = _end_slopes(supports, tops), layout.stitches
-    stitched = None
+    slopes, stitches, wire = _end_slopes(supports, tops), layout.stitches, line.messenger_wire
     if len(stitches.support):
-        stitched = StitchedMessenger(
-            line.messenger_wire, stitches, x, supports, springs[masts], (0.0, float(supports[-1])), slopes
-        )
-    upper = LongWire(line.messenger_wire, breaks, slopes, springs)
-    raised = np.zeros(len(breaks))
-    raised[masts] = springs[masts] * tops
-    no_nodes = np.zeros(0, dtype=np.int64)
+        limits = 0.0, float(supports[-1])
+        rope = StitchedMessenger(wire, stitches, x, supports, springs[masts], limits, slopes)
+        settled = cut_droppers(layout, contacts, lifts, below, rope, lambda pulled: rope.hang(tops, -pulled))
+    else:
+        upper, forces = LongWire(wire, breaks, slopes, springs), np.zeros(len(breaks))
+        forces[masts] = springs[masts] * tops
 
-    def hang(pulled: Array) -> tuple[Array, Array]:
-        """Unknowns above droppers that pull down (N), and heights of the droppers' upper ends (m)."""
-        if stitched is not None:
-            above = stitched.hang(tops, -pulled)
-            return above, above[stitched.tops]
-        forces = raised.copy()
-        forces[hung] -= pulled
-        above, _ = upper.hang(no_nodes, np.zeros(0), forces)
-        return above, above[2 * hung]
+        def hang(pulled: Array) -> tuple[Array, Array]:
+            forces[hung] = -pulled
+            above, _ = upper.hang(hung[:0], np.zeros(0), forces)
+            return above, above[2 * hung]
 
-    above, droppers = cut_droppers(layout, lifts, lower_heights, hang)
-    return StaticShape(
-        lower[0][0],
-        upper.profile(above) if stitched is None else stitched.profile(above, repeats=False),
-        lower[0][1],
-        *droppers,
-        spans=len(spans),
-        ropes=() if stitched is None else stitched.shapes(above),
-        second=lower[-1][0] if lower[1:] else None,
-        second_arm_force=lower[-1][1],
-    )
+        settled = cut_droppers(layout, contacts, lifts, below, upper, hang)
+    return replace(settled, spans=len(spans))
 
 
 def _end_slopes(supports: Array, heights: Array) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,15 +65,9 @@ class WireDefects(NamedTuple):
 
     def within(self, begin: float, end: float) -> WireDefects:
         """Those that begin from one position of the line up to before another (m); the end cuts stretches."""
-        return WireDefects(
-            tuple(spot for spot in self.spots if begin <= spot.position < end),
-            tuple(
-                stretch._replace(end=min(stretch.end, end))
-                for stretch in self.stretches
-                if begin <= stretch.begin < end
-            ),
-            tuple(bump for bump in self.bumps if begin <= bump.position < end),
-        )
+        kept: list[Any] = [tuple(defect for defect in each if begin <= defect[0] < end) for each in self]
+        spots, stretches, bumps = kept
+        return WireDefects(spots, tuple(each._replace(end=min(each.end, end)) for each in stretches), bumps)
 
     @property
     def lightest(self) -> float:
@@ -102,26 +96,22 @@ class WireDefects(NamedTuple):
         A spot hangs on the two nearest nodes.
         """
         mass = np.zeros(len(x))
-        for stretch in self.stretches:
-            covered = np.minimum(x + spacing / 2, stretch.end) - np.maximum(x - spacing / 2, stretch.begin)
-            mass -= stretch.share * wire.mass * np.maximum(covered, 0.0)
+        for begin, end, share, _ in self.stretches:
+            covered = np.minimum(x + spacing / 2, end) - np.maximum(x - spacing / 2, begin)
+            mass -= share * wire.mass * np.maximum(covered, 0.0)
         for spot in self.spots:
             mass += spot.mass * _shares(x, spacing, spot.position)
         return mass
 
     def springs_of_nodes(self, x: Array, spacing: float) -> Array:
         """Stiffness (N/m), (n,), with which spots hold the nodes of a grid at x (m)."""
-        stiffness = np.zeros(len(x))
-        for spot in self.spots:
-            stiffness += spot.stiffness * _shares(x, spacing, spot.position)
-        return stiffness
+        zero = np.zeros(len(x))
+        return sum((spot.stiffness * _shares(x, spacing, spot.position) for spot in self.spots), zero)
 
     def lightening(self, x: Array) -> Array:
         """Missing share of the wire's weight at places x (m), (n,)."""
-        gone = np.zeros(len(x))
-        for stretch in self.stretches:
-            gone += stretch.share * ((x > stretch.begin) & (x < stretch.end))
-        return gone
+        zero = np.zeros(len(x))
+        return sum((share * ((x > begin) & (x < end)) for begin, end, share, _ in self.stretches), zero)
 
     def surface(self, x: Array) -> Array:
         """Rise of the running surface over the axis of the wire (m), (n,), at places x (m)."""
@@ -139,18 +129,16 @@ NO_DEFECTS = WireDefects()
 def locate(layout: Layout, condition: LineCondition) -> WireDefects:
     """Defects of the contact wire in a condition. Raises InputError for a place beyond the line."""
     data, spans, alignment = layout.line, len(layout.spans), layout.alignment
-    lengths = alignment.lengths
+    whole = alignment.length
 
     def position(span: int, offset: float) -> float:
-        if span > spans or offset > lengths[span - 1]:
-            last = spans if span > spans else span
+        last = min(span, spans)
+        length = alignment.lengths[last - 1]
+        if span > spans or offset > length:
+            each = f", and span {last} is {length:g} m long" if data.sequence else f" of {length:g} m"
             raise InputError(
                 f"Line '{data.name}' has no place {offset:g} m from the first support of span {span}: "
-                + (
-                    f"it has {spans} spans of {data.span_length:g} m."
-                    if not data.sequence
-                    else f"it has {spans} spans, and span {last} is {lengths[last - 1]:g} m long."
-                )
+                f"it has {spans} spans{each}."
             )
         return float(alignment.support(span - 1) + offset)
 
@@ -169,7 +157,6 @@ def locate(layout: Layout, condition: LineCondition) -> WireDefects:
                 f"{stretches[-1].begin:g} and {begin:g} m along the line do."
             )
         stretches.append(Stretch(begin, begin + length, share * metal, worn_depth(wire, share)))
-    whole = alignment.length
     bumps = tuple(
         Bump(position(span, offset), length, height)
         for span, offset, length, height in condition.surface_bumps
@@ -180,11 +167,8 @@ def locate(layout: Layout, condition: LineCondition) -> WireDefects:
                 f"A bump reaches from {bump.knots[0]:g} to {bump.knots[-1]:g} m, and the line from 0 to "
                 f"{whole:g} m."
             )
-    for spot in spots:
-        if not 0 < spot.position < whole:
-            raise InputError(
-                f"A hard spot or a point must lie between the line's anchors, at 0 and {whole:g} m."
-            )
+    if not all(0 < spot.position < whole for spot in spots):
+        raise InputError(f"A hard spot or a point must lie between the line's anchors, at 0 and {whole:g} m.")
     if stretches and stretches[-1].end > whole:
         raise InputError(f"A worn stretch ends at {stretches[-1].end:g} m, but the line at {whole:g} m.")
     return WireDefects(spots, tuple(stretches), bumps)
