@@ -23,8 +23,7 @@ NOTE = (
 )
 
 
-MOST_LINES = 2
-"""Number of lines up to which Δσ is shown at each speed."""
+MOST_LINES = 2  # number of lines up to which Δσ is shown at each speed
 
 
 def brief(outcome: Benchmark) -> RenderableType:

@@ -37,8 +37,7 @@ from .submission import replay as play
 
 PLACE = (*OPTIONS, "pantographs")
 """Options that say what runs on which line: they replace the lines of a file."""
-DRAW = "draw"
-"""Salt that stands for one drawn at random."""
+DRAW = "draw"  # salt that stands for one drawn at random
 
 
 @with_settings(only=(*OPTIONS, "actuator", "sensors", "line_condition", "control_interval"), defaults=False)

@@ -93,8 +93,7 @@ def _files(folder: Path) -> list[str]:
     return sorted(path.as_posix() for path in paths if not any(p.startswith(".") for p in path.parts))
 
 
-DESIGNS_PER_PART = 64
-"""Designs per part: some seconds of work."""
+DESIGNS_PER_PART = 64  # designs per part: some seconds of work
 TABLE_KEY = b"panto_env"
 """Key of the table's identity in the schema's metadata; a column's metadata hold its description."""
 
@@ -208,8 +207,7 @@ def _made_designs(folder: Path, *, kept: bool) -> MadeTable:
 
 EPISODES_PER_PART = 10
 """Episodes per part: a second or two of work, so that little is lost by an interruption."""
-NAMESPACE_FILE = "namespace_metadata.json"
-"""File by which Minari recognises a folder of data sets."""
+NAMESPACE_FILE = "namespace_metadata.json"  # file by which Minari recognises a folder of data sets
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ from panto_env.control.observation import Context
 from .feedback import ForceLaw, number, time_constant
 from .lanes_law import Array, Gain, Observations, Source, TunableLaw
 
-FORCE_RANGE = (0.0, 300.0)
-"""Range (N) to which the feedback clips the contact force (paper 1)."""
+FORCE_RANGE = (0.0, 300.0)  # range (N) to which the feedback clips the contact force (paper 1)
 READINGS = ("span", "printed")
 SPEED_UNITS = {"km/h": METRES_PER_SECOND, "m/s": 1.0}
 

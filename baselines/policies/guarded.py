@@ -37,19 +37,15 @@ Observation = NDArray[np.float32]
 
 SAME = 5e-5
 """Difference of two readings, in the observation's scale, below which a sensor seems to stand still."""
-STANDS = 2
-"""Control steps in a row without a change after which a reading is held."""
+STANDS = 2  # control steps in a row without a change after which a reading is held
 PATIENCE, RETURN = 1.2, 0.5
 """Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
 (s) for which they must move again before it comes back."""
-LISTENING = 2.0
-"""Time (s) at the start in which the pantograph is passive and is listened to."""
-WINDOW, SHORT_WINDOW = 1.5, 0.4
-"""Time constants (s) of the means and variances that the monitor compares."""
+LISTENING = 2.0  # time (s) at the start in which the pantograph is passive and is listened to
+WINDOW, SHORT_WINDOW = 1.5, 0.4  # time constants (s) of the means and variances that the monitor compares
 FORCES = ("contact force", "force deviation", f"contact force{DEVIATION}")
 """Names of the entry that has the contact force, by kind of observation."""
-SETTLED = 1.0
-"""Time (s) of control, or without it, after which the windows hold nothing else."""
+SETTLED = 1.0  # time (s) of control, or without it, after which the windows hold nothing else
 HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
 """Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
 ``SETTLED``, before, and over the short window."""
@@ -64,19 +60,16 @@ window nor a single peak is control's doing."""
 SHIFT, SHIFT_WINDOW = 0.03, 5.0
 """Share of the nominal force by which control may move the mean force, by the model; time constant of that
 mean (s)."""
-LOW = 0.2
-"""Share of the nominal force below which the command may not take more away."""
+LOW = 0.2  # share of the nominal force below which the command may not take more away
 FADE_OUT, FADE_IN, PROBE = 0.2, 0.5, 3.0
 """Times (s) in which the command fades out; in, after readings were held; and in after a pause, so slowly
 that harm is seen while it is small."""
-HIGHEST = 20.0
-"""Frequency (Hz) up to which the force's spread is compared, as in figures."""
+HIGHEST = 20.0  # frequency (Hz) up to which the force's spread is compared, as in figures
 PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
 """First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
 CALMER = 0.85
 """Ratio of the spread heard in a pause to that over the short window before, above which it was no harm."""
-GOOD = 20.0
-"""Time (s) of control without harm after which the next pause is the first again."""
+GOOD = 20.0  # time (s) of control without harm after which the next pause is the first again
 FASTER = 1.2
 """Ratio of speeds, of now and of when it last listened, from which on it listens anew. Up to it the spread
 that it heard is taken to grow with the square of the speed."""

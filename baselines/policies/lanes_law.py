@@ -27,10 +27,8 @@ from panto_env.plant.state import Place
 
 Source = str | Sequence[float]
 GAINS_FOLDER = FOLDER / "policies"
-MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)
-"""How the names begin of what lines are drawn from."""
-REACH = 12.5
-"""Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
+MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)  # how the names begin of what lines are drawn from
+REACH = 12.5  # gains are used up to this far (km/h) beyond the tuned speeds: half a usual step
 
 
 class Tuning(Settings):

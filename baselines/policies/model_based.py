@@ -15,18 +15,14 @@ from panto_env.estimation.kalman import steady_gain
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, MeanLine, Sampled, line_model, mean_line
 
-HIGHEST = 8.0
-"""Maximum frequency (Hz) of the span's harmonics in the model of the wire's height."""
-FADING = 0.05
-"""Damping ratio of these harmonics: it sets the filter's memory and bandwidth."""
-HEIGHT = 1e-3
-"""Unit (m) of the noise that drives heights."""
+HIGHEST = 8.0  # maximum frequency (Hz) of the span's harmonics in the model of the wire's height
+FADING = 0.05  # damping ratio of these harmonics: it sets the filter's memory and bandwidth
+HEIGHT = 1e-3  # unit (m) of the noise that drives heights
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
 """Rms noise of ``OUTPUTS`` (N, m, m/s), mostly the model's own error; the force is trusted most."""
 ROUNDING = 1e-14
 """Variance added to each state's noise, without which the Riccati equation is too badly conditioned."""
-AVERAGED = 2.0
-"""Time constant (s) of the slow averages that are subtracted from readings."""
+AVERAGED = 2.0  # time constant (s) of the slow averages that are subtracted from readings
 HELD = 0.7
 """Frequency (Hz) below which the integral of the command costs more than the command: it keeps the mean."""
 
@@ -147,10 +143,8 @@ def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> A
     return gains
 
 
-CORNER = 30.0
-"""Angular frequency (rad/s) up to which the height of the wire is expected to vary."""
-WIDTH = 0.7
-"""Damping ratio of the weight on the contact force, which sets the width of its band."""
+CORNER = 30.0  # angular frequency (rad/s) up to which the height of the wire is expected to vary
+WIDTH = 0.7  # damping ratio of the weight on the contact force, which sets the width of its band
 NEAR = 1.1
 """Ratio of the bound used to the minimum one: a controller at the minimum bound is badly conditioned."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
@@ -225,8 +219,7 @@ class Weighted(NamedTuple):
     c2: Array  # (5, states)
 
 
-Controller = tuple[Array, Array, Array]
-"""Matrices A, B and C of x' = A x + B readings, u = C x."""
+Controller = tuple[Array, Array, Array]  # matrices A, B and C of x' = A x + B readings, u = C x
 
 
 def weighted(model: LineModel, performance: float, centre: float, height: float) -> Weighted:

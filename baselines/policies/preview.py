@@ -27,12 +27,9 @@ from panto_env.policies import Policy, find_policy, wishes
 from ..benchmark.settings import TRAINING
 
 Array = NDArray[np.float64]
-SETTLED = 9
-"""Spans after which the force nearly repeats with the span."""
-CLEAR = 8
-"""Spans of the line beyond those run, so that its end has no effect."""
-PULSE = 20.0
-"""Test force (N): small beside the contact force, large beside rounding."""
+SETTLED = 9  # spans after which the force nearly repeats with the span
+CLEAR = 8  # spans of the line beyond those run, so that its end has no effect
+PULSE = 20.0  # test force (N): small beside the contact force, large beside rounding
 
 
 class Preview(NamedTuple):
@@ -109,22 +106,15 @@ def _preview(
     return Preview(start, stride, passive - passive.mean(), response / PULSE)
 
 
-PLACES = tuple(range(0, 31, 2))
-"""Places ahead (m) at which the force in front is observed."""
-PASSES, EXCITED = 6, 3
-"""Passes without control, and with test forces, from which gains are fitted."""
-DISTANCE = 1500.0
-"""Length of these passes (m)."""
-BEGIN = 120
-"""Control steps of a pass that are left out at its start, while waves build up."""
-PULSES, PULSE_STEPS = 20.0, 5
-"""Test forces (N), up or down at random, and control steps that each is held."""
-RESPONSE = 40
-"""Control steps in which a command acts on the contact force."""
+PLACES = tuple(range(0, 31, 2))  # places ahead (m) at which the force in front is observed
+PASSES, EXCITED = 6, 3  # passes without control, and with test forces, from which gains are fitted
+DISTANCE = 1500.0  # length of these passes (m)
+BEGIN = 120  # control steps of a pass that are left out at its start, while waves build up
+PULSES, PULSE_STEPS = 20.0, 5  # test forces (N), up or down at random, and control steps that each is held
+RESPONSE = 40  # control steps in which a command acts on the contact force
 PAST = range(2, 60, 3)
 """Control steps ago at which the force in front at the own place is remembered, for waves that come late."""
-RIDGE = 0.3
-"""Weight of the squared command beside the squared force that it leaves."""
+RIDGE = 0.3  # weight of the squared command beside the squared force that it leaves
 
 
 class Gains(NamedTuple):

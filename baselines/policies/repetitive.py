@@ -67,27 +67,20 @@ class Washout:
         return change
 
 
-PLACES = ("read", "counted")
-"""Where the place within the span comes from."""
+PLACES = ("read", "counted")  # where the place within the span comes from
 
 
-HIGHEST = 16.0
-"""Maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz."""
-LISTENING = 3.0
-"""Spans without control at the start; the last two give the approximate passive sigma."""
-TOLERATED = 1.05
-"""Ratio of a span's sigma to the passive one above which the control backs off."""
+HIGHEST = 16.0  # maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz.
+LISTENING = 3.0  # spans without control at the start; the last two give the approximate passive sigma
+TOLERATED = 1.05  # ratio of a span's sigma to the passive one above which the control backs off
 ANOTHER = 0.03
 """Relative change of the measured speed from which on it learns at another speed; a train's drift is less."""
-SMOOTHED = 0.5
-"""Time constant (s) of the measured speed."""
+SMOOTHED = 0.5  # time constant (s) of the measured speed
 BACK_OFF, RECOVERY = 0.5, 1.05
 """Factor on the learnt force and on the speed of learning after a span in which the control backs off; factor
 by which learning recovers after any other span, up to its full speed."""
-OVER = 1.5
-"""Maximum peak of the learnt force, relative to the actuator's limit: clipping it gains a little."""
-PEAKS = 128
-"""Number of places of a span at which the peak of the learnt force is searched for."""
+OVER = 1.5  # maximum peak of the learnt force, relative to the actuator's limit: clipping it gains a little
+PEAKS = 128  # number of places of a span at which the peak of the learnt force is searched for
 
 
 class Pace(NamedTuple):
@@ -98,8 +91,7 @@ class Pace(NamedTuple):
     response: float  # response of the contact force below which learning slows down (N/N)
 
 
-PACE = Pace(0.65, 0.01, 0.5)
-"""Best of several values on training seeds of four lines."""
+PACE = Pace(0.65, 0.01, 0.5)  # best of several values on training seeds of four lines
 
 
 def harmonics(span_rate: float) -> Array:

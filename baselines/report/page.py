@@ -21,6 +21,7 @@ from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.actions import Trace
+from ..benchmark.overall import with_feedback
 from ..benchmark.report import LEGEND, LEGEND_OF_HARM, spans_in_words
 from ..benchmark.run import Result, read_result
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
@@ -54,8 +55,7 @@ def what_is(policy: str) -> str:
     return "It is not installed where this page was made."
 
 
-STRONGEST = 0.6
-"""Opacity of a heat map's strongest colour, so that text on it stays legible."""
+STRONGEST = 0.6  # opacity of a heat map's strongest colour, so that text on it stays legible
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,7 @@ class Track:
     """Everything that the page shows of one result."""
 
     result: Result
+    heading: str  # the title, and that a tape is nearly as good as the best policy where it is
     settings: str  # as TOML
     numbers: dict[str, int]  # of policies, for their colours
     shown_first: set[str]  # policies whose traces are shown when the page opens
@@ -125,6 +126,7 @@ def track(result: Result) -> Track:
     methods = dict.fromkeys(method_of.values())
     return Track(
         result=result,
+        heading=with_feedback(result.title, result.standings),
         settings=as_toml(result.settings),
         numbers={policy: number for number, policy in enumerate([*result.policies, *methods])},
         shown_first=first if len(ranked) > 2 else set(result.policies[:4]) | first,
@@ -139,11 +141,14 @@ def track(result: Result) -> Track:
             "Δσ over effort, all lines and speeds",
             ("effort, mean over lines and speeds (N)", "Δσ (%)"),
             [
-                Point(method_of[one.policy], *at, one.policy)
-                if one.policy in method_of
-                else Point(one.policy, *at)
+                Point(
+                    method_of.get(one.policy, one.policy),
+                    one.effort,
+                    one.change,
+                    bool(one.disqualified),
+                    one.policy if one.policy in method_of else "",
+                )
                 for one in result.standings
-                for at in [(one.effort, one.change, bool(one.disqualified))]
             ],
         ),
         sections=[_section(result, place) for place in result.places],
@@ -156,17 +161,16 @@ def _heat(result: Result) -> dict[str, list[Shade | None]]:
     cells = {(cell.policy, cell.place): cell for cell in result.cells}
     sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
     maximum = min(max([1.0, *sizes]), FAR_OFF)
+
+    def shade(cell: Cell | None) -> Shade | None:
+        if cell is None:
+            return None
+        strength = cell.change / maximum if isfinite(cell.change) else 0.0
+        return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
+
     return {
-        policy: [_shade(cells.get((policy, place)), maximum) for place in result.places]
-        for policy in result.policies
+        policy: [shade(cells.get((policy, place))) for place in result.places] for policy in result.policies
     }
-
-
-def _shade(cell: Cell | None, maximum: float) -> Shade | None:
-    if cell is None:
-        return None
-    strength = cell.change / maximum if isfinite(cell.change) else 0.0
-    return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
 
 
 def _pairs(result: Result) -> dict[str, list[Shade | None]]:
@@ -188,25 +192,15 @@ def _section(result: Result, place: LineAtSpeed) -> Section:
     windows = result.windows[list(dict.fromkeys(each.line for each in result.places)).index(place.line)]
     first, last = windows.early
     count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
-    points = [
-        Point(
-            cell.policy,
-            cell.figures.get("effort", nan),
-            cell.figures.get("std", nan),
-            bool(cell.disqualified),
-        )
-        for cell in cells
-    ]
-    over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
+    at = [(each.figures.get("effort", nan), each.figures.get("std", nan)) for each in cells]
+    points = [Point(one.policy, *xy, bool(one.disqualified)) for one, xy in zip(cells, at, strict=True)]
     traces = [trace for trace in result.traces if trace.place == place]
-    return Section(
-        title=title,
-        table=table_of_cells(cells, f"{spans_in_words(windows).capitalize()}, {count}"),
-        charts=[
-            *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
-            *([over_effort] if over_effort else []),
-        ],
-    )
+    charts: list[Chart | None] = []
+    if traces:
+        charts += _traces(traces, (max(first, last - 1), last), cells[0].nominal_force)
+    charts.append(dots("σ over effort", ("effort, rms (N)", "σ (N)"), points))
+    table = table_of_cells(cells, f"{spans_in_words(windows).capitalize()}, {count}")
+    return Section(title, table, [chart for chart in charts if chart is not None])
 
 
 def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> list[Chart]:
@@ -317,14 +311,10 @@ def report(
     path = with_suffix(files[0], PAGES[0]) if output is None else output
     check_output(path, PAGES)
     announce_overwriting(path)
-    if of_runs:
-        _of_runs(files, path, figures, droppers)
+    if not of_runs:
+        save([read_result(file) for file in files], path)
+        console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
         return
-    save([read_result(file) for file in files], path)
-    console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
-
-
-def _of_runs(files: list[Path], path: Path, figures: str | None, droppers: str | None) -> None:
     from panto_env import Trajectory, report
     from panto_env.metrics.run_tables import save_droppers, save_figures
 

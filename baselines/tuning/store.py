@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -68,17 +68,14 @@ def _tune_part(
     write_checked(path, asdict(tune_at(policy, settings, speed_kmh, seeds, passes)))
 
 
-DIGITS = 5
-"""Significant digits of a gain: far more than a tuning can resolve."""
+DIGITS = 5  # significant digits of a gain: far more than a tuning can resolve
 
 
 def make_tuning(
     settings: RunSettings, names: Sequence[str], tuned: Sequence[Tuned], seeds: Sequence[int], command: str
 ) -> Tuning:
     """The outcome of a tuning in its stored form; ``line_condition`` holds the drawn conditions as JSON."""
-    conditions = [
-        condition.model_dump(mode="json", exclude_defaults=True) for condition in settings.line_condition
-    ]
+    conditions = [each.model_dump(mode="json", exclude_defaults=True) for each in settings.line_condition]
     pantograph = settings.controlled_pantograph
     return Tuning(
         catenary=line_name(settings),
@@ -113,17 +110,18 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
-    pantograph = settings.controlled_pantograph
-    place = settings.actuator.place
-    alike = [each for each in file.tunings if each.washout == settings.washout]
-    if draws_line(settings):
-        held = any(each.is_for_any_line(pantograph, place) for each in alike)
-    else:
-        held = any(each.is_for(settings.line, pantograph, place) for each in alike)
+    pantograph, place = settings.controlled_pantograph, settings.actuator.place
+    held = any(
+        each.is_for_any_line(pantograph, place)
+        if draws_line(settings)
+        else each.is_for(settings.line, pantograph, place)
+        for each in file.tunings
+        if each.washout == settings.washout
+    )
     if held and not force:
         raise InputError(
             f"{path} already holds gains for {pantograph.name} on {line_name(settings)}, "
-            f"actuator on '{settings.actuator.place}'; give another --output, or --force to replace them."
+            f"actuator on '{place}'; give another --output, or --force to replace them."
         )
 
 
@@ -142,25 +140,13 @@ def _case(tuning: Tuning) -> tuple[str | float, ...]:
 
 def table(policy: str, tuned: Sequence[Tuned]) -> Table:
     """Table with a row per speed: objective before and after, sigma and mean force relative to passive."""
-    headings = (
-        "speed (km/h)",
-        "passes",
-        "iterations",
-        "objective before",
-        "after",
-        "σ to passive (%)",
-        "mean force (%)",
-    )
-    rows = [
-        (
-            f"{each.speed_kmh:g}",
-            str(each.passes),
-            str(len(each.history) - 1),
-            number(each.history[0], 3),
-            number(each.history[-1], 3),
-            f"{100 * each.std_change:+.1f}",
-            f"{100 * each.mean_change:+.2f}",
-        )
-        for each in tuned
-    ]
-    return Table(f"{policy}, tuned: σ and mean on selection seeds", headings, rows)
+    columns: dict[str, Callable[[Tuned], str]] = {
+        "speed (km/h)": lambda one: f"{one.speed_kmh:g}",
+        "passes": lambda one: str(one.passes),
+        "iterations": lambda one: str(len(one.history) - 1),
+        "objective before": lambda one: number(one.history[0], 3),
+        "after": lambda one: number(one.history[-1], 3),
+        "σ to passive (%)": lambda one: f"{100 * one.std_change:+.1f}",
+        "mean force (%)": lambda one: f"{100 * one.mean_change:+.2f}",
+    }
+    return Table.of(f"{policy}, tuned: σ and mean on selection seeds", tuned, columns)
