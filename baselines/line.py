@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ParamSpec, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, model_validator
 
@@ -17,7 +17,7 @@ from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
 T = TypeVar("T")
-P = ParamSpec("P")
+
 OPTIONS = ("catenary", "pantograph", "distances", "controlled")
 """Options of a command that say which train runs on which line."""
 CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
@@ -29,12 +29,12 @@ def of_run(name: str) -> Any:
     return Field(default(name), validate_default=True, description=description(name))
 
 
-def as_clause(read: Callable[P, T]) -> Callable[P, T]:
+def as_clause(read: Callable[[Any], T]) -> Callable[[Any], T]:
     """``read`` for a field: its errors become clauses, to which pydantic adds the key and the value."""
 
-    def read_field(*given: P.args, **named: P.kwargs) -> T:
+    def read_field(value: Any) -> T:
         try:
-            return read(*given, **named)
+            return read(value)
         except InputError as error:
             raise ValueError(str(error).rstrip(".")) from error
 

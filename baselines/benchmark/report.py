@@ -25,7 +25,7 @@ from panto_env.terminal import number
 from .harm import MOST_GROWN, MOST_WORSE, WORSE
 from .overall import Standing, method_of, next_in_ranking, with_feedback
 from .run import Benchmark
-from .settings import REFERENCE, LineAtSpeed, Windows
+from .settings import REFERENCE, Windows
 from .single_pass import ROW_LABELS, drive
 from .statistics import Cell
 
@@ -295,11 +295,11 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, lines_of: Mapping[str, Mappi
     speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
     first, last = outcome.windows[k].early
     shown = max(first, last - 1), last
-    place = LineAtSpeed(line.catenary, line.pantograph, speed, line.case)
+    place = (line.catenary, line.pantograph, line.case, speed, seed)
     actions = {
         row.policy: played
         for row, played in zip(outcome.rows, outcome.played, strict=True)
-        if (row.place, row.seed) == (place, seed)
+        if (row.catenary, row.pantograph, row.case, row.speed_kmh, row.seed) == place
     }
     for policy, style in lines_of.items():
         run, _ = drive(settings, line, policy, speed, seed, actions[policy])

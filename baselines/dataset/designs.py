@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -59,7 +60,7 @@ class DesignsSettings(Settings):
                 continue
             if family not in entries:
                 raise ValueError(f"{name} must be {SPEED} or begin with 'catenary.' or 'pantograph.'")
-            as_clause(check_name)(name, entries[family])
+            as_clause(partial(check_name, name))(entries[family])
         return self
 
     def entries(self) -> Mapping[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from panto_baselines.policies.fb_ff import FeedbackFeedforward
-from panto_baselines.policies.feedback import Passive, Proportional, ProportionalDerivative
+from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
 from panto_env import InputError, simulate
 from panto_env.control.observation import Context
 from panto_env.envs import PantographEnv
@@ -17,21 +17,7 @@ from panto_env.policies import Policy, find_policy, wishes
 from .laws import a_context, seen
 
 SPEED_KMH = 300.0
-POLICIES = {
-    "passive": Passive,
-    "p": Proportional,
-    "pd": ProportionalDerivative,
-    "fb+ff": FeedbackFeedforward,
-}
-
-
-def environment(**settings: Any) -> PantographEnv:
-    """An environment at the start of an episode."""
-    env = PantographEnv(**{"speed_kmh": SPEED_KMH} | settings)
-    env.reset(seed=0)
-    return env
-
-
+POLICIES = ("passive", "p", "pd", "fb+ff")
 CONTEXT = a_context(SPEED_KMH)
 NOMINAL = CONTEXT.nominal_force
 
@@ -44,9 +30,6 @@ def force(policy: Policy, context: Context = CONTEXT, **values: float) -> float:
 def ready(policy: Policy, context: Context = CONTEXT) -> Policy:
     policy.reset(context)
     return policy
-
-
-# --- all of them ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -107,9 +90,6 @@ def test_bad_parameters_are_refused_by_name(source: str, words: str) -> None:
     assert f"'{source}'" in str(caught.value)
 
 
-# --- each law ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["p", "pd", "fb+ff", "tuned-pd", "tuned-fb+ff"])
 def test_a_washout_is_a_parameter_and_off_by_default(name: str) -> None:
     """The papers' form is the default; with it a run takes the slow average of the force off."""
@@ -157,20 +137,19 @@ def test_feedback_gain_depends_on_speed(speed: float, gain: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "turns_per_metre"),
+    ("parameters", "turns_per_metre", "theta"),
     [
-        ({}, 1 / 60),
-        ({"reading": "printed"}, 2 * 300 / 60 / (4 * 60)),
-        ({"reading": "printed", "speed_unit": "m/s"}, 2 * (300 / 3.6) / 60 / (4 * 60)),
+        ({}, 1 / 60, math.pi / 6),
+        ({"reading": "printed"}, 2 * 300 / 60 / (4 * 60), -1.0),
+        ({"reading": "printed", "speed_unit": "m/s"}, 2 * (300 / 3.6) / 60 / (4 * 60), math.pi / 6),
     ],
 )
-@pytest.mark.parametrize("theta", [math.pi / 6, -1.0])
 def test_feedforward_follows_the_equation_along_the_line(
     parameters: dict[str, Any], turns_per_metre: float, theta: float
 ) -> None:
-    env = environment()
-    policy = ready(FeedbackFeedforward(gain=0, theta=theta, **parameters), env.context)
+    env = PantographEnv(speed_kmh=SPEED_KMH)
     observation, _ = env.reset(seed=0)
+    policy = ready(FeedbackFeedforward(gain=0, theta=theta, **parameters), env.context)
     for k in range(100):
         x = k * 0.01 * SPEED_KMH / 3.6
         action = policy.act(observation)
@@ -182,9 +161,6 @@ def test_feedforward_follows_the_equation_along_the_line(
 def test_feedforward_refuses_sensors_that_do_not_tell_the_place() -> None:
     with pytest.raises(InputError, match="needs the place within the span"):
         simulate(policy="fb+ff", sensors="blind", distance=100.0)
-
-
-# --- on the line ---------------------------------------------------------------------------------
 
 
 def test_each_calms_the_contact_force_without_pressing_less() -> None:

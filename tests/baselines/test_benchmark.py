@@ -63,9 +63,6 @@ def called(*arguments: str) -> Any:
     return CliRunner().invoke(app, short, env={"COLUMNS": "120"})
 
 
-# --- passes --------------------------------------------------------------------------------------
-
-
 def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Benchmark) -> None:
     assert [(row.policy, row.seed) for row in outcome.rows] == [
         *(("passive", 0), ("passive", 1)),
@@ -127,9 +124,6 @@ def test_a_bias_within_what_qualifies_gains_nothing(tmp_path: Path) -> None:
     assert abs(less.change) < 0.2 * abs(fall)
 
 
-# --- trainings -----------------------------------------------------------------------------------
-
-
 def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Path) -> None:
     given = settings(policies=["passive"], trainings={"p's": [P, "p:gain=0.2"]})
     done = benchmark.run(given, workers=1)
@@ -139,9 +133,6 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
     ]
     done.save(tmp_path / "out.json")
     assert "a training of p&#39;s" in page([read_result(tmp_path / "out.json")])
-
-
-# --- what is not valid ---------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -189,9 +180,6 @@ def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], wo
 def test_no_workers_are_refused() -> None:
     with pytest.raises(InputError, match="workers must be 1 or more"):
         benchmark.run(settings(), workers=0)
-
-
-# --- files ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -263,9 +251,6 @@ def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> 
     assert all(axis.get_legend() is None for axis in figure.axes)  # none lies on data
     assert "(N)" in forces.get_ylabel()
     assert "(km/h)" in sigmas.get_xlabel()
-
-
-# --- the command ---------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

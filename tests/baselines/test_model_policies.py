@@ -35,9 +35,6 @@ from .laws import CONTEXT, MODEL, a_context, repeated
 Array = NDArray[np.float64]
 
 
-# --- the model -----------------------------------------------------------------------------------
-
-
 def test_models_response_is_that_of_masses_springs_and_dampers_by_hand() -> None:
     frequency = np.array([0.3, 2.0, 9.0])
     pantograph, line = CONTEXT.pantograph, mean_line(CONTEXT)
@@ -130,9 +127,6 @@ def test_a_line_without_wires_is_refused() -> None:
         mean_line(context)
 
 
-# --- repetitive control ----------------------------------------------------------------------------
-
-
 def test_repetitive_control_learns_a_force_that_repeats_to_near_zero() -> None:
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.0, 0.05)), 25)
     assert controlled[: int(LISTENING) - 1] == pytest.approx(passive[: int(LISTENING) - 1], rel=1e-6)
@@ -154,9 +148,6 @@ def test_repetitive_control_backs_off_where_its_model_is_wrong() -> None:
     """Under a plant of the opposite sign it would grow without bounds."""
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.05, 0.1)), 40, sign=-1.0)
     assert np.mean(controlled[-10:]) < 1.08 * passive[-1]
-
-
-# --- linear-quadratic-Gaussian ---------------------------------------------------------------------
 
 
 def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
@@ -183,9 +174,6 @@ def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
     assert gain == pytest.approx(correction, rel=1e-3, abs=1e-6)
 
 
-# --- H-infinity ------------------------------------------------------------------------------------
-
-
 def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
     plant = weighted(MODEL, performance=2.0, centre=12.0, height=2e-3)
     bound, (a, b, c) = minimum_bound(plant)
@@ -200,9 +188,6 @@ def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
     ]
     assert 0.5 * bound < max(gains) < bound
     assert central(plant, 0.5 * bound) is None
-
-
-# --- predictive control ----------------------------------------------------------------------------
 
 
 def a_program(limit: float = 1e6, rate: float = 1e9) -> tuple[Programs, Array, Array]:
@@ -272,8 +257,6 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
     assert np.std(seen) > 0.2
     assert np.std(seen - predicted[: len(seen)]) < 0.05 * np.std(seen)
 
-
-# --- preview of a pantograph behind another ----------------------------------------------------------
 
 TRAIN = {
     "catenary": "re330", "pantographs": ["dsa380"] * 2, "distances": [100.0], "controlled": 2,

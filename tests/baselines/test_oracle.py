@@ -72,9 +72,6 @@ def descent(short: Problem) -> solver.Descent:
     return descend(short, "zero", np.zeros((short.count, 1)), iterations=4)
 
 
-# --- knots ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("actuator", ["ideal", "realistic:rate_limit=1e8", "realistic"])
 def test_commands_lead_the_force_from_knot_to_knot(actuator: str):
     chosen = actuator_settings(actuator)
@@ -110,9 +107,6 @@ def test_limits_are_those_of_the_real_actuator():
     assert (np.abs(limits.matrix @ knots.within(steepest)[:, 0]) <= limits.bound * (1 + 1e-12)).all()
 
 
-# --- the response --------------------------------------------------------------------------------
-
-
 RESPONSES = {
     "flexible": SHORT | {"actuator": "ideal"},
     "overlap": OVERLAP,
@@ -135,9 +129,6 @@ def test_response_is_the_difference_of_whole_runs(name: str, monkeypatch: pytest
     expected = (free[:-1] - free[-1]) / problem.PUSH
     assert np.abs(expected).max() > 1e-3
     np.testing.assert_allclose(response[:, some].T, expected, atol=1e-12)
-
-
-# --- the optimum ---------------------------------------------------------------------------------
 
 
 def filtered_forces_by_scipy(asked: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -294,9 +285,6 @@ def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkey
         assert 0.5 * search.HOP_FORCE < shaken < 1.5 * search.HOP_FORCE
 
 
-# --- what is stored ------------------------------------------------------------------------------
-
-
 def test_stored_oracles_are_what_simulate_says_today():
     cells = stored.stored_cells()
     assert cells
@@ -358,9 +346,6 @@ def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str, config: str
     for speed in line.speeds_kmh:
         assert stored.fingerprint(along(settings, line) | {"speed_kmh": speed}) in known
     assert oracles.spans == evaluated_windows(settings, line).early
-
-
-# --- the command ---------------------------------------------------------------------------------
 
 
 def called(*arguments: str) -> Any:

@@ -264,9 +264,6 @@ def test_labels_of_points_lie_apart_and_inside():
     assert all(a[0] != b[0] or a[2] <= b[1] for a, b in itertools.pairwise(spans))
 
 
-# --- the command ---------------------------------------------------------------------------------
-
-
 def called(*arguments):
     app = typer.Typer()
     app.command()(report)
@@ -312,9 +309,6 @@ def test_what_is_no_result_is_refused_in_one_sentence(tmp_path, name, text, word
     assert words in str(done.exception)
     assert "\n" not in str(done.exception)
     assert not (tmp_path / "page.html").exists()
-
-
-# --- in a browser --------------------------------------------------------------------------------
 
 
 def opened(tmp_path, script):
@@ -400,8 +394,6 @@ def test_a_reason_is_shown_without_the_rule():
     assert why(told) == "changes σ by +12.8 % in one pass (seed 5): ln2 at 260 km/h"
     assert why("it cheats, more than twice") == "cheats"
 
-
-# --- the documents ---------------------------------------------------------------------------------
 
 TRACKS = [name for name in names("benchmark") if name.startswith("benchmark/") and name != "benchmark/ideal"]
 """All but that for the curious, which `make benchmark` leaves out."""
