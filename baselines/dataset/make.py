@@ -146,7 +146,12 @@ def make_designs(
             _assemble_designs(settings, folder, list(jobs), made_of)
             remove_parts(parts)
             remove_if_empty(output / PARTS)
-    return _made_designs(folder, kept=there)
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(folder / TABLE, columns=["refused", "ending", "accuracy_warning"])
+    counts = (int(pc.sum(pc.not_equal(table[name], "")).as_py()) for name in table.column_names)
+    return MadeTable(folder, table.num_rows, *counts, (folder / TABLE).stat().st_size / 1e6, there)
 
 
 def read_identity(path: Path) -> dict[str, Any]:
@@ -193,18 +198,6 @@ def _whole_folder(folder: Path) -> Iterator[Path]:
     unfinished.rename(folder)
 
 
-def _made_designs(folder: Path, *, kept: bool) -> MadeTable:
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(folder / TABLE, columns=["refused", "ending", "accuracy_warning"])
-    refused, ended, warned = (
-        int(pc.sum(pc.not_equal(table[name], "")).as_py()) for name in table.column_names
-    )
-    size = (folder / TABLE).stat().st_size / 1e6
-    return MadeTable(folder, table.num_rows, refused, ended, warned, size, kept)
-
-
 EPISODES_PER_PART = 10
 """Episodes per part: a second or two of work, so that little is lost by an interruption."""
 NAMESPACE_FILE = "namespace_metadata.json"  # file by which Minari recognises a folder of data sets
@@ -247,7 +240,7 @@ def make_episodes(
         for one, there in zip(sets, kept, strict=True):
             if not there:
                 open_parts(one.parts, one.made_of)
-                jobs |= one.jobs(settings)
+                jobs |= {path: partial(record, settings, group) for path, group in one.groups.items()}
         make_parts(jobs, read_part, workers=workers, ray=ray, progress=progress)
         for one, there in zip(sets, kept, strict=True):
             if not there:
@@ -285,9 +278,6 @@ class _Order:
         }
         table = settings.model_copy(update={"sets": (policy_set,)}).model_dump(mode="json")
         return cls(policy_set, name, output / name, parts, groups, identity("episodes", table))
-
-    def jobs(self, settings: EpisodesSettings) -> dict[Path, PartJob]:
-        return {path: partial(record, settings, group) for path, group in self.groups.items()}
 
     def kept(self) -> bool:
         """Whether the data set exists. Raises InputError if a different one with its id exists."""

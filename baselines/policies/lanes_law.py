@@ -201,8 +201,7 @@ class LanesLaw(ABC):
                 "h-infinity, or repetitive:place='counted'."
             )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.alignment.mean_length
-        angle: Array = np.arctan2(sine, cosine) + ahead
-        return angle
+        return np.asarray(np.arctan2(sine, cosine) + ahead)
 
 
 class Gain(NamedTuple):

@@ -104,28 +104,17 @@ def asked(**given):
     return parse(BenchmarkSettings, LATE | given, "the benchmark")
 
 
-def test_both_windows_are_those_of_one_pass():
-    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built")
+def test_both_windows_are_those_of_one_pass_and_the_passive_run_of_the_early_one_may_end_with_it():
+    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
     done = benchmark.run(given, workers=1)
     assert done.windows == (Windows((10, 19), (30, 32)),)
-    found = done.rows[0]
-    run = simulate(speed_kmh=280, seed=0, spans=44, line_condition="as-built", record_droppers=False)
-    assert found.figures == run.summary((10, 19))
-    assert found.late.figures == run.summary((30, 32))
-    assert found.as_dict()["late_std"] == found.late.figures.std
-
-
-def test_the_passive_run_of_the_early_window_may_end_with_it():
-    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
-    found = next(row for row in benchmark.run(given, workers=1).rows if row.policy != "passive")
-    whole = simulate(
-        speed_kmh=280,
-        seed=0,
-        spans=44,
-        line_condition="as-built",
-        mean_force=found.figures.mean,
-        trimmed_over=(10, 19),
-    )
+    passive, found = done.rows
+    line = {"speed_kmh": 280, "spans": 44, "line_condition": "as-built", "record_droppers": False}
+    run = simulate(**line)
+    assert passive.figures == run.summary((10, 19))
+    assert passive.late.figures == run.summary((30, 32))
+    assert passive.as_dict()["late_std"] == passive.late.figures.std
+    whole = simulate(**line, mean_force=found.figures.mean, trimmed_over=(10, 19))
     assert found.pressed_std == whole.summary((10, 19)).std
 
 
@@ -166,15 +155,8 @@ def test_a_case_changes_the_runs_of_its_line_and_keeps_its_rows_apart():
     passive, full, alike, weak, slower, _ = (row.figures for row in done.rows)
     assert passive == alike != slower
     assert weak.effort == pytest.approx(0.5 * full.effort, rel=0.1)
-    run = simulate(
-        policy="pd:washout=1",
-        distance=900.0,
-        seed=0,
-        line_condition="smooth",
-        faults="actuator-weak",
-        speed_kmh=280,
-    )
-    assert weak == run.summary((5, 12))
+    own = {"policy": "pd:washout=1", "faults": "actuator-weak", "line_condition": "smooth", "speed_kmh": 280}
+    assert weak == simulate(**own, distance=900.0).summary((5, 12))
 
 
 @pytest.mark.parametrize("run", [{"speed_kmh": 200}, {"catenary": "re330"}, {"wind": 3}, {"spans": 50}])
@@ -197,11 +179,9 @@ def test_kilometres_are_compared_one_by_one():
 
 
 def test_margins_are_where_a_policy_meets_the_passive_pantograph():
-    lines = [
-        {"case": "none", "sweep": {"delay (ms)": 0, "gain": 1}},
-        {"case": "a", "sweep": {"delay (ms)": 20}},
-    ]
-    lines += [{"case": "b", "sweep": {"delay (ms)": 40}}, {"case": "c", "sweep": {"gain": 2}}, {"case": "d"}]
+    sweeps = {"none": {"delay (ms)": 0, "gain": 1}, "a": {"delay (ms)": 20}, "b": {"delay (ms)": 40}}
+    lines = [{"case": case, "sweep": own} for case, own in (sweeps | {"c": {"gain": 2}}).items()]
+    lines.append({"case": "d"})
     stds = {"none": 0.8, "a": 0.9, "b": 1.05, "c": 0.9, "d": 2.0}
     rows = [
         replace(row(name, std=std), case=case)

@@ -55,9 +55,7 @@ def test_models_response_is_that_of_masses_springs_and_dampers_by_hand() -> None
 
 def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says() -> None:
     """The dashpot of the string's closed form stands for wires, droppers and supports within a quarter."""
-    settings = run_settings(
-        {"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic", "sensors": "ideal"}
-    )
+    settings = run_settings({"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic"})
     amplitude, harmonics = 3.0, (1, 2, 4)
     laws: list[LanesLaw] = [Still()]
     for place in (k - 1 + half for k in harmonics for half in (0, HARMONICS)):
@@ -190,25 +188,19 @@ def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
     assert central(plant, 0.5 * bound) is None
 
 
-def a_program(limit: float = 1e6, rate: float = 1e9) -> tuple[Programs, Array, Array]:
-    rng = np.random.default_rng(3)
-    response = np.exp(-0.1 * np.arange(HORIZON)) * rng.uniform(0.1, 0.4, size=(50, 1))
-    response[:, 0] = 0.0  # a delay
-    line = Preview(0.0, 1.2, np.zeros(50), response)
-    return Programs(line, 0.1, limit, rate, 0.01), rng.normal(size=HORIZON) * 20, response
-
-
-def objective(programs: Programs, step: int, free: Array, total: float, u: Array) -> float:
-    force = free + programs.answers[step] @ u
-    sums = total + 0.01 * np.cumsum(u)
-    return float(force @ force + 0.1 * u @ u + (2 * np.pi * 0.4) ** 2 * sums @ sums)
-
-
 @pytest.mark.parametrize(("limit", "rate"), [(1e6, 1e9), (15.0, 1e9), (100.0, 600.0)])
 def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float, rate: float) -> None:
     pytest.importorskip("osqp")
-    programs, free, _ = a_program(limit, rate)
-    last, total, change = 4.0, 0.3, rate * 0.01
+    rng, last, total, change = np.random.default_rng(3), 4.0, 0.3, rate * 0.01
+    response = np.exp(-0.1 * np.arange(HORIZON)) * rng.uniform(0.1, 0.4, size=(50, 1))
+    response[:, 0] = 0.0  # a delay
+    programs = Programs(Preview(0.0, 1.2, np.zeros(50), response), 0.1, limit, rate, 0.01)
+    free = rng.normal(size=HORIZON) * 20
+
+    def objective(u: Array) -> float:
+        force, sums = free + programs.answers[7] @ u, total + 0.01 * np.cumsum(u)
+        return float(force @ force + 0.1 * u @ u + (2 * np.pi * 0.4) ** 2 * sums @ sums)
+
     between = np.eye(HORIZON) - np.eye(HORIZON, k=-1)
     before = np.zeros(HORIZON)
     before[0] = last
@@ -217,7 +209,7 @@ def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float,
         {"type": "ineq", "fun": lambda u: change + (between @ u - before)},
     ]
     best = minimize(
-        lambda u: objective(programs, 7, free, total, u),
+        objective,
         np.zeros(HORIZON),
         method="SLSQP",
         bounds=[(-limit, limit)] * HORIZON,
@@ -232,13 +224,8 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
     context = a_context(actuator="realistic")
     length, first = 100, 780
     line = preview(context, length, 0.005, 0.015)
-    settings = {
-        "speed_kmh": 250.0,
-        "accuracy": "fast",
-        "actuator": {"delay": 0.005, "lag": 0.015},
-        "distance": 900.0,
-        "spans": 23,
-    }
+    settings = {"speed_kmh": 250.0, "accuracy": "fast", "distance": 900.0, "spans": 23}
+    settings["actuator"] = {"delay": 0.005, "lag": 0.015}
     task = Task(run_settings(settings), lanes=2, keep_samples=False)
     task.reset(np.arange(2), np.random.default_rng(0))
     entry = task.layout.index("contact force")

@@ -227,11 +227,7 @@ def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
     assert run.summary(SPANS).std == pytest.approx(found.std, rel=1e-12)
     assert run.policy == "Tape"
     # It waits until it comes onto the line, 35 m behind.
-    assert (
-        35.0 / run.speed - asked.interval
-        < asked.first_action * asked.interval
-        < 35.0 / run.speed + asked.interval
-    )
+    assert asked.first_action * asked.interval == pytest.approx(35.0 / run.speed, abs=asked.interval)
 
 
 def test_simulate_says_the_same_to_the_digit_and_the_force_keeps_the_actuators_limits(
@@ -285,10 +281,11 @@ def test_hops_start_near_the_best_and_never_make_it_worse(short: Problem, monkey
         assert 0.5 * search.HOP_FORCE < shaken < 1.5 * search.HOP_FORCE
 
 
-def test_stored_oracles_are_what_simulate_says_today():
+@pytest.mark.parametrize("first", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_stored_oracles_are_what_simulate_says_today(first: bool):
     cells = stored.stored_cells()
     assert cells
-    for cell in cells:
+    for cell in cells[:1] if first else cells[1:]:
         names = ["catenary", "speed_kmh", "actuator", "line_condition", "control_interval"]
         names += ["pantographs", "distances", "controlled"] if "pantographs" in cell else ["pantograph"]
         names += [name for name in ("pantograph_scatter", "speed_drift") if name in cell]
@@ -312,33 +309,18 @@ def test_a_stored_ratio_is_of_exactly_these_settings_and_spans():
     assert 0.2 < ratio < 0.75
     assert stored_ratio(given | {"sensors": "realistic", "observation": "full"}, spans) == ratio
     assert stored_ratio(given, (4, 9)) is None
-    others: list[dict[str, Any]] = [
-        {"speed_kmh": 301},
-        {"actuator": "realistic:delay=0.006"},
-        {"actuator": "realistic:place=head"},
-        {"actuator": "ideal"},
-        {"actuator": {"kind": "motor", "place": "frame"}},
-        {"line_condition": "new"},
-        {"control_interval": 0.02},
-        {"pantograph": "dsa380"},
-        {"mean_force": 120.0},
-        {"time_step": 1e-3},
-    ]
-    for other in others:
-        assert stored_ratio(given | other, spans) is None
+    others = {"speed_kmh": 301, "line_condition": "new", "control_interval": 0.02, "pantograph": "dsa380"}
+    others |= {"mean_force": 120.0, "time_step": 1e-3, "actuator": "realistic:delay=0.006"}
+    for name, value in others.items():
+        assert stored_ratio(given | {name: value}, spans) is None
+    for actuator in ("realistic:place=head", "ideal", {"kind": "motor", "place": "frame"}):
+        assert stored_ratio(given | {"actuator": actuator}, spans) is None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("track", "config"),
-    [
-        ("known-line", "oracle"),
-        ("head", "oracle"),
-        ("high-speed", "oracle"),
-        ("any-line", "oracle-any-line"),
-    ],
-)
-def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str, config: str):
+@pytest.mark.parametrize("track", ["known-line", "head", "high-speed", "any-line"])
+def test_tracks_of_the_benchmark_are_cells_of_the_oracle(track: str):
+    config = "oracle-any-line" if track == "any-line" else "oracle"
     settings = load_benchmark(find_config(f"benchmark/{track}", "benchmark"))
     (line,) = settings.lines
     oracles = oracle_settings(config, {}, {})
@@ -358,10 +340,9 @@ def called(*arguments: str) -> Any:
 def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(search, "descend", partial(descend, iterations=2))
     file, picture = tmp_path / "o.json", tmp_path / "o.png"
-    result = called(
-        "--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2",
-        "--start", "random", "--hops", "1", "--output", str(file), "--plot", str(picture),
-    )  # fmt: skip
+    words = ["--actuator", "ideal", "--speed", "300", "--seed", "0", "--seed", "1", "--spans", "2-2"]
+    words += ["--start", "random", "--hops", "1", "--output", str(file)]
+    result = called(*words, "--plot", str(picture))
     assert result.exit_code == 0, result.output
     for word in ("random", "seed 0", "iteration", "local optimum"):
         assert word in result.output
@@ -374,11 +355,7 @@ def test_command_prints_and_writes_what_it_found(tmp_path: Any, monkeypatch: pyt
     again = simulate(**given, seed=1, distance=None).summary((2, 2))
     assert cell["passes"][1]["passive"]["std"] == again.std
     assert picture.read_bytes().startswith(b"\x89PNG")
-    result = called(
-        "--actuator", "ideal", "--speed", "300", "--speed", "250", "--seed", "0", "--seed", "1",
-        "--spans", "2-2", "--start", "random", "--hops", "1", "--output", str(file),
-    )  # fmt: skip
-    assert "1 of 2 cells were in" in result.output
+    assert "1 of 2 cells were in" in called(*words, "--speed", "250").output
     assert [each["speed_kmh"] for each in stored.read(file)["cells"]] == [300.0, 250.0]
     assert stored.read(file)["cells"][0] == cell
 
@@ -416,28 +393,19 @@ def test_what_is_asked_for_otherwise_is_searched_anew(monkeypatch: pytest.Monkey
     settings = oracle_settings(None, {}, {})
     (before,) = stored.requests(settings)
     assert stored.requests(settings) == [before]
-    others: tuple[dict[str, Any], ...] = (
-        {"seeds": [1]},
-        {"spans": [2, 2]},
-        {"starts": ["random"]},
-        {"hops": 1},
-    )
-    for changes in others:
-        assert stored.requests(oracle_settings(None, changes, {})) != [before]
+    for name, value in {"seeds": [1], "spans": [2, 2], "starts": ["random"], "hops": 1}.items():
+        assert stored.requests(oracle_settings(None, {name: value}, {})) != [before]
     assert stored.requests(oracle_settings(None, {}, {"speeds_kmh": [301]})) != [before]
     monkeypatch.setattr(stored, "METHOD", search.METHOD + 1)
     assert stored.requests(settings) != [before]
 
 
-@pytest.mark.parametrize("text", ["", "[]", json.dumps(with_checksum({"cells": [{"fingerprint": "0"}]}))])
-def test_a_file_of_something_else_is_not_written_over(tmp_path: Any, text: str):
-    file = tmp_path / "o.json"
+def test_a_file_of_something_else_is_not_written_over(tmp_path: Any):
+    file, text = tmp_path / "o.json", json.dumps(with_checksum({"cells": [{"fingerprint": "0"}]}))
     file.write_text(text)
-    with pytest.raises(
-        InputError, match=r"holds no oracles of this version|is not JSON|checksum does not fit"
-    ):
-        stored.read(file)
-    assert isinstance(called("--output", str(file)).exception, InputError)
+    told = called("--output", str(file)).exception
+    assert isinstance(told, InputError)
+    assert "holds no oracles of this version" in str(told)
     assert file.read_text() == text
 
 
@@ -474,11 +442,8 @@ def test_bad_settings_are_refused(changes: dict[str, Any], cell: dict[str, Any],
 def test_problems_without_an_oracle_are_refused(short: Problem):
     with pytest.raises(InputError, match="one speed"):
         Problem({"speed_kmh": (250, 300)})
-    both = TRAILING | {"controlled": (1, 2)}
-    with pytest.raises(
-        InputError, match="An oracle controls one pantograph of a train, not 1 and 2; name one"
-    ):
-        Problem(both)
+    with pytest.raises(InputError, match="controls one pantograph of a train, not 1 and 2; name one"):
+        Problem(TRAILING | {"controlled": (1, 2)})
     with pytest.raises(InputError, match="start must be one of zero, periodic, random, not 'best'"):
         find(short, ("best",))
 

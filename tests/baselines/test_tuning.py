@@ -32,9 +32,8 @@ from panto_baselines.policies.lanes_law import (
     gain_file,
     load_gains,
 )
-from panto_baselines.tuning import store as parts
-from panto_baselines.tuning.command import tune
-from panto_baselines.tuning.store import check_gain_file, make_tuning, store
+from panto_baselines.tuning import command
+from panto_baselines.tuning.command import check_gain_file, make_tuning, store, tune, tune_speeds
 from panto_baselines.tuning.tune import (
     DAMPINGS,
     MEAN_TOLERANCE,
@@ -129,6 +128,7 @@ def test_stored_gains_are_found_and_interpolated_over_speed(tmp_path: Path) -> N
     [
         ({"speed_kmh": 330.0}, "from 250 to 300 km/h, not for 330 km/h"),
         ({"catenary": "re330"}, "no gains for the pantograph 'en50318-2002' on the line 're330'"),
+        ({"catenary": "re330"}, "give them (frame, head) as the parameter gains"),
         ({"actuator": {"place": "head"}}, "with an actuator at head"),
     ],
 )
@@ -380,7 +380,7 @@ def test_what_it_cannot_do_is_said_at_once(
 ) -> None:
     file = tmp_path / "lqg.toml"
     file.write_text('policy = "lqg"\n')
-    monkeypatch.setattr(parts, "tune", None)  # nothing may be run
+    monkeypatch.setattr(command, "tune_speeds", None)  # nothing may be run
     result = called(*(each.format(lqg=file) for each in arguments), *SMALL)
     assert result.exit_code != 0
     assert words in str(result.exception)
@@ -391,12 +391,14 @@ def test_what_it_cannot_do_is_said_at_once(
 def test_parts_of_another_tuning_are_not_taken(tmp_path: Path) -> None:
     settings = run_settings({"catenary": "periodic-stiffness", "pantograph": "three-mass"})
     given: dict[str, Any] = {"speeds_kmh": (250.0,), "passes": 11, "workers": 1}
-    first = parts.tune(tmp_path, "skyhook", settings, seeds=1, **given)
-    assert parts.tune(tmp_path, "skyhook", settings, seeds=1, **given) == first
+    first = tune_speeds(tmp_path, "skyhook", settings, seeds=1, **given)
+    assert tune_speeds(tmp_path, "skyhook", settings, seeds=1, **given) == first
     with pytest.raises(InputError, match=r"holds parts of another work \(its seeds is 1, this is 2\)"):
-        parts.tune(tmp_path, "skyhook", settings, seeds=2, **given)
+        tune_speeds(tmp_path, "skyhook", settings, seeds=2, **given)
     with pytest.raises(InputError, match=r"holds parts of another work \(its passes is 11, this is 12\)"):
-        parts.tune(tmp_path, "skyhook", settings, seeds=1, **given | {"passes": 12})
+        tune_speeds(tmp_path, "skyhook", settings, seeds=1, **given | {"passes": 12})
     part = tmp_path / "250.0.json"
     part.write_text(part.read_text().replace("0.", "1.", 1))
-    assert parts.tune(tmp_path, "skyhook", settings, seeds=1, **given) == first  # a damaged part is made anew
+    assert (
+        tune_speeds(tmp_path, "skyhook", settings, seeds=1, **given) == first
+    )  # damage: anew
