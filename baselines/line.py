@@ -43,9 +43,9 @@ def as_clause(read: Callable[[Any], T]) -> Callable[[Any], T]:
 
 def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """The values. Raises ValueError where one is given twice."""
-    twice = next((value for value, count in Counter(values).items() if count > 1), None)
-    if twice is not None:
-        raise ValueError(f"{shown(twice)} is given twice")
+    for value, count in Counter(values).items():
+        if count > 1:
+            raise ValueError(f"{shown(value)} is given twice")
     return values
 
 

@@ -43,8 +43,7 @@ def window_changes(rows: Sequence[Row]) -> Array:
 def relative(values: Sequence[Sequence[float]], to: Sequence[Sequence[float]]) -> Array:
     """Relative changes, of the shape of both."""
     with np.errstate(divide="ignore", invalid="ignore"):  # a sigma of 0 has no relative change
-        changes: Array = np.asarray(values) / np.asarray(to) - 1
-    return changes
+        return np.asarray(np.asarray(values) / np.asarray(to) - 1)
 
 
 @dataclass(frozen=True)

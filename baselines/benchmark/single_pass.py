@@ -264,8 +264,7 @@ def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: 
     steps = round(interval / run.time_step)
     inside = np.zeros(max(len(commands) * steps, len(run.time)), dtype=np.bool_)
     inside[len(inside) - len(run.time) :] = run.inside(spans)
-    within: Array = commands[inside[len(inside) - len(commands) * steps :][::steps]]
-    return within
+    return np.asarray(commands[inside[len(inside) - len(commands) * steps :][::steps]])
 
 
 def _record(

@@ -189,8 +189,7 @@ def _interquartile_means(values: Array, counts: NDArray[np.int32]) -> Array:
     kept = np.clip(up_to, cut, up_to[-1] - cut)
     kept[1:] -= kept[:-1].copy()
     kept[0] -= cut
-    means: Array = values[order] @ kept / kept.sum(axis=0)
-    return means
+    return np.asarray(values[order] @ kept / kept.sum(axis=0))
 
 
 def _between(means: Array) -> list[_Part]:

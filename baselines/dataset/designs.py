@@ -108,8 +108,7 @@ def draw(settings: DesignsSettings, first: int, last: int) -> Array:
             sequence.fast_forward(first)
         points = sequence.random(last - first)
     low, high = np.array(list(settings.ranges.values())).T
-    values: Array = low + points * (high - low)
-    return values
+    return np.asarray(low + points * (high - low))
 
 
 def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Path) -> None:

@@ -81,9 +81,11 @@ def _verify(folder: Path) -> int:
                 f"{folder / name} does not match {LIST}: it was damaged or changed; make or download the "
                 "data set anew."
             )
-    extra = next((name for name in found if name not in listed), None)
-    if extra is not None:
-        raise InputError(f"{folder / extra} is not in {LIST}; move it elsewhere, it is not part of the data.")
+    for name in found:
+        if name not in listed:
+            raise InputError(
+                f"{folder / name} is not in {LIST}; move it elsewhere, it is not part of the data."
+            )
     return len(listed)
 
 
@@ -235,24 +237,21 @@ def make_episodes(
     check_places(settings)
     with alone_in(output, "makes data in"):
         sets = [_Order.of(settings, policy_set, output) for policy_set in settings.sets]
-        kept = [each.kept() for each in sets]
+        missing = [one for one in sets if not one.kept()]
         jobs: dict[Path, PartJob] = {}
-        for one, there in zip(sets, kept, strict=True):
-            if not there:
-                open_parts(one.parts, one.made_of)
-                jobs |= {path: partial(record, settings, group) for path, group in one.groups.items()}
+        for one in missing:
+            open_parts(one.parts, one.made_of)
+            jobs |= {path: partial(record, settings, group) for path, group in one.groups.items()}
         make_parts(jobs, read_part, workers=workers, ray=ray, progress=progress)
-        for one, there in zip(sets, kept, strict=True):
-            if not there:
-                _assemble_episodes(settings, one)
-                remove_parts(one.parts)
+        for one in missing:
+            _assemble_episodes(settings, one)
+            remove_parts(one.parts)
         remove_if_empty(output / PARTS)
     made = []
-    for one, there in zip(sets, kept, strict=True):
-        metadata = _metadata(one.folder)
+    for one in sets:
+        counts = [_metadata(one.folder)[name] for name in ("total_episodes", "total_steps")]
         size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file()) / 1e6
-        counts = metadata["total_episodes"], metadata["total_steps"]
-        made.append(Made(one.name, one.folder, *counts, size, there))
+        made.append(Made(one.name, one.folder, *counts, size, one not in missing))
     return made
 
 
@@ -293,7 +292,12 @@ class _Order:
 
 
 def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
-    _make_namespaces(one.folder)
+    make_folder(one.folder.parent)
+    for above in (one.folder.parent, one.folder.parent.parent):  # as Minari makes them
+        if not (above / NAMESPACE_FILE).is_file():
+            (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
+        if above.name == NAMESPACE:
+            break
     rows: list[tuple[Plan, dict[str, float]]] = []
 
     def episodes() -> Iterator[tuple[Plan, Episode]]:
@@ -303,25 +307,15 @@ def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
                 table.add(plan, episode)
                 yield plan, episode
 
-    paragraph = description(settings, one.policy_set)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()
     with _whole_folder(one.folder) as unfinished:
         with StepsTable(unfinished / STEPS) as table:
-            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
+            words = description(settings, one.policy_set)
+            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, words)
         text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
         (unfinished / "card.md").write_text(text, encoding="utf-8")
-
-
-def _make_namespaces(folder: Path) -> None:
-    """Make the folders above a data set in the way that Minari does."""
-    make_folder(folder.parent)
-    for above in (folder.parent, folder.parent.parent):
-        if not (above / NAMESPACE_FILE).is_file():
-            (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
-        if above.name == NAMESPACE:
-            break
 
 
 def _metadata(folder: Path) -> dict[str, Any]:

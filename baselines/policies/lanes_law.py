@@ -109,24 +109,24 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
         if len(source) != len(names):
             raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
         return np.array(source, dtype=float)
-    path = gain_file(source)
+    path, line, pantograph = gain_file(source), context.catenary, context.pantograph
     place = "both" if len(context.channels) > 1 else Place(context.channels[0]).name.lower()
     tunings = load_gains(path).tunings
     able = [each for each in tunings if each.washout in (0.0, context.washout)]
     able.sort(key=lambda each: each.washout != context.washout)
-    own = [each for each in able if each.is_for(context.catenary, context.pantograph, place)]
-    others = [each for each in able if each.is_for_any_line(context.pantograph, place)]
-    if own or others:
-        return _at_speed((*own, *others)[0], names, to_kmh(context.speed), path)
-    line, pantograph = context.catenary.name, context.pantograph.name
-    named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
-    but = ", only for others of these names with other values" if named else ""
+    own = [each for each in able if each.is_for(line, pantograph, place)]
+    own += [each for each in able if each.is_for_any_line(pantograph, place)]
+    if own:
+        return _at_speed(own[0], names, to_kmh(context.speed), path)
+    but, case = "", (line.name, pantograph.name, place)
+    if case in ((each.catenary, each.pantograph, each.place) for each in tunings):
+        but = ", only for others of these names with other values"
     for each in tunings:
-        if each not in able and each.is_for(context.catenary, context.pantograph, place):
+        if each not in able and each.is_for(line, pantograph, place):
             but = f", only for a washout of {each.washout:g} s, which the policy must then have"
     raise InputError(
-        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
-        f"at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
+        f"{path.name} has no gains for the pantograph '{pantograph.name}' on the line '{line.name}' with an "
+        f"actuator at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
         f"{', ...' if len(names) > 4 else ''}) as the parameter gains, or take a policy that needs none."
     )
 

@@ -139,8 +139,7 @@ def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> A
     cost[-1, -1] += effort * (2 * np.pi * held) ** 2
     with one_thread():
         p = solve_discrete_are(a, b[:, None], cost, np.array([[effort]]))
-        gains: Array = (b @ p @ a) / (effort + b @ p @ b)
-    return gains
+        return np.asarray((b @ p @ a) / (effort + b @ p @ b))
 
 
 CORNER = 30.0  # angular frequency (rad/s) up to which the height of the wire is expected to vary

@@ -1,7 +1,5 @@
 """Learning beside fitted feedback and feed-forward, and paper 1's laws with fitted gains."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -28,7 +26,7 @@ FEEDBACK = np.array([0.0, 2, 0, -12, -9, 0, 0, 3, -6, -4, 0, 0, 0, 0, 2, -1.5, -
 """Gains that leave the loop stable and change its answers by a quarter and more."""
 
 
-def test_answers_of_the_closed_loop_are_those_of_a_simulation() -> None:
+def test_answers_of_the_closed_loop_are_those_of_a_simulation():
     """Of the sampled model under the feedback itself, in time; slow averages are left out of the answers."""
     policy, turn = Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 2 * np.pi * CONTEXT.control_interval
     policy.begin(CONTEXT, 1)
@@ -53,13 +51,13 @@ def test_answers_of_the_closed_loop_are_those_of_a_simulation() -> None:
         assert abs(alone - answer) > 0.15 * abs(answer)
 
 
-def test_it_learns_beside_feedback_what_repeats_to_near_zero() -> None:
+def test_it_learns_beside_feedback_what_repeats_to_near_zero():
     controlled, passive = repeated(Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 25)
     assert controlled[1] != pytest.approx(passive[1], rel=0.02)  # feedback acts from the start
     assert controlled[-1] < 0.05 * passive[-1]
 
 
-def test_learning_goes_on_from_the_feed_forward() -> None:
+def test_learning_goes_on_from_the_feed_forward():
     series = np.zeros(2 * HARMONICS)
     series[[0, 15]] = 9.0, -6.0
     begun = AdaptiveFeedforward(gains=[*series, *np.zeros(COUNT), 0.5, 0.0, 0.05])
@@ -69,7 +67,7 @@ def test_learning_goes_on_from_the_feed_forward() -> None:
     assert controlled[-1] < 0.05 * passive[-1]
 
 
-def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
+def test_before_it_learns_it_does_what_fitted_feedback_does():
     """But for a washout of two seconds, of which a tenth of a second passes."""
     gains = np.random.default_rng(2).normal(size=2 * HARMONICS + COUNT)
     gains[-2:] = 4.0, -2.0
@@ -86,7 +84,8 @@ def test_before_it_learns_it_does_what_fitted_feedback_does() -> None:
     assert forces[0] == pytest.approx(forces[1], abs=0.06 * np.abs(forces[1]).max())
 
 
-def test_without_a_place_it_takes_more_off_sigma_than_learning_alone() -> None:
+@pytest.mark.slow
+def test_without_a_place_it_takes_more_off_sigma_than_learning_alone():
     settings = run_settings(
         {"speed_kmh": 325.0, "actuator": "realistic", "sensors": "blind", "line_condition": "smooth"}
         | {"accuracy": "fast"}
@@ -119,7 +118,7 @@ SINE, COSINE = float(14.0 * np.cos(0.7)), float(-14.0 * np.sin(0.7))
         ),
     ],
 )
-def test_tuned_laws_are_the_plain_ones_with_a_bias(tuned, plain, bias) -> None:
+def test_tuned_laws_are_the_plain_ones_with_a_bias(tuned, plain, bias):
     tuned.reset(CONTEXT)
     plain.reset(CONTEXT)
     for force, velocity, angle in ((100.0, 0.02, 0.1), (330.0, -0.05, 2.2), (-20.0, 0.0, 4.5)):
@@ -129,7 +128,7 @@ def test_tuned_laws_are_the_plain_ones_with_a_bias(tuned, plain, bias) -> None:
 
 
 @pytest.mark.slow
-def test_learning_goes_on_at_another_speed() -> None:
+def test_learning_goes_on_at_another_speed():
     """By the sigma of its first spans, at a lower speed, it would back off for ever."""
     given = {"speed_profile": "place:0=200,1500=280", "distance": 3600.0, "line_condition": "as-built"}
     runs = [simulate("re330", "dsa380", policy=policy, seed=1, **given) for policy in (None, "repetitive")]

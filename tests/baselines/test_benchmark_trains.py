@@ -10,7 +10,6 @@ from panto_baselines.benchmark.run import evaluated_windows
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.benchmark.statistics import compare
-from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 
@@ -119,9 +118,3 @@ def test_what_cannot_be_a_train_is_refused_in_a_sentence():
         simulate(**TRAIN, mean_force=[100.0, 100.0, 100.0])
     with pytest.raises(InputError, match="one for each of the 2 controlled pantographs, not 3"):
         simulate(**TRAIN, controlled=[1, 2], policy=["pd"] * 3)
-
-
-def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
-    train = {"pantographs": ["dsa380"] * 2, "distances": [200.0]}
-    given = ({"pantograph": "dsa380"}, train, train | {"controlled": 2})
-    assert len({fingerprint(each | {"speed_kmh": SPEED_KMH}) for each in given}) == 3

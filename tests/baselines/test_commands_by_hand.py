@@ -7,13 +7,12 @@ from types import SimpleNamespace
 from unittest import mock
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 
 from ..command import panto
+from .commands import called
 
 CONFIG = """
 policies = ["p"]
@@ -41,11 +40,9 @@ def handed(monkeypatch, tmp_path):
     path, run = tmp_path / "mine.toml", mock.Mock(side_effect=EnoughError)
     path.write_text(CONFIG)
     monkeypatch.setattr(command, "run", run)
-    app = typer.Typer()
-    app.command()(command.benchmark)
 
     def of(*words, config=True):
-        done = CliRunner().invoke(app, [*words, *(("--config", str(path)) if config else ())])
+        done = called(command.benchmark, *words, *(("--config", path) if config else ()))
         assert isinstance(done.exception, EnoughError), done.output
         settings, workers, _, ray = run.call_args.args
         return SimpleNamespace(settings=settings, workers=workers, ray=ray)

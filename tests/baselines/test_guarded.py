@@ -22,9 +22,6 @@ BUILT = {
 FIRST, LATE = (10, 19), (40, 49)
 
 
-RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK"]
-
-
 def changes(line, pantograph, speed_kmh, policy, seed=0, late=True, **more):
     """Change of sigma (%) from passive in the first window, and in one that is far behind."""
     windows = (FIRST, LATE) if late else (FIRST,)
@@ -131,20 +128,6 @@ def test_it_is_better_under_silent_sensors(fault):
     )
     assert own[0] < plain[0] - 5.0
     assert own[1] < plain[1] - 10.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("rules", "case"),
-    [
-        (RULES, ("ln2", "dsa250", 220.0, "guarded:pd")),
-        ([*RULES, "SHIFT"], ("sweden-st15", "dsa250", 160.0, "guarded:agent-any-line")),
-    ],
-)
-def test_without_its_rules_it_fails(rules, case, monkeypatch):
-    for name in rules:
-        monkeypatch.setattr(guarded, name, np.inf)
-    assert max(changes(*case)) > 15.0
 
 
 def test_its_name_holds_that_of_the_other_and_it_wishes_what_that_wishes():

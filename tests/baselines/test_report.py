@@ -7,15 +7,12 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from panto_baselines.benchmark.overall import why
 from panto_baselines.benchmark.run import parse_result, read_result
-from panto_baselines.benchmark.settings import BenchmarkSettings, control_of, load_benchmark
+from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 from panto_baselines.line import as_toml
 from panto_baselines.oracle.stored import stored_changes
 from panto_baselines.report import charts
@@ -25,8 +22,9 @@ from panto_configs import names
 from panto_env import InputError
 from panto_env.base.checksums import read_checked, with_checksum, write_checked
 
-from ..benchmark_tables import BEST, HEADLINE, short_ranking
+from ..benchmark_tables import HEADLINE, short_ranking
 from ..pages import DOCS, tables_of
+from .commands import called
 
 HOSTILE = "</title><script>alert('\"1')</script>&amp;"
 VOID = {"meta", "input"}
@@ -260,22 +258,16 @@ def test_labels_of_points_lie_apart_and_inside():
     assert all(a[0] != b[0] or a[2] <= b[1] for a, b in itertools.pairwise(spans))
 
 
-def called(*arguments):
-    app = typer.Typer()
-    app.command()(report)
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-
 def test_command_writes_the_page_beside_the_first_file(tmp_path):
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     for path in (first, second):
         write_checked(path, result())
-    done = called(first, second)
+    done = called(report, first, second)
     assert done.exit_code == 0, done.output
     assert done.stdout == f"The page is {tmp_path / 'a.html'}.\n"
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == html(result(), result())
     (tmp_path / "a.html").unlink()
-    told = called(first, "--markdown")
+    told = called(report, first, "--markdown")
     assert "| policy | Δσ (%) | 95 % | CL (%) | ΔCF (%) |" in told.output
     assert set(tmp_path.iterdir()) == {first, second}
 
@@ -295,7 +287,7 @@ def test_command_writes_the_page_beside_the_first_file(tmp_path):
 def test_what_is_no_result_is_refused_in_one_sentence(tmp_path, name, text, words):
     if text is not None:
         (tmp_path / name).write_text(text if isinstance(text, str) else json.dumps(text))
-    done = called(tmp_path / name, "--output", tmp_path / "page.html")
+    done = called(report, tmp_path / name, "--output", tmp_path / "page.html")
     assert isinstance(done.exception, InputError)
     assert words in str(done.exception)
     assert "\n" not in str(done.exception)
@@ -390,19 +382,6 @@ def test_the_page_has_a_ranking_of_each_headline_track_and_no_other_table_of_res
     }
 
 
-@pytest.mark.parametrize("track", HEADLINE)
-def test_a_short_ranking_has_the_best_policies_and_rows_of_the_full_one(track):
-    result = read_result(DOCS / "benchmark" / f"{track}.json.gz")
-    full, short = ranking(result), short_ranking(result)
-    columns = [full.headings.index(heading) for heading in short.headings[1:]]
-    rows = [tuple(row[column] for column in columns) for row in full.cells]
-    assert [rows.index(row[1:]) for row in short.cells] == sorted(rows.index(row[1:]) for row in short.cells)
-    ranks = {one.policy: one.rank for one in result.standings}
-    assert all(row[0] == str(ranks[row[1]] or "–") for row in short.cells)
-    best = sorted((rank, name) for name, rank in ranks.items() if rank and not control_of(name))[:BEST]
-    assert {name for _, name in best} <= {row[1] for row in short.cells}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("track", TRACKS)
 def test_stored_results_are_of_the_tracks_as_they_are(track):
@@ -414,7 +393,7 @@ def test_stored_results_are_of_the_tracks_as_they_are(track):
 
 
 def test_the_makefile_runs_the_same_tracks():
-    lines = (Path(__file__).parents[2] / "Makefile").read_text(encoding="utf-8").splitlines()
+    lines = (DOCS.parent / "Makefile").read_text(encoding="utf-8").splitlines()
     told = next(line for line in lines if line.startswith("TRACKS := ")).split()[2:]
     assert {f"benchmark/{name}" for name in told} == set(TRACKS)
 

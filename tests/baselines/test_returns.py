@@ -6,8 +6,6 @@ from types import SimpleNamespace
 import gymnasium
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from panto_baselines.benchmark.command import returns as command
 from panto_baselines.benchmark.returns import INGREDIENTS, Returned, one_return, rank_correlation, returns
@@ -18,6 +16,8 @@ from panto_env.control.settings import read_settings
 from panto_env.envs import IDS
 from panto_env.envs.settings import EnvironmentSettings
 from panto_env.policies import find_policy
+
+from .commands import called
 
 LINE = "en50318-2002"
 OF_RESULT = {"catenary": LINE, "pantograph": LINE, "actuator": "ideal", "sensors": "ideal"}
@@ -85,9 +85,7 @@ def test_every_policy_has_the_mean_of_its_episodes_at_the_speeds_of_the_result_i
 def test_the_command_prints_policies_by_return_and_the_correlation(result, tmp_path):
     file = tmp_path / "result.json"
     result.save(file)
-    app = typer.Typer()
-    app.command()(command)
-    printed = CliRunner().invoke(app, [str(file), "--episodes", "2", "--workers", "1", "--json"])
+    printed = called(command, file, "--episodes", 2, "--workers", 1, "--json")
     assert printed.exit_code == 0, printed.output
     table = json.loads(printed.stdout)["all"]
     assert [each["policy"] for each in table["policies"]] == ["passive", "pd", "p:gain=0.1"]
