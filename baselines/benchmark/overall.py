@@ -92,7 +92,10 @@ def standings(
         own_cells[cell.policy].append(cell)
     places = [cell.place for cell in own_cells[REFERENCE]]
     everywhere = [name for name, own in own_cells.items() if [cell.place for cell in own] == places]
-    clusters = _clusters(own_rows[REFERENCE])
+    passive = own_rows[REFERENCE]
+    names = [(row.catenary, row.pantograph) for row in passive]  # a seed is one line in all cases
+    lines = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    clusters = Clusters(np.array([lines[name] for name in names]), np.array([row.seed for row in passive]))
     changes = {name: relative_changes(own_rows[name])[None] for name in everywhere}
     found = {
         name: _standing(name, own_cells[name], own_rows[name], changes[name][0], clusters)
@@ -134,14 +137,6 @@ def next_in_ranking(found: Sequence[Standing]) -> dict[str, str]:
     """The policy that is ranked next after each one."""
     ranked = sorted((each for each in found if each.rank is not None), key=lambda each: each.rank or 0)
     return {one.policy: after.policy for one, after in pairwise(ranked)}
-
-
-def _clusters(rows: Sequence[Row]) -> Clusters:
-    """Lines and seeds of the passes of one policy."""
-    names = [(row.catenary, row.pantograph) for row in rows]  # a seed is one line in all cases
-    lines = list(dict.fromkeys(names))
-    line = [lines.index(name) for name in names]
-    return Clusters(np.array(line), np.array([row.seed for row in rows]))
 
 
 def _standing(

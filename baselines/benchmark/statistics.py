@@ -94,13 +94,13 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
     rows = np.atleast_2d(values)
     if np.isnan(rows).any():
         return None
-    drawn = _drawn(clusters)
-    if drawn.freedom < 1:
+    counts, seeds, freedom = _drawn(clusters)
+    if freedom < 1:
         return None
-    means = np.mean([_interquartile_means(row, drawn.counts) for row in rows], axis=0)
+    means = np.mean([_interquartile_means(row, counts) for row in rows], axis=0)
     # Half of what lies between is a standard deviation that a few far-off resamples do not stretch.
     low, high = np.quantile(means, norm.cdf((-1.0, 1.0)))
-    return _around(rows, _Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom))
+    return _around(rows, _Part(float((high - low) / 2) ** 2 * (seeds / freedom), freedom))
 
 
 def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
@@ -134,43 +134,34 @@ def share_of(wins: NDArray[np.bool_], clusters: Clusters) -> Share:
     nothing varies, as where all passes are won, it is the geometric mean of the numbers of seeds and passes.
     """
     share, passes = float(wins.mean()), wins.shape[-1]
-    drawn = _drawn(clusters)
-    if drawn.freedom < 1:
+    counts, seeds, freedom = _drawn(clusters)
+    if freedom < 1:
         return Share(share, None)
-    shares = wins.mean(axis=(0, 1)) @ drawn.counts / passes
+    shares = wins.mean(axis=(0, 1)) @ counts / passes
     parts = [
-        _Part(float(shares.var()) * drawn.correction, drawn.freedom),
+        _Part(float(shares.var()) * (seeds / freedom), freedom),
         *_between(wins.mean(axis=(1, 2))),
         *_between(wins.mean(axis=(0, 2))),
     ]
     variance = sum(part.variance for part in parts)
     varies = variance > ROUNDING
-    number = share * (1 - share) / variance if varies else (drawn.seeds * passes) ** 0.5
+    number = share * (1 - share) / variance if varies else (seeds * passes) ** 0.5
     z = _quantile(parts) ** 2 / number
     middle = (share + z / 2) / (1 + z)
     half = (z * (share * (1 - share) + z / 4)) ** 0.5 / (1 + z)
     return Share(share, (max(0.0, middle - half), min(1.0, middle + half)))
 
 
-class _Drawn(NamedTuple):
-    """How often each of n passes is in each of many resamples."""
+def _drawn(clusters: Clusters) -> tuple[NDArray[np.int32], int, int]:
+    """How often each pass is in each of many resamples, (n, resamples), numbers of seeds and of freedoms.
 
-    counts: NDArray[np.int32]  # (n, resamples)
-    seeds: int  # of all lines together
-    freedom: int  # degrees of freedom of the variance between them
-
-    @property
-    def correction(self) -> float:
-        """Variance by that of resamples: means of n values drawn from n vary by (n - 1) / n too little."""
-        return self.seeds / self.freedom
-
-
-def _drawn(clusters: Clusters) -> _Drawn:
-    """Resamples: the seeds of each line are drawn with replacement, as many as there are."""
+    The seeds of each line are drawn with replacement, as many as there are. By the degrees of freedom the
+    variance of resamples is corrected: means of n values drawn from n vary by (n - 1) / n too little.
+    """
     found, number = np.unique(np.stack(clusters, axis=1), axis=0, return_inverse=True)
     _, seeds = np.unique(found[:, 0], return_counts=True)
     counts = _counts(tuple(seeds.tolist()))[number.ravel()]
-    return _Drawn(counts, len(found), len(found) - len(seeds))
+    return counts, len(found), len(found) - len(seeds)
 
 
 @lru_cache

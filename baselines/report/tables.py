@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import compress
 from math import isfinite, isnan, nan
 from statistics import mean
 from types import MappingProxyType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from panto_env.base.table import Table
 from panto_env.terminal import number
@@ -41,22 +40,12 @@ Column = tuple[str, Callable[[R], Entry]]
 """One column: its heading, and the function that makes its entry for a row."""
 
 
-class Row(NamedTuple):
-    """One policy's row."""
-
-    policy: str
-    disqualified: str
-    best: bool
-    entries: list[Entry]
-
-
-@dataclass(frozen=True)
-class PageTable:
+class PageTable(NamedTuple):
     """A sortable table; its second column, the policy, is the heading of each row."""
 
     caption: str
     headings: list[str]
-    rows: list[Row]
+    rows: list[dict[str, Any]]  # policy, whether it is disqualified or best, and its entries
 
 
 def leaderboard(result: Result) -> PageTable:
@@ -151,7 +140,9 @@ def _first_columns(rows: Sequence[R], method_of: Mapping[str, str] = MappingProx
 
 def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> PageTable:
     made = [
-        Row(one.policy, one.disqualified, one.rank == 1, [entry(one) for _, entry in columns]) for one in rows
+        {"policy": one.policy, "disqualified": one.disqualified, "best": one.rank == 1}
+        | {"entries": [entry(one) for _, entry in columns]}
+        for one in rows
     ]
     return PageTable(caption, [heading for heading, _ in columns], made)
 
