@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csc_matrix, eye_array, kron
@@ -98,13 +97,15 @@ def descend(
         if progress is not None:
             progress(start, found[-1])
 
+    def measured() -> Array:
+        return problem.response(knots) if basis is None else problem.response_along(knots, basis)
+
     note(0.0)
-    response, fresh = _response(problem, knots, basis), True
+    response, fresh = measured(), True
     while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
         before = merit(problem, force)
-        model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
-        best_steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
+        best_steps = _best_steps(problem, response, force, knots.ravel(), limits, basis, weights)
         steps = np.array([share * step for step in best_steps for share in SHARES])
         tried = knots + (steps if basis is None else steps @ basis.T).reshape(-1, *knots.shape)
         forces = problem.forces(tried)
@@ -124,12 +125,8 @@ def descend(
             break
         fresh = gain < WORTH
         if fresh:
-            response = _response(problem, knots, basis)
+            response = measured()
     return Descent(start, knots, tuple(found))
-
-
-def _response(problem: Problem, knots: Array, basis: Array | None) -> Array:
-    return problem.response(knots) if basis is None else problem.response_along(knots, basis)
 
 
 def merit(problem: Problem, force: Array) -> float:
@@ -143,45 +140,44 @@ def _mean_met(problem: Problem, force: Array) -> bool:
     return abs(float(force.mean()) - required) <= MEAN_TOLERANCE * required
 
 
-class Model(NamedTuple):
-    """Quadratic model of a step: squares of the filtered force about its mean, and of the mean's error."""
+def _best_steps(
+    problem: Problem,
+    response: Array,
+    force: Array,
+    knots: Array,
+    limits: Limits,
+    basis: Array | None,
+    dampings: Sequence[float],
+) -> list[Array]:
+    """Best steps along each direction (N) within the limits, one for each damping: see ``DAMPING``.
 
-    hessian: Array  # (directions, directions)
-    gradient: Array  # (directions,)
-    size: float  # of ``hessian``: mean of its diagonal
-    basis: Array | None
-
-    @classmethod
-    def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
-        """Model about the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
-        compared = force[:: problem.every]
-        mean = response.mean(axis=0)
-        stiffness = MEAN_STIFFNESS * len(compared)
-        missing = problem.figures.mean - float(force.mean())
-        about_mean = response - mean
-        hessian = about_mean.T @ about_mean
-        size = float(np.trace(hessian)) / len(hessian)
-        hessian += stiffness * np.outer(mean, mean)
-        gradient = about_mean.T @ (compared - compared.mean()) - stiffness * missing * mean
-        return cls(hessian, gradient, size, basis)
-
-    def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
-        """Best step along each direction (N) within the limits; damping: see ``DAMPING``.
-
-        knots: the present knots, flat (N). Without a basis each direction is a knot.
-        Raises InputError if OSQP finds no step.
-        """
-        now = limits.matrix @ knots
-        matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
-        hessian = self.hessian + damping * self.size * np.eye(len(self.hessian))
+    They minimise a quadratic model: squares of the filtered force, (samples,) (N), about its mean, and of the
+    mean's error. response: (rows, directions) (N/N); knots: the present ones, flat (N). Without a basis each
+    direction is a knot. Raises InputError if OSQP finds no step.
+    """
+    compared = force[:: problem.every]
+    mean = response.mean(axis=0)
+    stiffness = MEAN_STIFFNESS * len(compared)
+    missing = problem.figures.mean - float(force.mean())
+    about_mean = response - mean
+    plain = about_mean.T @ about_mean
+    size = float(np.trace(plain)) / len(plain)
+    plain += stiffness * np.outer(mean, mean)
+    gradient = about_mean.T @ (compared - compared.mean()) - stiffness * missing * mean
+    now = limits.matrix @ knots
+    matrix = limits.matrix if basis is None else csc_matrix(limits.matrix @ basis)
+    steps = []
+    for damping in dampings:
+        hessian = plain + damping * size * np.eye(len(plain))
         scale = 1.0 / float(np.diag(hessian).max())
         solver = quadratic_solver("An oracle")
         low, high = -limits.bound - now, limits.bound - now
-        solver.setup(csc_matrix(np.triu(scale * hessian)), scale * self.gradient, matrix, low, high, **OSQP)
+        solver.setup(csc_matrix(np.triu(scale * hessian)), scale * gradient, matrix, low, high, **OSQP)
         answer = solver.solve(raise_error=False)
         if answer.x is None or not np.isfinite(answer.x).all():
             raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
-        return np.asarray(answer.x)
+        steps.append(np.asarray(answer.x))
+    return steps
 
 
 def corrected(response: Array, step: Array, change: Array) -> Array:
