@@ -109,7 +109,7 @@ def curves(
     ticks = [Tick(x(value), f"{value:g}") for value in _nice(x.lowest, x.highest) if value <= x.highest]
     ticks = [tick for tick in ticks if tick.at >= LEFT]
     level = None if level is None else y(level)
-    return Chart(title, *labels, ticks, y_ticks, drawn, supports=[*map(x, supports)], level=level)
+    return Chart(title, *labels, ticks, y_ticks, drawn, supports=[x(each) for each in supports], level=level)
 
 
 def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart | None:

@@ -323,7 +323,7 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
 @pytest.mark.parametrize(
     ("source", "speeds_kmh", "spans"),
     [
-        ("family:high-speed", (260.0, 350.0), (10, 19)),
+        ("family:high-speed", (300.0,), (10, 19)),
         # The shortest has 36 spans, and its end is felt in 8 of them.
         pytest.param("section:main-line", (160.0,), (10, 28), marks=pytest.mark.slow),
     ],
