@@ -277,13 +277,14 @@ def _record(
 ) -> tuple[Trajectory, list[_CommandRecorder]]:
     players = tapes(played, line) if played else _players(settings, line, policy, speed_kmh, seed)
     recorders = [_CommandRecorder(player, policy, row) for row, player in enumerate(players)]
+
+    def watch(task: Task) -> None:
+        for recorder in recorders:
+            recorder.watch(task)
+
     with _torch_on_one_thread():
-        run = simulate(
-            policy=recorders,
-            watch=lambda task: [recorder.watch(task) for recorder in recorders],
-            record_droppers=False,
-            **_arguments(settings, line, speed_kmh, seed),
-        )
+        arguments = _arguments(settings, line, speed_kmh, seed)
+        run = simulate(policy=recorders, watch=watch, record_droppers=False, **arguments)
     return run, recorders
 
 

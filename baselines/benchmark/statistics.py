@@ -285,7 +285,8 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
     sigma = np.array([row.figures.std for row in rows])
     by_window = window_changes(rows)
     changes = relative_changes(rows)
-    early, late = (*(100 * interquartile_mean(each) for each in by_window), None)[:2]
+    early, *rest = (100 * interquartile_mean(each) for each in by_window)
+    late = rest[0] if rest else None
     costs = relative(
         [[each.figures.cost_function for each in row.windows] for row in rows],
         [[each.pressed_cost_function for each in row.windows] for row in rows],

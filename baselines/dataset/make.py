@@ -152,8 +152,9 @@ def make_designs(
     import pyarrow.parquet as pq
 
     table = pq.read_table(folder / TABLE, columns=["refused", "ending", "accuracy_warning"])
-    counts = (int(pc.sum(pc.not_equal(table[name], "")).as_py()) for name in table.column_names)
-    return MadeTable(folder, table.num_rows, *counts, (folder / TABLE).stat().st_size / 1e6, there)
+    refused, ended, warned = (int(pc.sum(pc.not_equal(each, "")).as_py()) for each in table.columns)
+    size = (folder / TABLE).stat().st_size / 1e6
+    return MadeTable(folder, table.num_rows, refused, ended, warned, size, there)
 
 
 def read_identity(path: Path) -> dict[str, Any]:
@@ -249,9 +250,9 @@ def make_episodes(
         remove_if_empty(output / PARTS)
     made = []
     for one in sets:
-        counts = [_metadata(one.folder)[name] for name in ("total_episodes", "total_steps")]
+        episodes, steps = (_metadata(one.folder)[name] for name in ("total_episodes", "total_steps"))
         size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file()) / 1e6
-        made.append(Made(one.name, one.folder, *counts, size, one not in missing))
+        made.append(Made(one.name, one.folder, episodes, steps, size, one not in missing))
     return made
 
 

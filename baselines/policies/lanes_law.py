@@ -63,16 +63,16 @@ class Tuning(Settings):
             raise ValueError("speeds_kmh must rise")
         return self
 
-    def is_for(self, catenary: CatenaryData, pantograph: PantographData, place: str) -> bool:
-        """Whether it was made for this line and pantograph, by their values, and place of the actuator."""
-        return self._is_of(pantograph, place) and is_entry(catenary, self.catenary, self.catenary_sha256)
+    def is_for(self, catenary: CatenaryData | None, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made for this line and pantograph, by their values, and place of the actuator.
 
-    def is_for_any_line(self, pantograph: PantographData, place: str) -> bool:
-        """Whether it was made on many lines, drawn from a family or a section, for this pantograph."""
-        return self._is_of(pantograph, place) and self.catenary.startswith(MANY_LINES)
-
-    def _is_of(self, pantograph: PantographData, place: str) -> bool:
-        return place == self.place and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
+        Without a line: whether it was made on many lines, drawn from a family or a section.
+        """
+        if place != self.place or not is_entry(pantograph, self.pantograph, self.pantograph_sha256):
+            return False
+        if catenary is None:
+            return self.catenary.startswith(MANY_LINES)
+        return is_entry(catenary, self.catenary, self.catenary_sha256)
 
 
 class GainFile(Settings):
@@ -114,8 +114,7 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
     tunings = load_gains(path).tunings
     able = [each for each in tunings if each.washout in (0.0, context.washout)]
     able.sort(key=lambda each: each.washout != context.washout)
-    own = [each for each in able if each.is_for(line, pantograph, place)]
-    own += [each for each in able if each.is_for_any_line(pantograph, place)]
+    own = [each for where in (line, None) for each in able if each.is_for(where, pantograph, place)]
     if own:
         return _at_speed(own[0], names, to_kmh(context.speed), path)
     but, case = "", (line.name, pantograph.name, place)

@@ -98,7 +98,7 @@ class Disturbed:
         interval, span_rate = context.control_interval, context.speed / context.alignment.mean_length
         count = max(1, int(HIGHEST / span_rate))
         size, own = sampled.size, 2 * count + 1
-        self.a = np.zeros((size + own, size + own))
+        self.a = np.zeros((size + own + 1, size + own + 1))
         self.a[:size, :size] = sampled.a
         rows = np.zeros(own)
         for k in range(1, count + 1):
@@ -108,24 +108,19 @@ class Disturbed:
             turn = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
             self.a[place : place + 2, place : place + 2] = fading * np.array(turn)
             rows[2 * k - 2] = 1.0
-        self.a[-1, -1] = np.exp(-interval * 2 * np.pi * span_rate)
+        self.a[-2, -2] = np.exp(-interval * 2 * np.pi * span_rate)
         rows[-1] = 1.0
-        self.a[:size, size:] = np.outer(sampled.height, rows)
-        self.b = np.concatenate([sampled.b, np.zeros(own)])
-        self.c = np.hstack([sampled.c, np.outer(sampled.d_height, rows)])
+        self.a[:size, size:-1] = np.outer(sampled.height, rows)
+        # The last state is the integral of the command (N s), which is known without being read.
+        self.a[-1, -1] = 1.0
+        self.b = np.concatenate([sampled.b, np.zeros(own), [interval]])
+        self.c = np.hstack([sampled.c, np.outer(sampled.d_height, rows), np.zeros((len(sampled.c), 1))])
         strength = interval * HEIGHT**2
         # Heights of high harmonics are small: their noise falls with the number.
         falling = np.repeat(1.0 / np.arange(1, count + 1) ** 2, 2)
         self.noise = np.zeros(len(self.a))
-        self.noise[size:-1] = strength * harmonics**2 * falling
-        self.noise[-1] = strength * wandering**2
-        # The integral of the command (N s), which is known without being read.
-        size = len(self.a)
-        whole = np.eye(size + 1)
-        whole[:size, :size] = self.a
-        self.a, self.b = whole, np.append(self.b, interval)
-        self.c = np.hstack([self.c, np.zeros((len(self.c), 1))])
-        self.noise = np.append(self.noise, 0.0)
+        self.noise[size:-2] = strength * harmonics**2 * falling
+        self.noise[-2] = strength * wandering**2
 
 
 def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> Array:

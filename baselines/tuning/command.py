@@ -167,15 +167,10 @@ def check_gain_file(path: Path, policy: str, settings: RunSettings, force: bool)
     file = load_gains(path)
     if file.policy != policy:
         raise InputError(f"{path} holds gains of '{file.policy}'; give another --output.")
+    line = None if draws_line(settings) else settings.line
     pantograph, place = settings.controlled_pantograph, settings.actuator.place
-    held = any(
-        each.is_for_any_line(pantograph, place)
-        if draws_line(settings)
-        else each.is_for(settings.line, pantograph, place)
-        for each in file.tunings
-        if each.washout == settings.washout
-    )
-    if held and not force:
+    alike = [each for each in file.tunings if each.washout == settings.washout]
+    if not force and any(each.is_for(line, pantograph, place) for each in alike):
         raise InputError(
             f"{path} already holds gains for {pantograph.name} on {line_name(settings)}, "
             f"actuator on '{place}'; give another --output, or --force to replace them."
