@@ -147,7 +147,7 @@ def _best_steps(
     knots: Array,
     limits: Limits,
     basis: Array | None,
-    dampings: Sequence[float],
+    dampings: Array,
 ) -> list[Array]:
     """Best steps along each direction (N) within the limits, one for each damping: see ``DAMPING``.
 
