@@ -232,19 +232,25 @@ def test_other_places_are_options_of_reset_and_a_policy_sees_what_it_asks_for():
     assert np.abs(agent.actions).max() > 0.01
 
 
-def test_a_policy_whose_run_would_differ_is_refused(tmp_path):
-    path = tmp_path / "mine.py"
+def played(folder, observation, action):
+    """An episode of a policy of a file that wishes this observation, and always acts alike."""
+    path = folder / "mine.py"
     path.write_text(
-        "import numpy as np\nclass Mine:\n    observation = 'estimated'\n"
-        "    def reset(context): pass\n"
-        "    def act(seen): return np.zeros(1)\n"
+        f"import numpy as np\nclass Mine:\n    observation = {observation!r}\n"
+        f"    def reset(self, context): pass\n    def act(self, seen): return np.full(1, {action})\n"
     )
     plan = next(settings().plans(settings().sets[0]))
-    episode = Stage(settings()).play(plan._replace(policy=f"{path}:Mine"))
-    assert (episode.actions == 0).all()  # the filter changes what is seen, and nothing else
-    path.write_text(path.read_text().replace("np.zeros(1)", "np.full(1, np.nan)"))
+    return Stage(settings()).play(plan._replace(policy=f"{path}:Mine"))
+
+
+def test_a_policy_whose_action_is_no_number_is_refused(tmp_path):
     with pytest.raises(InputError, match="its action must be finite numbers"):
-        Stage(settings()).play(plan._replace(policy=f"{path}:Mine"))
+        played(tmp_path, "measured", "np.nan")
+
+
+@pytest.mark.slow
+def test_an_estimator_changes_what_is_seen_and_nothing_else(tmp_path):
+    assert (played(tmp_path, "estimated", 0.0).actions == 0).all()
 
 
 @pytest.mark.slow
