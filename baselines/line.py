@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, model_validator
 
 from panto_env.base.errors import InputError, shown
 from panto_env.base.settings import Between, Positive, Settings, parse
@@ -17,6 +17,7 @@ from panto_env.plant.catenary.schema import MOST_SPANS
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition
 
 T = TypeVar("T")
+
 OPTIONS = ("catenary", "pantograph", "distances", "controlled")
 """Options of a command that say which train runs on which line."""
 CONDITIONS = ("line_condition", "pantograph_scatter", "speed_drift", "control_interval")
@@ -42,18 +43,18 @@ def as_clause(read: Callable[[Any], T]) -> Callable[[Any], T]:
 
 def distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """The values. Raises ValueError where one is given twice."""
-    twice = next((value for value, count in Counter(values).items() if count > 1), None)
-    if twice is not None:
-        raise ValueError(f"{shown(twice)} is given twice")
+    for value, count in Counter(values).items():
+        if count > 1:
+            raise ValueError(f"{shown(value)} is given twice")
     return values
 
 
-def _condition(value: Any) -> LineCondition:
-    return parse(LineCondition, value, "line_condition", LINE_CONDITIONS)
-
-
+Distinct = Annotated[tuple[T, ...], AfterValidator(distinct)]  # values of which none is given twice
 Actuator = SerializeAsAny[Annotated[ActuatorSettings, BeforeValidator(as_clause(actuator_settings))]]
-Condition = Annotated[LineCondition, BeforeValidator(as_clause(_condition))]
+Condition = Annotated[
+    LineCondition,
+    BeforeValidator(as_clause(lambda value: parse(LineCondition, value, "line_condition", LINE_CONDITIONS))),
+]
 Span = Annotated[int, Between(1, MOST_SPANS)]
 _Controlled = Annotated[tuple[int, ...], BeforeValidator(as_clause(controlled_numbers))]
 
@@ -68,7 +69,7 @@ class LineAndTrain(Settings):
     )
     distances: tuple[Positive, ...] = Field((), description=description("distances"))
     controlled: _Controlled = of_run("controlled")
-    speeds_kmh: tuple[Positive, ...] = Field((250.0, 300.0), min_length=1, description="km/h")
+    speeds_kmh: Distinct[Positive] = Field((250.0, 300.0), min_length=1, description="km/h")
 
     @model_validator(mode="before")
     @classmethod
@@ -76,11 +77,6 @@ class LineAndTrain(Settings):
         """The pantograph is the first of several."""
         several = values.get("pantographs") if isinstance(values, dict) else None
         return {"pantograph": several[0], **values} if several else values
-
-    @field_validator("speeds_kmh")
-    @classmethod
-    def _distinct_speeds(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return distinct(value)
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from panto_env import Trajectory
-from panto_env.base.arrays import Array
 from panto_env.base.checksums import checksum, read_arrays, write_arrays
 from panto_env.base.errors import InputError
 from panto_env.base.files import with_suffix
 from panto_env.metrics.low_pass import CUTOFF, amplitudes, zero_phase_low_pass
 from panto_env.plant.alignment import Spans
 
-from .settings import Line, LineAtSpeed
+from .settings import Line, Placed
 
-SUFFIX = ".actions.safetensors"
-"""End of the file's name, in the place of the result's ".json"."""
+SUFFIX = ".actions.safetensors"  # end of the file's name, in the place of the result's ".json"
 
 
 class Played(NamedTuple):
@@ -77,12 +75,11 @@ def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
 
 STRIDE = 0.5
 """Distance (m) between points of a trace, unless the train is so slow that a peak would be missed."""
-PER_PERIOD = 4
-"""Points of a trace per period of the low-pass's cut-off frequency."""
+PER_PERIOD = 4  # points of a trace per period of the low-pass's cut-off frequency
 
 
 @dataclass(frozen=True)
-class Trace:
+class Trace(Placed):
     """One policy's pass under the first seed; n points, m frequencies; rounded, for drawing only."""
 
     policy: str
@@ -95,11 +92,6 @@ class Trace:
     force: tuple[float, ...]  # (n,): contact force, low-passed at 20 Hz without delay (N)
     frequency: tuple[float, ...]  # (m,): up to 20 Hz (Hz)
     amplitude: tuple[float, ...]  # (m,): of the unfiltered contact force over all evaluated spans (N)
-
-    @property
-    def place(self) -> LineAtSpeed:
-        """Line, pantograph and speed."""
-        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh, self.case)
 
 
 def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
@@ -121,12 +113,8 @@ def trace(run: Trajectory, spans: Spans, policy: str, line: Line) -> Trace:
         speed_kmh=run.speed_kmh,
         case=line.case,
         seed=run.seed,
-        position=_rounded(position, 2),
-        force=_rounded(np.interp(position, run.position, force), 2),
-        frequency=_rounded(frequency[shown], 4),
-        amplitude=_rounded(amplitude[shown], 4),
+        position=tuple(position.round(2).tolist()),
+        force=tuple(np.interp(position, run.position, force).round(2).tolist()),
+        frequency=tuple(frequency[shown].round(4).tolist()),
+        amplitude=tuple(amplitude[shown].round(4).tolist()),
     )
-
-
-def _rounded(values: Array, decimals: int) -> tuple[float, ...]:
-    return tuple(values.round(decimals).tolist())

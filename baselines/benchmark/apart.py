@@ -41,20 +41,17 @@ from panto_env.policies import (
     wishes,
 )
 
-ACT_LIMIT = 60.0
-"""Time (s) within which a policy must answer an observation."""
+ACT_LIMIT = 60.0  # time (s) within which a policy must answer an observation
 PREPARATION_LIMIT = 600.0
 """Time (s) within which it must be loaded, and prepare for an episode: kernels may be compiled for that."""
 INTERPRETER = "PANTO_POLICY_PYTHON"
 """Variable that names the Python of policies, which has this package too; by default it is this one."""
 ENVIRONMENT = re.compile("PATH|HOME|LANG|LC_.*|TZ|TMPDIR|LD_LIBRARY_PATH|.*_CACHE_(DIR|HOME)|NUMBA_.*")
 """Variables of the environment that a policy's process gets; others may hold secrets."""
-END_LIMIT = 5.0
-"""Time (s) within which its process ends by itself where another user's can't be killed."""
+END_LIMIT = 5.0  # time (s) within which its process ends by itself where another user's can't be killed
 DONE, FAILED = b"+", b"!"
 """First byte of an answer: followed by its content, or by a sentence about the policy's error."""
-ACT = b"@"
-"""First byte of an observation for the policy that was asked last; all other requests are pickled."""
+ACT = b"@"  # first byte of an observation for the policy that was asked last; all other requests are pickled
 
 
 def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 
 from rich.console import Group, RenderableType
@@ -23,8 +23,7 @@ NOTE = (
 )
 
 
-MOST_LINES = 2
-"""Number of lines up to which Δσ is shown at each speed."""
+MOST_LINES = 2  # number of lines up to which Δσ is shown at each speed
 
 
 def brief(outcome: Benchmark) -> RenderableType:
@@ -39,28 +38,17 @@ def brief(outcome: Benchmark) -> RenderableType:
         for (_, cells), windows in zip(groups, outcome.windows, strict=True):
             own = list(cells)
             parts.append(as_rich(by_speed(own, f"Δσ (%), {own[0].place.name}, {spans_in_words(windows)}")))
-    parts += [
-        Text(f"Not ranked: {each.policy}: {why(each.disqualified)}.", style="red")
+    out = {
+        each.policy: f"Not ranked: {each.policy}: {why(each.disqualified)}."
         for each in standings
         if each.disqualified
-    ]
-    parts += [
-        Text(
-            f"Out there: {cell.policy}: {why(cell.disqualified)}, at {cell.place.speed_kmh:g} km/h.",
-            style="red",
-        )
-        for cell in _out_elsewhere(outcome.cells, [each.policy for each in standings])
-    ]
-    return Group(*parts, Text(NOTE, style="dim"))
-
-
-def _out_elsewhere(cells: Sequence[Cell], judged: Sequence[str]) -> list[Cell]:
-    """Of each policy that did not run on every line, and has no standing: its first cell without a rank."""
-    found: dict[str, Cell] = {}
-    for cell in cells:
+    }
+    judged = {each.policy for each in standings}
+    for cell in outcome.cells:  # of policies that did not run on every line the first without a rank
         if cell.disqualified and cell.policy not in judged:
-            found.setdefault(cell.policy, cell)
-    return list(found.values())
+            words = f"Out there: {cell.policy}: {why(cell.disqualified)}, at {cell.speed_kmh:g} km/h."
+            out.setdefault(cell.policy, words)
+    return Group(*parts, *(Text(words, style="red") for words in out.values()), Text(NOTE, style="dim"))
 
 
 def headline(standings: Sequence[Standing]) -> str:
@@ -84,35 +72,35 @@ def _within(one: Standing) -> str:
 
 def ranking(title: str, standings: Sequence[Standing]) -> Table:
     """A row for each policy that ran on every line."""
-    after = next_in_ranking(standings)
-    methods = method_of(standings)
-    rows = []
-    for each in standings:
-        change = f"{number(each.change, 1)}{_within(each)}"
-        better = each.better_than.get(after.get(each.policy, ""))
-        rows.append(
-            (
-                f"{methods[each.policy]}: {each.policy}" if each.policy in methods else each.policy,
-                "–" if each.rank is None else str(each.rank),
-                change if each.rank is not None else f"({number(each.change, 1)})",
-                number(each.contact_loss, 2),
-                number(each.harm.worst, 0),
-                "–" if better is None else f"{100 * better.share:.0f} %",
-            )
-        )
-    headings = ("policy", "rank", "Δσ (%)", "CL (%)", "worst pass (%)", "ahead of next")
-    return Table(with_feedback(f"{title}: all lines, speeds and seeds", standings), headings, rows)
+    after, methods = next_in_ranking(standings), method_of(standings)
+
+    def ahead(one: Standing) -> str:
+        better = one.better_than.get(after.get(one.policy, ""))
+        return "–" if better is None else f"{100 * better.share:.0f} %"
+
+    columns: dict[str, Callable[[Standing], str]] = {
+        "policy": lambda one: f"{methods[one.policy]}: {one.policy}" if one.policy in methods else one.policy,
+        "rank": lambda one: "–" if one.rank is None else str(one.rank),
+        "Δσ (%)": lambda one: (
+            f"({number(one.change, 1)})" if one.rank is None else f"{number(one.change, 1)}{_within(one)}"
+        ),
+        "CL (%)": lambda one: number(one.contact_loss, 2),
+        "worst pass (%)": lambda one: number(one.harm.worst, 0),
+        "ahead of next": ahead,
+    }
+    title = with_feedback(f"{title}: all lines, speeds and seeds", standings)
+    return Table.of(title, standings, columns)
 
 
 def by_speed(cells: Sequence[Cell], title: str) -> Table:
     """Δσ of each policy at each speed of a line; in brackets where it is not ranked there."""
     speeds = list(dict.fromkeys(cell.speed_kmh for cell in cells))
     at = {(cell.policy, cell.speed_kmh): cell for cell in cells}
-    rows = []
-    for policy in dict.fromkeys(cell.policy for cell in cells):
-        own = [at[policy, speed] for speed in speeds]
-        words = (
-            f"({number(cell.change, 1)})" if cell.disqualified else number(cell.change, 1) for cell in own
-        )
-        rows.append((policy, *words))
+
+    def shown(cell: Cell) -> str:
+        change = number(cell.change, 1)
+        return f"({change})" if cell.disqualified else change
+
+    policies = dict.fromkeys(cell.policy for cell in cells)
+    rows = [(policy, *(shown(at[policy, speed]) for speed in speeds)) for policy in policies]
     return Table(title, ("policy", *(f"{speed:g} km/h" for speed in speeds)), rows)

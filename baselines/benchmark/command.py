@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import secrets
+from collections import defaultdict
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,8 +39,8 @@ from .submission import replay as play
 
 PLACE = (*OPTIONS, "pantographs")
 """Options that say what runs on which line: they replace the lines of a file."""
-DRAW = "draw"
-"""Salt that stands for one drawn at random."""
+Workers = Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)]
+DRAW = "draw"  # salt that stands for one drawn at random
 
 
 @with_settings(only=(*OPTIONS, "actuator", "sensors", "line_condition", "control_interval"), defaults=False)
@@ -138,17 +140,10 @@ def _settings(config: Path | None, line: dict[str, Any], **given: Any) -> Benchm
     A catenary or pantograph replaces all of the file's lines; speeds apply to every line.
     """
     base = BenchmarkSettings() if config is None else load_benchmark(config)
-    line_changes = _without_none(line)
-    table = base.model_dump() | _without_none(given)
-    if line_changes.keys() & set(PLACE):
-        table["lines"] = [line_changes]
-    else:
-        table["lines"] = [old | line_changes for old in table["lines"]]
+    changes, own = ({key: each for key, each in some.items() if each is not None} for some in (given, line))
+    table = base.model_dump() | changes
+    table["lines"] = [own] if own.keys() & set(PLACE) else [old | own for old in table["lines"]]
     return parse(BenchmarkSettings, table, "the benchmark")
-
-
-def _without_none(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
 
 
 def replay(
@@ -160,7 +155,7 @@ def replay(
     tolerance: Annotated[
         float, typer.Option(min=0, help="Relative difference that is allowed; 0 means bit for bit.")
     ] = 0.0,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    workers: Workers = None,
     json: Json = False,
 ) -> None:
     """Play a result's passes again from the actions that it keeps, and compare all figures.
@@ -174,9 +169,9 @@ def replay(
         rows = [{**each.row, "difference": each.difference} for each in played.rows]
         print_json({"follows": played.follows, "rows": rows})
     else:
-        groups: dict[str, list[float]] = {}
+        groups = defaultdict(list)
         for each in played.rows:
-            groups.setdefault(each.row["policy"], []).append(each.difference)
+            groups[each.row["policy"]].append(each.difference)
         rows_of = [
             (policy, str(len(found)), str(found.count(0.0)), f"{max(found):.2g}")
             for policy, found in groups.items()
@@ -200,7 +195,7 @@ def returns(
         bool,
         typer.Option("--ingredients", help="Also with each ingredient of the reward left out or changed."),
     ] = False,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    workers: Workers = None,
     json: Json = False,
 ) -> None:
     """Compare the returns of an environment with a benchmark's ranks.
@@ -213,17 +208,11 @@ def returns(
 
     judged = read_result(result)
     chosen = INGREDIENTS if ingredients else {"all": {}}
+    run_all = partial(measure, judged, environment, episodes=episodes, workers=workers)
     found = {}
     for name, arguments in chosen.items():
         with counting(f"episodes, {name}" if ingredients else "episodes") as progress:
-            found[name] = measure(
-                judged,
-                environment,
-                episodes=episodes,
-                arguments=arguments,
-                workers=workers,
-                progress=progress,
-            )
+            found[name] = run_all(arguments=arguments, progress=progress)
     if json:
         print_json({name: as_dict(each) for name, each in found.items()})
         return
@@ -256,7 +245,7 @@ def check(
     against: Annotated[
         Path | None, typer.Option(help="JSON of `panto benchmark` on the same track, to be ranked in.")
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core by default.", min=1)] = None,
+    workers: Workers = None,
     json: Json = False,
 ) -> None:
     """Run a submission as the benchmark would, with few seeds, and say whether it would be ranked, and where.
@@ -279,8 +268,7 @@ def check(
 def _report(checked: Checked, others: list[float]) -> list[str]:
     """What is said of a submission, line by line."""
     card, standing, tape = checked.card, checked.standing, checked.tape
-    interval = standing.interval
-    within = f", 95 % interval {interval[0]:.1f} to {interval[1]:.1f}" if interval else ""
+    within = ", 95 % interval {:.1f} to {:.1f}".format(*standing.interval) if standing.interval else ""
     lines = [
         f"{card.name} by {', '.join(card.authors)} ({card.licence})",
         f"Learnt from: {card.learnt_from}",

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from panto_env.base.arrays import Array
 from panto_env.base.errors import beside
@@ -22,8 +21,7 @@ from .single_pass import Row
 
 WORSE = {"sigma": 1.0, "loss": 0.0, "minimum": 1.0, "uplift": 1.0}
 """By how much a pass must be worse than the passive one to count: σ in %, CL in points, N, mm."""
-MOST_WORSE = 10.0
-"""Change of σ (%) above which no pass of a ranked policy may be, in any window."""
+MOST_WORSE = 10.0  # change of σ (%) above which no pass of a ranked policy may be, in any window
 MOST_GROWN = 10.0
 """Points (%) by which the interquartile mean of the change of σ may be larger in the late window.
 
@@ -45,8 +43,7 @@ def window_changes(rows: Sequence[Row]) -> Array:
 def relative(values: Sequence[Sequence[float]], to: Sequence[Sequence[float]]) -> Array:
     """Relative changes, of the shape of both."""
     with np.errstate(divide="ignore", invalid="ignore"):  # a sigma of 0 has no relative change
-        changes: Array = np.asarray(values) / np.asarray(to) - 1
-    return changes
+        return np.asarray(np.asarray(values) / np.asarray(to) - 1)
 
 
 @dataclass(frozen=True)
@@ -65,18 +62,17 @@ class Harm:
     uplift: int  # with an uplift more than 1 mm above
     worst: Number  # maximum change of σ of any pass (%)
     worst_at: str  # its seed and window
-    lowest_minimum: (
-        Number  # maximum (N) by which a minimum lies below the passive one; negative: all lie above
-    )
+    lowest_minimum: Number  # maximum (N) by which a minimum lies below the passive one; negative: all above
     most_uplift: Number  # maximum (m) by which an uplift lies above the passive one; negative: all lie below
 
     @classmethod
     def over(cls, parts: Sequence[tuple[str, Harm]]) -> Self:
         """Harm over several cells, each with the name of its place."""
         each = [harm for _, harm in parts]
-        place, worst = max(parts, key=lambda part: _last_if_nan(part[1].worst))
+        place, worst = max(parts, key=lambda part: last_if_nan(part[1].worst))
+        counts = ("passes", "sigma", "loss", "lost", "minimum", "uplift")
         return cls(
-            **{name: sum(getattr(harm, name) for harm in each) for name in _COUNTS},
+            **{name: sum(getattr(harm, name) for harm in each) for name in counts},
             worst=worst.worst,
             worst_at=f"{place}, {worst.worst_at}",
             lowest_minimum=max(harm.lowest_minimum for harm in each),
@@ -84,56 +80,41 @@ class Harm:
         )
 
 
-_COUNTS = ("passes", "sigma", "loss", "lost", "minimum", "uplift")
-
-
-class _Beside(NamedTuple):
-    """One figure of a policy's passes, and of the passive ones, (windows, passes) each."""
-
-    own: Array
-    passive: Array
-
-    @property
-    def above(self) -> Array:
-        """Maximum over the windows of the difference, (passes,)."""
-        highest: Array = (self.own - self.passive).max(axis=0)
-        return highest
-
-
 def harm_of(rows: Sequence[Row], passive_rows: Sequence[Row]) -> Harm:
     """Harm in one cell; the rows of the policy and of the passive pantograph are for the same seeds."""
 
-    def figure(name: str) -> _Beside:
-        tables = [
-            [[getattr(each.figures, name) for each in row.windows] for row in some]
-            for some in (rows, passive_rows)
-        ]
-        return _Beside(*(np.array(table).T for table in tables))
+    def figure(name: str) -> Array:
+        """Of the policy's passes, and of the passive ones, (2, windows, passes)."""
+        return np.array(
+            [
+                [[getattr(each.figures, name) for each in row.windows] for row in some]
+                for some in (rows, passive_rows)
+            ]
+        ).swapaxes(1, 2)
 
     changes = 100 * window_changes(rows)
     most = int(np.nanargmax(changes)) if np.isfinite(changes).any() else 0
     late, number = divmod(most, len(rows))
-    loss, minimum, uplift = figure("contact_loss"), figure("min"), figure("max_uplift")
-    below = _Beside(minimum.passive, minimum.own).above
+    loss, passive_loss = figure("contact_loss")
+    minimum, passive_minimum = figure("min")
+    uplift, passive_uplift = figure("max_uplift")
+    below, above = (passive_minimum - minimum).max(axis=0), (uplift - passive_uplift).max(axis=0)
     return Harm(
         passes=len(rows),
-        sigma=_count(changes.max(axis=0) > WORSE["sigma"]),
-        loss=_count(loss.above > WORSE["loss"]),
-        lost=_count(((loss.own > 0) & (loss.passive == 0)).any(axis=0)),
-        minimum=_count(below > WORSE["minimum"]),
-        uplift=_count(1e3 * uplift.above > WORSE["uplift"]),
+        sigma=int(np.sum(changes.max(axis=0) > WORSE["sigma"])),
+        loss=int(np.sum((loss - passive_loss).max(axis=0) > WORSE["loss"])),
+        lost=int(np.sum(((loss > 0) & (passive_loss == 0)).any(axis=0))),
+        minimum=int(np.sum(below > WORSE["minimum"])),
+        uplift=int(np.sum(1e3 * above > WORSE["uplift"])),
         worst=float(changes[late, number]),
         worst_at=f"seed {rows[number].seed}" + (", late" if late else ""),
         lowest_minimum=float(below.max()),
-        most_uplift=float(uplift.above.max()),
+        most_uplift=float(above.max()),
     )
 
 
-def _count(passes: NDArray[np.bool_]) -> int:
-    return int(np.sum(passes))
-
-
-def _last_if_nan(value: float) -> float:
+def last_if_nan(value: float) -> float:
+    """A value for a maximum that passes over nan."""
     return -np.inf if np.isnan(value) else value
 
 

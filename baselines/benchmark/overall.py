@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -13,7 +14,7 @@ import numpy as np
 
 from panto_env.base.arrays import Array
 
-from .harm import Harm, window_changes
+from .harm import Harm, last_if_nan, window_changes
 from .settings import REFERENCE, TAPE, Number, control_of
 from .single_pass import LATE, Row
 from .statistics import (
@@ -84,15 +85,17 @@ def standings(
     pairs: in which share of passes one has a smaller change than the other, on the same line under the same
     seed.
     """
-    own_rows: dict[str, list[Row]] = {}
+    own_rows, own_cells = defaultdict(list), defaultdict(list)
     for row in rows:
-        own_rows.setdefault(row.policy, []).append(row)
-    own_cells: dict[str, list[Cell]] = {}
+        own_rows[row.policy].append(row)
     for cell in cells:
-        own_cells.setdefault(cell.policy, []).append(cell)
+        own_cells[cell.policy].append(cell)
     places = [cell.place for cell in own_cells[REFERENCE]]
     everywhere = [name for name, own in own_cells.items() if [cell.place for cell in own] == places]
-    clusters = _clusters(own_rows[REFERENCE])
+    passive = own_rows[REFERENCE]
+    names = [(row.catenary, row.pantograph) for row in passive]  # a seed is one line in all cases
+    lines = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    clusters = Clusters(np.array([lines[name] for name in names]), np.array([row.seed for row in passive]))
     changes = {name: relative_changes(own_rows[name])[None] for name in everywhere}
     found = {
         name: _standing(name, own_cells[name], own_rows[name], changes[name][0], clusters)
@@ -103,16 +106,13 @@ def standings(
         found[method] = _of_method(method, [found[name] for name in trainings], changes[method], clusters)
     ranked = sorted(found[name].change for name in changes if not found[name].disqualified)
     for name, own in changes.items():
-        one = found[name]
-        found[name] = replace(
-            one,
-            rank=None if one.disqualified else 1 + ranked.index(one.change),
-            better_than={
-                other: share_of(own[:, None] < theirs, clusters)
-                for other, theirs in changes.items()
-                if other != name
-            },
-        )
+        shares = {
+            other: share_of(own[:, None] < theirs, clusters)
+            for other, theirs in changes.items()
+            if other != name
+        }
+        rank = None if found[name].disqualified else 1 + ranked.index(found[name].change)
+        found[name] = replace(found[name], rank=rank, better_than=shares)
     return tuple(found.values())
 
 
@@ -139,25 +139,18 @@ def next_in_ranking(found: Sequence[Standing]) -> dict[str, str]:
     return {one.policy: after.policy for one, after in pairwise(ranked)}
 
 
-def _clusters(rows: Sequence[Row]) -> Clusters:
-    """Lines and seeds of the passes of one policy."""
-    names = [(row.catenary, row.pantograph) for row in rows]  # a seed is one line in all cases
-    lines = list(dict.fromkeys(names))
-    line = [lines.index(name) for name in names]
-    return Clusters(np.array(line), np.array([row.seed for row in rows]))
-
-
 def _standing(
     policy: str, cells: Sequence[Cell], rows: Sequence[Row], changes: Array, clusters: Clusters
 ) -> Standing:
-    worst = max(cells, key=lambda cell: -np.inf if np.isnan(cell.change) else cell.change)
+    worst = max(cells, key=lambda cell: last_if_nan(cell.change))
     shares = [cell.oracle_share for cell in cells if cell.oracle_share is not None]
 
     def mean(name: str) -> float:
-        windows = (name, f"{LATE}{name}")
-        return float(
-            np.mean([np.mean([cell.figures[n] for n in windows if n in cell.figures]) for cell in cells])
-        )
+        """Over the cells, each the mean of its windows."""
+        windows = [
+            [cell.figures[key] for key in (name, f"{LATE}{name}") if key in cell.figures] for cell in cells
+        ]
+        return float(np.mean([np.mean(each) for each in windows]))
 
     def in_window(number: int) -> float:
         return 100 * interquartile_mean(np.array([window_changes([row])[number, 0] for row in rows]))
@@ -189,15 +182,15 @@ def _standing(
 
 def _of_method(method: str, trainings: Sequence[Standing], changes: Array, clusters: Clusters) -> Standing:
     """changes: relative changes of sigma, (trainings, passes)."""
-    names = ["change", "early", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"]
-    names += [
-        "saturation",
-        *(name for name in ("late", "oracle_share") if getattr(trainings[0], name) is not None),
-    ]
-    means: dict[str, Any] = {n: float(np.mean([getattr(each, n) for each in trainings])) for n in names}
+    names = (
+        *("change", "early", "worst_quarter", "improved", "contact_loss", "cost_change", "effort", "power"),
+        *("saturation", "late", "oracle_share"),
+    )
+    values = {name: [getattr(each, name) for each in trainings] for name in names}
+    means: dict[str, Any] = {n: float(np.mean(own)) for n, own in values.items() if own[0] is not None}
     out = next((each for each in trainings if each.disqualified), None)
     return replace(
-        max(trainings, key=lambda each: -np.inf if np.isnan(each.worst) else each.worst),
+        max(trainings, key=lambda each: last_if_nan(each.worst)),
         policy=method,
         interval=interval_of_mean(100 * changes, clusters),
         interval_for_lines=interval_for_lines(100 * changes, clusters),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import chain, groupby, pairwise
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any
 
@@ -69,23 +70,21 @@ ORACLE = (
 
 def tables(outcome: Benchmark) -> RenderableType:
     """One table per line, one over all of them, and a legend."""
-    parts: list[RenderableType] = []
+    title, parts = outcome.settings.title, list[RenderableType]()
     cells = groupby(outcome.cells, key=lambda cell: cell.place.line)
     for (_, grouped), windows in zip(cells, outcome.windows, strict=True):
         of_line = list(grouped)
-        title = f"{of_line[0].place.name}, {spans_in_words(windows)}"
-        parts += [*_table_of_line(of_line, title), ""]
-    out = [each for each in outcome.standings if each.disqualified]
-    reasons = [Text(f"{each.policy} is not ranked: {each.disqualified}.", style="red") for each in out]
-    legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
-    harm = as_rich(harm_table(outcome.settings.title, outcome.standings))
-    along = [as_rich(each) for each in kilometre_tables(outcome.settings.title, outcome.cells)]
+        parts += [*_table_of_line(of_line, f"{of_line[0].place.name}, {spans_in_words(windows)}"), ""]
+    parts += map(as_rich, kilometre_tables(title, outcome.cells))
     lines = [line.model_dump() for line in outcome.settings.lines]
-    if (margins := margins_table(outcome.settings.title, lines, outcome.cells)) is not None:
-        along.append(as_rich(margins))
-    return Group(
-        *parts, *along, _overall(outcome), harm, *reasons, Text(f"{legend} {LEGEND_OF_HARM}", style="dim")
-    )
+    if (margins := margins_table(title, lines, outcome.cells)) is not None:
+        parts.append(as_rich(margins))
+    parts += [_overall(outcome), as_rich(harm_table(title, outcome.standings))]
+    for each in outcome.standings:
+        if each.disqualified:
+            parts.append(Text(f"{each.policy} is not ranked: {each.disqualified}.", style="red"))
+    legend = LEGEND if all(cell.oracle is None for cell in outcome.cells) else f"{LEGEND} {ORACLE}"
+    return Group(*parts, Text(f"{legend} {LEGEND_OF_HARM}", style="dim"))
 
 
 def kilometre_tables(title: str, cells: Sequence[Cell]) -> list[TextTable]:
@@ -109,29 +108,22 @@ def margins_table(title: str, lines: Sequence[Mapping[str, Any]], cells: Sequenc
     names = list(dict.fromkeys(name for line in lines for name in line.get("sweep", {})))
     if not names:
         return None
-    policies = list(dict.fromkeys(cell.policy for cell in cells if cell.policy != REFERENCE))
-    of_case: dict[tuple[str, str], list[float]] = {}
+    of_case = defaultdict(list)
     for cell in cells:
-        of_case.setdefault((cell.policy, cell.case), []).append(cell.change)
-    rows = []
-    for policy in policies:
-        row = [policy]
-        for name in names:
-            found = sorted(
-                (line["sweep"][name], line["case"]) for line in lines if name in line.get("sweep", {})
-            )
-            changes = [float(np.mean(of_case[policy, case])) for _, case in found]
-            row.append(_crossing([value for value, _ in found], changes))
-        rows.append(tuple(row))
+        of_case[cell.policy, cell.case].append(cell.change)
+
+    def crossing(policy: str, name: str) -> str:
+        """The value at which changes, in the order of the values, first rise above 0."""
+        cases = sorted((line["sweep"][name], line["case"]) for line in lines if name in line.get("sweep", {}))
+        found = [(value, float(np.mean(of_case[policy, case]))) for value, case in cases]
+        for (low, before), (high, after) in pairwise(found):
+            if after > 0:
+                return f"{low:g}" if before > 0 else f"{low + (high - low) * before / (before - after):.3g}"
+        return f"> {found[-1][0]:g}"
+
+    policies = dict.fromkeys(cell.policy for cell in cells if cell.policy != REFERENCE)
+    rows = [(policy, *(crossing(policy, name) for name in names)) for policy in policies]
     return TextTable(f"{title}: where Δσ is 0", ("policy", *names), rows)
-
-
-def _crossing(values: Sequence[float], changes: Sequence[float]) -> str:
-    """The value at which changes, in the order of the values, first rise above 0."""
-    for (low, before), (high, after) in pairwise(zip(values, changes, strict=True)):
-        if after > 0:
-            return f"{low:g}" if before > 0 else f"{low + (high - low) * before / (before - after):.3g}"
-    return f"> {values[-1]:g}"
 
 
 def spans_in_words(windows: Windows) -> str:
@@ -152,9 +144,12 @@ LEGEND_OF_HARM = (
 
 def harm_table(title: str, standings: Sequence[Standing]) -> TextTable:
     """Table of what each policy makes worse, over all passes: counts and the worst, and Δσ by window."""
-    late = any(one.late is not None for one in standings)
+
+    def at_most(value: float, name: str, unit: str) -> str:
+        return f" ({value:.0f} {unit})" if value > WORSE[name] else ""
+
     columns: dict[str, Callable[[Standing], str]] = {"policy": lambda one: one.policy}
-    if late:
+    if any(one.late is not None for one in standings):
         columns["Δσ early (%)"] = lambda one: number(one.early, 1)
         columns["late (%)"] = lambda one: "–" if one.late is None else number(one.late, 1)
     columns |= {
@@ -162,25 +157,21 @@ def harm_table(title: str, standings: Sequence[Standing]) -> TextTable:
         "σ higher": lambda one: str(one.harm.sigma),
         "CL higher": lambda one: str(one.harm.loss),
         "contact lost": lambda one: str(one.harm.lost),
-        "minimum lower": lambda one: (
-            f"{one.harm.minimum}{_at_most(one.harm.lowest_minimum, WORSE['minimum'], 'N')}"
-        ),
+        "minimum lower": lambda one: f"{one.harm.minimum}{at_most(one.harm.lowest_minimum, 'minimum', 'N')}",
         "uplift higher": lambda one: (
-            f"{one.harm.uplift}{_at_most(1e3 * one.harm.most_uplift, WORSE['uplift'], 'mm')}"
+            f"{one.harm.uplift}{at_most(1e3 * one.harm.most_uplift, 'uplift', 'mm')}"
         ),
         "of": lambda one: str(one.harm.passes),
     }
     return TextTable.of(f"{title}: harm", [one for one in standings if one.policy != REFERENCE], columns)
 
 
-def _at_most(value: float, least: float, unit: str) -> str:
-    return f" ({value:.0f} {unit})" if value > least else ""
+FORM: dict[str, Any] = {"title_justify": "left", "box": SIMPLE_HEAD, "padding": (0, 1, 0, 0)}
 
 
 def as_rich(table: TextTable) -> Table:
     """A table for the terminal, without empty lines above and below."""
-    form: dict[str, Any] = {"title_justify": "left", "box": SIMPLE_HEAD, "padding": (0, 1, 0, 0)}
-    shown = Table(title=table.title, show_edge=False, **form)
+    shown = Table(title=table.title, show_edge=False, **FORM)
     for k, heading in enumerate(table.headings):
         shown.add_column(heading, justify="right" if k else "left", overflow="fold")
     for row in table.cells:
@@ -191,17 +182,16 @@ def as_rich(table: TextTable) -> Table:
 def _overall(outcome: Benchmark) -> Table:
     """Table of the overall results, one row per policy."""
     found = outcome.standings
-    title = f"{outcome.settings.title}: all lines, speeds and seeds"
-    title = with_feedback(title, found)
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(
+        title=with_feedback(f"{outcome.settings.title}: all lines, speeds and seeds", found), **FORM
+    )
     table.add_column("policy", overflow="fold")
     best = next((each for each in found if each.rank == 1), None)
     headings = ["rank", "Δσ (%)", "CL (%)", "ΔCF (%)", "worst\nquarter (%)", "worst cell (%)"]
     headings += ["passes\nimproved", "of\noracle", "mean\nmoved in", "better than\nthe next in"]
     for heading in [*headings, *(["beaten by\nthe first in"] if best else [])]:
         table.add_column(heading, justify="right", no_wrap=heading.startswith(("Δσ", "better", "beaten")))
-    after = next_in_ranking(found)
-    methods = method_of(found)
+    after, methods = next_in_ranking(found), method_of(found)
     for each in found:
         low_high = "" if each.interval is None else f" ({each.interval[0]:+.1f} to {each.interval[1]:+.1f})"
         if each.interval_for_lines is not None:
@@ -213,21 +203,19 @@ def _overall(outcome: Benchmark) -> Table:
             number(each.cost_change, 0),
             number(each.worst_quarter, 1),
             f"{number(each.worst, 1)} at {each.worst_at}",
-            _share(each.improved),
-            "–" if each.oracle_share is None else _share(each.oracle_share),
+            *(
+                "–" if share is None or isnan(share) else f"{100 * share:.0f} %"
+                for share in (each.improved, each.oracle_share)
+            ),
             f"{each.moved} of {each.passes}",
             str(each.better_than.get(after.get(each.policy, ""), "–")),
         ]
         if best is not None:
             values.append(str(best.better_than.get(each.policy, "–")))
         style = "red" if each.disqualified else "bold" if each is best else ""
-        method = methods.get(each.policy)
-        table.add_row(f"{method}: {each.policy}" if method else each.policy, *values, style=style)
+        name = f"{methods[each.policy]}: {each.policy}" if each.policy in methods else each.policy
+        table.add_row(name, *values, style=style)
     return table
-
-
-def _share(value: float) -> str:
-    return "–" if isnan(value) else f"{100 * value:.0f} %"
 
 
 def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
@@ -236,7 +224,7 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     spreads = [cell.spread for cell in cells if cell.policy == REFERENCE and not isnan(cell.spread)]
     if spreads:
         title += f"; passive σ spreads by up to {max(spreads):.1f} % rms over them"
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(title=title, **FORM)
     table.add_column("km/h", justify="right")
     table.add_column("policy", overflow="fold")
     table.add_column("rank", justify="right")
@@ -247,13 +235,16 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
     disqualifications: list[RenderableType] = []
     for speed, cells_at_speed in groupby(cells, key=lambda cell: cell.speed_kmh):
         for k, cell in enumerate(cells_at_speed):
-            beside = (_change(cell), number(cell.cost_change, 0), number(cell.mean_change, 1))
-            changes = dict(zip(CHANGES, beside, strict=True))
+            between = "" if cell.interval is None else " ({:+.1f} to {:+.1f})".format(*cell.interval)
+            changes = {
+                "std": f"{cell.change:+.1f}{between}" if between else number(cell.change, 1),
+                "cost_function": number(cell.cost_change, 0),
+                "mean": number(cell.mean_change, 1),
+            }
             values = []
             for name, decimals in FIGURES.items():
                 values.append(number(ROW_LABELS[name].scale * cell.figures[name], decimals))
-                if name in changes:
-                    values.append(changes[name])
+                values += [changes[name]] if name in changes else []
             rank = "–" if cell.rank is None else str(cell.rank)
             style = "red" if cell.disqualified else "bold" if cell.rank == 1 else ""
             table.add_row(f"{speed:g}" if k == 0 else "", cell.policy, rank, *values, style=style)
@@ -265,14 +256,6 @@ def _table_of_line(cells: list[Cell], title: str) -> list[RenderableType]:
                 table.add_row(*row, *[""] * (len(table.columns) - len(row)), style="dim")
         table.add_section()
     return [table, *disqualifications]
-
-
-def _change(cell: Cell) -> str:
-    """Change of sigma from the passive pantograph at the same mean, with its interval if there is one."""
-    if cell.interval is None:
-        return number(cell.change, 1)
-    low, high = cell.interval
-    return f"{cell.change:+.1f} ({low:+.1f} to {high:+.1f})"
 
 
 def plot(outcome: Benchmark) -> Figure:
@@ -292,9 +275,8 @@ def plot(outcome: Benchmark) -> Figure:
         above, below = part.subfigures(2, 1)
         forces, (sigmas, changes) = above.subplots(), below.subplots(1, 2)
         _forces(forces, outcome, k, lines_of)
-        cells = [
-            each for each in outcome.cells if each.place.line == (line.catenary, line.pantograph, line.case)
-        ]
+        own = line.catenary, line.pantograph, line.case
+        cells = [each for each in outcome.cells if each.place.line == own]
         _sigmas(sigmas, cells, lines_of)
         _changes(changes, cells, lines_of)
         where = f"pantograph {line.pantograph}, line {line.catenary}{line.case and f', {line.case}'}"
@@ -313,11 +295,10 @@ def _forces(axes: Axes, outcome: Benchmark, k: int, lines_of: Mapping[str, Mappi
     speed, seed = max(line.speeds_kmh), settings.drawn_seeds[0]
     first, last = outcome.windows[k].early
     shown = max(first, last - 1), last
-    rows = zip(outcome.rows, outcome.played, strict=True)
     place = (line.catenary, line.pantograph, line.case, speed, seed)
     actions = {
         row.policy: played
-        for row, played in rows
+        for row, played in zip(outcome.rows, outcome.played, strict=True)
         if (row.catenary, row.pantograph, row.case, row.speed_kmh, row.seed) == place
     }
     for policy, style in lines_of.items():
@@ -359,10 +340,9 @@ def _changes(axes: Axes, cells: list[Cell], lines_of: Mapping[str, Mapping[str, 
         for cell in _by_speed(cells, policy):
             x = cell.speed_kmh + apart * (k - (len(lines_of) - 1) / 2)
             low, high = cell.interval or (cell.change, cell.change)
-            colour = style["color"]
             axes.plot([x, x], [low, high], **style, linewidth=1.6)
-            fill = "white" if cell.disqualified else colour
-            axes.plot(x, cell.change, "o", color=colour, markerfacecolor=fill, markersize=5)
+            fill = "white" if cell.disqualified else style["color"]
+            axes.plot(x, cell.change, "o", color=style["color"], markerfacecolor=fill, markersize=5)
     axes.axhline(0.0, color="0.4", linewidth=0.9)
     axes.set(
         title="against a passive pantograph of the same mean force",
@@ -380,11 +360,8 @@ def _legend(panels: tuple[Axes, ...], cells: list[Cell]) -> tuple[list[Artist], 
     """Handles and labels of the legend that all panels of a line share."""
     from matplotlib.lines import Line2D
 
-    handles, labels = list[Any](), list[str]()
-    for axes in panels:
-        own = axes.get_legend_handles_labels()
-        handles += own[0]
-        labels += own[1]
+    own = [axes.get_legend_handles_labels() for axes in panels]
+    handles, labels = ([*chain(*each)] for each in zip(*own, strict=True))
     if any(cell.disqualified for cell in cells):
         handles.append(Line2D([], [], linestyle="", marker="o", color="0.4", markerfacecolor="white"))
         labels.append("disqualified")

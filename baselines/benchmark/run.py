@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -27,7 +28,7 @@ from panto_env.plant.catenary.schema import CLEAR
 from ..oracle.stored import stored_changes
 from . import actions, apart
 from .actions import Played, Trace
-from .overall import Standing, by_rank, method_of, standings, with_feedback
+from .overall import Standing, by_rank, method_of, standings
 from .settings import (
     ORACLE_TAPE,
     BenchmarkSettings,
@@ -52,8 +53,7 @@ from .single_pass import (
 )
 from .statistics import Cell, compare
 
-SUFFIXES = (*JSON, *TABLES)
-"""Suffixes of the files that an outcome can be saved to."""
+SUFFIXES = (*JSON, *TABLES)  # suffixes of the files that an outcome can be saved to
 PER_CORE = 2
 """Processes per core: a plant waits while its policy acts, in a process of its own, and vice versa."""
 
@@ -143,10 +143,10 @@ def run(
 
 def _learnt(jobs: Sequence[Callable[[], Pass]], passes: Sequence[Pass]) -> tuple[str, ...]:
     """Policies of Python files whose last and first pass, each played again alone, differ in a bit."""
-    own: dict[str, list[int]] = {}
+    own = defaultdict(list)
     for k, each in enumerate(passes):
         if each.row.policy.partition(":")[0].endswith(".py") and not control_of(each.row.policy):
-            own.setdefault(each.row.policy, []).append(k)
+            own[each.row.policy].append(k)
 
     def differs(k: int) -> bool:
         apart.close()
@@ -157,10 +157,11 @@ def _learnt(jobs: Sequence[Callable[[], Pass]], passes: Sequence[Pass]) -> tuple
 
 def _check_policies(settings: BenchmarkSettings) -> None:
     """Raise InputError for a policy that cannot be made, before any pass is run."""
+    policies = set()
     for line in settings.lines:
+        policies |= set(settings.policies_on(line))
         for speed in line.speeds_kmh if ORACLE_TAPE in settings.policies_on(line) else ():
             oracle_tape(settings, line, speed)
-    policies = {policy for line in settings.lines for policy in settings.policies_on(line)}
     for policy in policies - {ORACLE_TAPE}:
         apart.find_apart(policy_of(policy), settings.trusted)
 
@@ -183,24 +184,17 @@ def outcome_of(
     learnt: tuple[str, ...] = (),
 ) -> Benchmark:
     """Outcome of all passes; learnt: see ``compare``."""
+    oracles = {}
+    for line, covered in zip(settings.lines, windows, strict=True):
+        for speed in line.speeds_kmh:
+            changes = stored_changes(at_speed(along(settings, line), speed), covered.early)
+            oracles[LineAtSpeed(line.catenary, line.pantograph, speed, line.case)] = changes
     rows = tuple(each.row for each in passes)
     traces = tuple(each.trace for each in passes if each.trace is not None)
-    cells = compare(rows, stored_bounds(settings, windows), learnt)
+    cells = compare(rows, oracles, learnt)
     played = tuple(each.played for each in passes)
     standing = standings(rows, cells, settings.trainings)
     return Benchmark(settings, windows, rows, cells, standing, traces, played, learnt)
-
-
-def stored_bounds(
-    settings: BenchmarkSettings, windows: Sequence[Windows]
-) -> dict[LineAtSpeed, dict[int, float]]:
-    """Changes of sigma (%) of the stored oracles in the early window, by line and speed, and by seed."""
-    found = {}
-    for line, covered in zip(settings.lines, windows, strict=True):
-        for speed in line.speeds_kmh:
-            if changes := stored_changes(at_speed(along(settings, line), speed), covered.early):
-                found[LineAtSpeed(line.catenary, line.pantograph, speed, line.case)] = changes
-    return found
 
 
 def evaluated_windows(settings: BenchmarkSettings, line: Line) -> Windows:
@@ -255,11 +249,6 @@ class Result(BaseModel):
     def title(self) -> str:
         """Title from the benchmark's settings."""
         return str(self.settings.get("title", "benchmark"))
-
-    @property
-    def heading(self) -> str:
-        """The title, and that a tape is nearly as good as the best policy where it is."""
-        return with_feedback(self.title, self.standings)
 
     @property
     def policies(self) -> list[str]:

@@ -30,7 +30,7 @@ from panto_env.plant.line_condition import LINE_CONDITIONS
 from panto_env.plant.sensors import SensorSettings, sensor_settings
 from panto_env.policies import Policy, check_named, wishes
 
-from ..line import Actuator, Condition, LineAndTrain, Span, as_clause, distinct, of_run
+from ..line import Actuator, Condition, Distinct, LineAndTrain, Span, as_clause, distinct, of_run
 
 Number = Annotated[
     float,
@@ -48,7 +48,7 @@ class Windows(NamedTuple):
 
 
 class LineAtSpeed(NamedTuple):
-    """A line, the pantograph on it, its speed (km/h), and the case in which they run."""
+    """A line, the pantograph on it, its speed, and the case in which they run."""
 
     catenary: str
     pantograph: str
@@ -66,9 +66,21 @@ class LineAtSpeed(NamedTuple):
         return f"{self.pantograph} on {self.catenary}{self.case and f', {self.case}'}"
 
 
-TEST = range(1000)
-SELECTION = range(1000, 2000)
-TRAINING = range(2000, 1_000_000)
+class Placed:
+    """What belongs to a line, a pantograph on it, a speed and a case."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+    case: str
+
+    @property
+    def place(self) -> LineAtSpeed:
+        """Line, pantograph, speed and case."""
+        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh, self.case)
+
+
+TEST, SELECTION, TRAINING = range(1000), range(1000, 2000), range(2000, 1_000_000)
 # Above the seeds under which the benchmark records its tapes (``OTHER_SEED``).
 DATA = range(2_000_000, 3_000_000)
 Purpose = Literal["test", "selection", "training", "data"]
@@ -82,12 +94,12 @@ SALTED = range(2**52, 2**53)
 def check_seeds(seeds: Iterable[int], purpose: Purpose) -> None:
     """Raise InputError for a seed that is reserved for another purpose."""
     own = SEEDS[purpose]
-    wrong = next((seed for seed in seeds if seed not in own), None)
-    if wrong is not None:
-        raise InputError(
-            f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {wrong}: a policy must be trained, "
-            "selected and judged on different seeds."
-        )
+    for seed in seeds:
+        if seed not in own:
+            raise InputError(
+                f"Seeds for {purpose} are {own[0]:,} to {own[-1]:,}, not {seed}: a policy must be trained, "
+                "selected and judged on different seeds."
+            )
 
 
 def salted_seed(salt: str, number: int) -> int:
@@ -96,7 +108,7 @@ def salted_seed(salt: str, number: int) -> int:
     These are the first 8 bytes of the SHA-256 of "salt:number", modulo the size of their range.
     """
     digest = hashlib.sha256(f"{salt}:{number}".encode()).digest()
-    return SALTED.start + int.from_bytes(digest[:8], "big") % (SALTED.stop - SALTED.start)
+    return SALTED[int.from_bytes(digest[:8], "big") % len(SALTED)]
 
 
 def salt_hash(salt: str) -> str:
@@ -106,8 +118,7 @@ def salt_hash(salt: str) -> str:
 
 BLIND, TAPE = "blind of ", "tape of "
 ORACLE_TAPE = TAPE + "oracle"
-OTHER_SEED = 1_000_003
-"""Added to the seed of a pass, so that a tape is recorded on a different line."""
+OTHER_SEED = 1_000_003  # added to the seed of a pass, so that a tape is recorded on a different line
 
 
 def control_of(name: Any) -> str:
@@ -157,10 +168,7 @@ class Tape:
         return self._actions[step] if step < len(self._actions) else np.zeros_like(self._actions[0])
 
 
-REFERENCE = "passive"
-"""The policy that every other one is compared with."""
-
-
+REFERENCE = "passive"  # the policy that every other one is compared with
 _Sensors = SerializeAsAny[Annotated[SensorSettings, BeforeValidator(as_clause(sensor_settings))]]
 
 
@@ -177,7 +185,7 @@ class Line(LineAndTrain):
         description="first and last span that the figures cover, counted from 1; by default from the "
         "tenth, where the start has died out, to the last one that every run covers completely",
     )
-    policies: tuple[str, ...] = Field(
+    policies: Distinct[str] = Field(
         (), description="policies that run on this line only, in addition to those that run on every line"
     )
     case: str = Field("", max_length=40, description="name of the case, where one line has several")
@@ -196,24 +204,26 @@ class Line(LineAndTrain):
     @classmethod
     def _of_runs(cls, value: dict[str, Any]) -> dict[str, Any]:
         given = {*LineAndTrain.model_fields, "distance", "spans", "speed_kmh", "control_interval"}
-        unknown = next(
-            (name for name in value if name not in RunSettings.model_fields or name in given), None
-        )
-        if unknown is not None:
-            raise ValueError(f"has {shown(unknown)}, which is no setting that a case may change")
+        for name in value:
+            if name not in RunSettings.model_fields or name in given:
+                raise ValueError(f"has {shown(name)}, which is no setting that a case may change")
         return value
 
-    @field_validator("policies")
-    @classmethod
-    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return distinct(value)
+
+def _with_reference(policies: tuple[str, ...]) -> tuple[str, ...]:
+    return policies if REFERENCE in policies else (REFERENCE, *policies)
+
+
+def _for_tests(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    check_seeds(seeds, "test")
+    return seeds
 
 
 class BenchmarkSettings(Settings):
     """Policies, lines with speeds, and seeds. Every policy runs on the same lines, under the same noise."""
 
     title: str = Field("benchmark", description="what tables and pages call it")
-    policies: tuple[str, ...] = Field(
+    policies: Annotated[Distinct[str], AfterValidator(_with_reference)] = Field(
         ("passive", "p", "pd", "fb+ff"),
         description="names, with parameters (p:gain=0.5) or without, or model files, or controls of these: "
         "'blind of pd' sees nothing, 'tape of pd' plays its actions from another line; the passive "
@@ -225,7 +235,7 @@ class BenchmarkSettings(Settings):
         "on every line, and the method's result is over all of them",
     )
     lines: tuple[Line, ...] = Field((Line(),), min_length=1, description="lines, with pantograph and speeds")
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field(
+    seeds: Annotated[Distinct[Annotated[int, Field(ge=0)]], AfterValidator(as_clause(_for_tests))] = Field(
         tuple(range(5)),
         min_length=1,
         description="seeds, or their number, counted from 0; only those that are for tests",
@@ -266,8 +276,7 @@ class BenchmarkSettings(Settings):
 
     def policies_on(self, line: Line) -> tuple[str, ...]:
         """All policies that run on a line."""
-        trainings = chain.from_iterable(self.trainings.values())
-        return tuple(dict.fromkeys((*self.policies, *trainings, *line.policies)))
+        return tuple(dict.fromkeys(chain(self.policies, *self.trainings.values(), line.policies)))
 
     @field_validator("seeds", mode="before")
     @classmethod
@@ -278,36 +287,17 @@ class BenchmarkSettings(Settings):
             return tuple(range(value))
         return value
 
-    @field_validator("policies", "seeds")
-    @classmethod
-    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return distinct(value)
-
-    @field_validator("seeds")
-    @classmethod
-    def _for_tests(cls, value: tuple[int, ...]) -> tuple[int, ...]:
-        try:
-            check_seeds(value, "test")
-        except InputError as error:
-            raise ValueError(str(error).rstrip(".")) from error
-        return value
-
-    @field_validator("policies")
-    @classmethod
-    def _with_reference(cls, value: tuple[str, ...]) -> tuple[str, ...]:
-        return value if REFERENCE in value else (REFERENCE, *value)
-
     @field_validator("trainings")
     @classmethod
     def _of_several(cls, value: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-        few = next((method for method, trainings in value.items() if len(trainings) < 2), None)
-        if few is not None:
-            raise ValueError(f"{shown(few)} must have two trainings or more; a single one is a policy")
+        for method, trainings in value.items():
+            if len(trainings) < 2:
+                raise ValueError(f"{shown(method)} must have two trainings or more; a single one is a policy")
         return value
 
     @model_validator(mode="after")
     def _with_distinct_names(self) -> Self:
-        distinct((*self.policies, *self.trainings, *chain.from_iterable(self.trainings.values())))
+        distinct(tuple(chain(self.policies, self.trainings, *self.trainings.values())))
         # Rows and cells tell lines apart by these.
         distinct(tuple(filter(None, (line.case for line in self.lines))))
         distinct(tuple((line.catenary, line.pantograph, line.case) for line in self.lines))

@@ -41,6 +41,7 @@ from .settings import (
     BenchmarkSettings,
     Blind,
     Line,
+    Placed,
     Tape,
     Windows,
     control_of,
@@ -71,22 +72,17 @@ def passive_at_mean_of(
 def by_kilometre(run: Trajectory, passive: Trajectory, spans: tuple[int, int]) -> tuple[float, ...]:
     """Relative change of sigma from a passive run in each whole kilometre of the spans."""
     begin, end = run.alignment.limits(spans)
-    forces = [low_pass(own.contact_force, own.time_step) for own in (run, passive)]
-    found = []
-    for place in np.arange(begin, end - KILOMETRE + 1e-6, KILOMETRE):
-        std, than = (
-            force[(own.position >= place) & (own.position < place + KILOMETRE)].std()
-            for force, own in zip(forces, (run, passive), strict=True)
-        )
-        found.append(float(std / than - 1))
-    return tuple(found)
+    places = np.arange(begin, end - KILOMETRE + 1e-6, KILOMETRE)
+
+    def deviations(own: Trajectory) -> Array:
+        force, x = low_pass(own.contact_force, own.time_step), own.position
+        return np.array([force[(x >= place) & (x < place + KILOMETRE)].std() for place in places])
+
+    return tuple((deviations(run) / deviations(passive) - 1).tolist())
 
 
 KILOMETRE = 1000.0
-FULL = 0.999
-"""Share of the actuator's maximum force above which a command counts as saturated."""
-
-
+FULL = 0.999  # share of the actuator's maximum force above which a command counts as saturated
 OWN_LABELS = {
     "action_rate": Label("rate of the commanded force, rms", "rate", "N/s"),
     "saturation": Label("share of commands at the limit", "at limit", "-"),
@@ -101,14 +97,11 @@ ROW_HEADINGS = {
     **{f"mean_{number}": f"mean_{number} (N)" for number in range(1, MOST_COLLECTORS + 1)},
 }
 """Headings with units, in files of tables, of what ``Row`` has beside the figures of a run."""
-
-
-LATE = "late_"
-"""Before the names of figures of the late window."""
+LATE = "late_"  # before the names of figures of the late window
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(Placed):
     """Figures of one pass in one window; all are nan if it ended early (``terminated``)."""
 
     policy: str
@@ -150,23 +143,11 @@ class Row:
         late = {} if self.late is None else self.late.numbers
         return self.figures.as_dict() | own | each | {f"{LATE}{name}": late[name] for name in late}
 
-    @property
-    def _kilometres(self) -> dict[str, float]:
-        return {f"km_{number}": change for number, change in enumerate(self.kilometres, start=1)}
-
     def as_dict(self) -> dict[str, Any]:
         """What identifies the pass, and its figures, in one table."""
-        names = (
-            "policy",
-            "catenary",
-            "pantograph",
-            "case",
-            "speed_kmh",
-            "seed",
-            "nominal_force",
-            "terminated",
-        )
-        return {name: getattr(self, name) for name in names} | self.numbers | self._kilometres
+        names = "policy catenary pantograph case speed_kmh seed nominal_force terminated"
+        kilometres = {f"km_{number}": change for number, change in enumerate(self.kilometres, start=1)}
+        return {name: getattr(self, name) for name in names.split()} | self.numbers | kilometres
 
 
 class Pass(NamedTuple):
@@ -196,7 +177,8 @@ def run_pass(
     Raises InputError, naming the policy, if the policy fails.
     """
     first, recorders = _record(settings, line, policy, speed_kmh, seed, played)
-    judge = partial(_judged, settings, line, policy, speed_kmh, seed, first, recorders)
+    arguments = _arguments(settings, line, speed_kmh, seed)
+    judge = partial(_judged, settings, line, policy, speed_kmh, arguments, first, recorders)
     row = judge(windows.early)
     if windows.late is not None:
         row = replace(row, late=judge(windows.late))
@@ -210,7 +192,7 @@ def _judged(
     line: Line,
     policy: str,
     speed_kmh: float,
-    seed: int,
+    arguments: dict[str, Any],
     first: Trajectory,
     recorders: list[_CommandRecorder],
     spans: tuple[int, int],
@@ -225,16 +207,15 @@ def _judged(
     action_rate = saturation = watts = float("nan")
     if not run.terminated:
         figures = run.summary(spans)
-        interval = along(settings, line)["control_interval"]
+        interval = arguments["control_interval"]
         commands = _within(recorder.forces(), run, spans, interval)
         changes = np.diff(commands, axis=0) / interval
         action_rate = float(np.sqrt(np.mean((changes**2).sum(axis=1))))
         saturation = float(np.mean(np.abs(commands) >= FULL * recorder.force_limit))
         watts = run.mechanical_power(spans)
-        arguments = _arguments(settings, line, speed_kmh, seed)
         if "spans" in arguments:  # the line is given, so the passive run may end where its figures do
             behind = sum(line.distances) + SHORT_SPAN
-            arguments["distance"] = run.alignment.limits(spans)[1] + behind
+            arguments = arguments | {"distance": run.alignment.limits(spans)[1] + behind}
         passive = run if policy == REFERENCE else passive_at_mean_of(first, spans, arguments)
     pressed = Figures.none() if passive is None else passive.summary(spans)
     return Row(
@@ -242,7 +223,7 @@ def _judged(
         catenary=line.catenary,
         pantograph=line.pantograph,
         speed_kmh=speed_kmh,
-        seed=seed,
+        seed=arguments["seed"],
         nominal_force=run.nominal_force,
         terminated=run.terminated,
         figures=figures,
@@ -283,8 +264,7 @@ def _within(commands: Array, run: Trajectory, spans: tuple[int, int], interval: 
     steps = round(interval / run.time_step)
     inside = np.zeros(max(len(commands) * steps, len(run.time)), dtype=np.bool_)
     inside[len(inside) - len(run.time) :] = run.inside(spans)
-    within: Array = commands[inside[len(inside) - len(commands) * steps :][::steps]]
-    return within
+    return np.asarray(commands[inside[len(inside) - len(commands) * steps :][::steps]])
 
 
 def _record(
@@ -438,12 +418,13 @@ def played_by(recorders: Sequence[_CommandRecorder]) -> Played:
 @contextmanager
 def _torch_on_one_thread() -> Iterator[None]:
     """Other passes need the cores, and results must not depend on how many of them are free."""
-    torch = sys.modules.get("torch")  # None unless a policy has imported it
-    threads = torch.get_num_threads() if torch else 0
+    torch = sys.modules.get("torch")
+    if torch is None:  # no policy has imported it
+        yield
+        return
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
     try:
-        if torch:
-            torch.set_num_threads(1)
         yield
     finally:
-        if torch:
-            torch.set_num_threads(threads)
+        torch.set_num_threads(threads)

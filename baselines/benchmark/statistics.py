@@ -22,13 +22,12 @@ from panto_env.base.arrays import Array
 from panto_env.base.errors import beside
 
 from .harm import Harm, harm_of, harmful, relative, window_changes
-from .settings import REFERENCE, LineAtSpeed, Number
+from .settings import REFERENCE, LineAtSpeed, Number, Placed
 from .single_pass import Row
 
 Interval = tuple[FiniteFloat, FiniteFloat]
 
-TRIM = 0.25
-"""Share of the values that the interquartile mean leaves out at each end."""
+TRIM = 0.25  # share of the values that the interquartile mean leaves out at each end
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 ROUNDING = 1e-12
@@ -57,10 +56,7 @@ class Share:
     @property
     def between(self) -> str:
         """The interval in words, in percent; "" without one."""
-        if self.interval is None:
-            return ""
-        low, high = self.interval
-        return f"{100 * low:.0f} to {100 * high:.0f}"
+        return "{:.0f} to {:.0f}".format(*(100 * end for end in self.interval)) if self.interval else ""
 
     def __str__(self) -> str:
         return f"{100 * self.share:.0f} %{f' ({self.between})' if self.interval else ''}"
@@ -98,14 +94,13 @@ def interval_of_mean(values: Array, clusters: Clusters) -> Interval | None:
     rows = np.atleast_2d(values)
     if np.isnan(rows).any():
         return None
-    drawn = _drawn(clusters)
-    if drawn.freedom < 1:
+    counts, seeds, freedom = _drawn(clusters)
+    if freedom < 1:
         return None
-    means = np.mean([_interquartile_means(row, drawn.counts) for row in rows], axis=0)
+    means = np.mean([_interquartile_means(row, counts) for row in rows], axis=0)
     # Half of what lies between is a standard deviation that a few far-off resamples do not stretch.
     low, high = np.quantile(means, norm.cdf((-1.0, 1.0)))
-    own = np.array([interquartile_mean(row) for row in rows])
-    return _around(own, _Part(float((high - low) / 2) ** 2 * drawn.correction, drawn.freedom))
+    return _around(rows, _Part(float((high - low) / 2) ** 2 * (seeds / freedom), freedom))
 
 
 def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
@@ -117,12 +112,12 @@ def interval_for_lines(values: Array, clusters: Clusters) -> Interval | None:
     lines = [rows[:, clusters.line == line].mean() for line in np.unique(clusters.line)]
     if np.isnan(rows).any() or len(lines) < 3:
         return None
+    return _around(rows, _Part(float(np.var(lines, ddof=1)) / len(lines), len(lines) - 1))
+
+
+def _around(rows: Array, drawn: _Part) -> Interval | None:
+    """Interval about the mean of the means of (trainings, n) values, by the variance of what is drawn."""
     own = np.array([interquartile_mean(row) for row in rows])
-    return _around(own, _Part(float(np.var(lines, ddof=1)) / len(lines), len(lines) - 1))
-
-
-def _around(own: Array, drawn: _Part) -> Interval | None:
-    """Interval about the mean of the trainings' means, (trainings,), by the variance of what is drawn."""
     parts = [drawn, *_between(own)]
     variance = sum(part.variance for part in parts)
     if variance < ROUNDING:
@@ -139,43 +134,34 @@ def share_of(wins: NDArray[np.bool_], clusters: Clusters) -> Share:
     nothing varies, as where all passes are won, it is the geometric mean of the numbers of seeds and passes.
     """
     share, passes = float(wins.mean()), wins.shape[-1]
-    drawn = _drawn(clusters)
-    if drawn.freedom < 1:
+    counts, seeds, freedom = _drawn(clusters)
+    if freedom < 1:
         return Share(share, None)
-    shares = wins.mean(axis=(0, 1)) @ drawn.counts / passes
+    shares = wins.mean(axis=(0, 1)) @ counts / passes
     parts = [
-        _Part(float(shares.var()) * drawn.correction, drawn.freedom),
+        _Part(float(shares.var()) * (seeds / freedom), freedom),
         *_between(wins.mean(axis=(1, 2))),
         *_between(wins.mean(axis=(0, 2))),
     ]
     variance = sum(part.variance for part in parts)
     varies = variance > ROUNDING
-    number = share * (1 - share) / variance if varies else (drawn.seeds * passes) ** 0.5
+    number = share * (1 - share) / variance if varies else (seeds * passes) ** 0.5
     z = _quantile(parts) ** 2 / number
     middle = (share + z / 2) / (1 + z)
     half = (z * (share * (1 - share) + z / 4)) ** 0.5 / (1 + z)
     return Share(share, (max(0.0, middle - half), min(1.0, middle + half)))
 
 
-class _Drawn(NamedTuple):
-    """How often each of n passes is in each of many resamples."""
+def _drawn(clusters: Clusters) -> tuple[NDArray[np.int32], int, int]:
+    """How often each pass is in each of many resamples, (n, resamples), numbers of seeds and of freedoms.
 
-    counts: NDArray[np.int32]  # (n, resamples)
-    seeds: int  # of all lines together
-    freedom: int  # degrees of freedom of the variance between them
-
-    @property
-    def correction(self) -> float:
-        """Variance by that of resamples: means of n values drawn from n vary by (n - 1) / n too little."""
-        return self.seeds / self.freedom
-
-
-def _drawn(clusters: Clusters) -> _Drawn:
-    """Resamples: the seeds of each line are drawn with replacement, as many as there are."""
+    The seeds of each line are drawn with replacement, as many as there are. By the degrees of freedom the
+    variance of resamples is corrected: means of n values drawn from n vary by (n - 1) / n too little.
+    """
     found, number = np.unique(np.stack(clusters, axis=1), axis=0, return_inverse=True)
     _, seeds = np.unique(found[:, 0], return_counts=True)
     counts = _counts(tuple(seeds.tolist()))[number.ravel()]
-    return _Drawn(counts, len(found), len(found) - len(seeds))
+    return counts, len(found), len(found) - len(seeds)
 
 
 @lru_cache
@@ -194,8 +180,7 @@ def _interquartile_means(values: Array, counts: NDArray[np.int32]) -> Array:
     kept = np.clip(up_to, cut, up_to[-1] - cut)
     kept[1:] -= kept[:-1].copy()
     kept[0] -= cut
-    means: Array = values[order] @ kept / kept.sum(axis=0)
-    return means
+    return np.asarray(values[order] @ kept / kept.sum(axis=0))
 
 
 def _between(means: Array) -> list[_Part]:
@@ -214,8 +199,7 @@ def _quantile(parts: Sequence[_Part]) -> float:
     return float(t.ppf((1 + CONFIDENCE) / 2, freedom))
 
 
-MOVED = 0.015
-"""Share by which a policy may move the mean force from that of its own passive run."""
+MOVED = 0.015  # share by which a policy may move the mean force from that of its own passive run
 MOVED_AT_MOST = 0.05
 """Share by which a policy may not move it in any pass, or it could do as it likes in one pass of four.
 
@@ -232,7 +216,7 @@ ADVICE = "a policy's attribute washout = 1.0 keeps the mean"
 
 
 @dataclass(frozen=True)
-class Cell:
+class Cell(Placed):
     """One policy on one line at one speed, over all seeds; changes are relative, pass by pass.
 
     "At the same mean": a passive pantograph on the same line with the mean force of the policy's own pass.
@@ -264,11 +248,6 @@ class Cell:
     disqualified: str  # the reason, or "" if the policy qualifies
     rank: int | None  # by ``change`` among the policies that qualify, from 1
 
-    @property
-    def place(self) -> LineAtSpeed:
-        """Line, pantograph and speed."""
-        return LineAtSpeed(self.catenary, self.pantograph, self.speed_kmh, self.case)
-
 
 def mean_range(passive: float) -> tuple[float, float]:
     """Minimum and maximum mean force (N) that qualify, for a passive mean (N)."""
@@ -287,26 +266,15 @@ def compare(
     """
     groups: dict[LineAtSpeed, dict[str, list[Row]]] = {}
     for row in rows:
-        group = groups.setdefault(LineAtSpeed(row.catenary, row.pantograph, row.speed_kmh, row.case), {})
-        group.setdefault(row.policy, []).append(row)
-    return tuple(
-        cell
-        for place, rows_of_policies in groups.items()
-        for cell in _ranked_cells(rows_of_policies, oracles.get(place, {}), learnt)
-    )
-
-
-def _ranked_cells(
-    rows_of_policies: dict[str, list[Row]], oracle: Mapping[int, float], learnt: Collection[str]
-) -> list[Cell]:
-    """Cells of all policies on one line at one speed."""
-    passive_rows = rows_of_policies[REFERENCE]
-    cells = [_cell(rows, passive_rows, oracle) for rows in rows_of_policies.values()]
-    cells = [replace(cell, disqualified=LEARNT) if cell.policy in learnt else cell for cell in cells]
-    changes = sorted(cell.change for cell in cells if not cell.disqualified)
-    return [
-        cell if cell.disqualified else replace(cell, rank=1 + changes.index(cell.change)) for cell in cells
-    ]
+        groups.setdefault(row.place, {}).setdefault(row.policy, []).append(row)
+    found: list[Cell] = []
+    for place, of_policies in groups.items():
+        cells = [_cell(own, of_policies[REFERENCE], oracles.get(place, {})) for own in of_policies.values()]
+        cells = [replace(cell, disqualified=LEARNT) if cell.policy in learnt else cell for cell in cells]
+        changes = sorted(cell.change for cell in cells if not cell.disqualified)
+        ranks = [None if cell.disqualified else 1 + changes.index(cell.change) for cell in cells]
+        found += [replace(cell, rank=rank) for cell, rank in zip(cells, ranks, strict=True)]
+    return tuple(found)
 
 
 def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float]) -> Cell:
@@ -329,6 +297,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
     ]
     reached, bound = np.mean(both, axis=0).tolist() if both else (0.0, None)
     harm = harm_of(rows, passive_rows)
+    kilometres = [row.kilometres for row in rows]  # as many count as all passes have
     return Cell(
         policy=first.policy,
         catenary=first.catenary,
@@ -351,7 +320,7 @@ def _cell(rows: list[Row], passive_rows: list[Row], oracle: Mapping[int, float])
         oracle_share=None if bound is None else 100 * reached / bound + 0.0,  # no minus zero
         spread=float(100 * sigma.std(ddof=1) / sigma.mean()) if len(sigma) > 1 else float("nan"),
         harm=harm,
-        kilometres=_by_kilometre(rows),
+        kilometres=tuple(100 * interquartile_mean(np.array(each)) for each in zip(*kilometres, strict=False)),
         disqualified=_disqualification(rows, passive_rows, means) or harmful(harm, early, late),
         rank=None,
     )
@@ -364,14 +333,6 @@ def relative_changes(rows: Sequence[Row]) -> Array:
     """
     # One by one: not all lines need have a late window.
     return np.array([window_changes([row]).mean() for row in rows])
-
-
-def _by_kilometre(rows: Sequence[Row]) -> tuple[float, ...]:
-    """Interquartile means (%) over the rows, for as many kilometres as all of them have."""
-    count = min(len(row.kilometres) for row in rows)
-    return tuple(
-        100 * interquartile_mean(np.array([row.kilometres[k] for row in rows])) for k in range(count)
-    )
 
 
 def _moved_means(rows: Sequence[Row], passive_rows: Sequence[Row]) -> Array:
@@ -408,8 +369,7 @@ def _disqualification(rows: list[Row], passive_rows: list[Row], means: Array) ->
 
     means: relative changes of the mean force, (windows, rows).
     """
-    ended_early = sum(row.terminated for row in rows)
-    if ended_early:
+    if ended_early := sum(row.terminated for row in rows):
         return f"{ended_early} of {len(rows)} runs ended early, outside the plant's range"
     if any(row.terminated for row in passive_rows):
         return "the passive pantograph's runs ended early: there is nothing to compare with"

@@ -62,17 +62,17 @@ def replay(
         kept = actions.read(actions.beside(result), expected)
         named = [row["policy"] for row in rows]
         learnt = tuple(table.get("learnt", ()))
+    except InputError:
+        raise
     except (LookupError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"{result} is no result of `panto benchmark --output RESULT.json`.") from error
     if not len(rows) == len(passes) == len(kept):
         raise InputError(
             f"{result} has {len(rows)} rows and the actions of {len(kept)} passes; make it again."
         )
-    unknown = next((policy for policy in policies if policy not in named), None)
-    if unknown is not None:
-        raise InputError(f"{result} has no policy '{unknown}': it has {', '.join(dict.fromkeys(named))}.")
+    for policy in policies:
+        if policy not in named:
+            raise InputError(f"{result} has no policy '{policy}': it has {', '.join(dict.fromkeys(named))}.")
     chosen = [k for k, policy in enumerate(named) if not policies or policy in policies]
     first = settings.drawn_seeds[0]
     jobs = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -40,8 +40,16 @@ def front_matter(title: str, file: str, rows: int, task: str, tags: Sequence[str
     ]
 
 
-TABLE = "designs.parquet"
-"""Name of the table in its folder."""
+def made_by(made_of: Mapping[str, Any]) -> list[str]:
+    """Lines that say what made the data, by its identity."""
+    return [
+        f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
+        f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
+        "",
+    ]
+
+
+TABLE = "designs.parquet"  # name of the table in its folder
 
 
 class Column(NamedTuple):
@@ -54,9 +62,9 @@ class Column(NamedTuple):
 
 def columns(settings: DesignsSettings) -> list[Column]:
     """All columns, in order."""
-    labels, figures = settings.labels(), [(name, LABELS[name]) for name in FIGURES]
+    figures = [(name, LABELS[name]) for name in FIGURES]
     drawn = [
-        Column(name, "float64", f"{labels[name]}, drawn from {low:g} to {high:g}")
+        Column(name, "float64", f"{settings.label(name)}, drawn from {low:g} to {high:g}")
         for name, (low, high) in settings.ranges.items()
     ]
     return [
@@ -77,7 +85,6 @@ def card_of_designs(
     settings: DesignsSettings, shown: Sequence[Column], table: Any, made_of: Mapping[str, Any]
 ) -> str:
     """Text of the card, as Markdown. shown: columns to describe. table: Arrow table."""
-    kinds = {name: _reasons(table[name].to_pylist()) for name in ("refused", "ending", "accuracy_warning")}
     lines = [
         *front_matter(settings.title, TABLE, table.num_rows, "tabular-regression", ("surrogate-model",)),
         f"# {settings.title}",
@@ -91,18 +98,16 @@ def card_of_designs(
         "is longer or shorter, droppers keep their positions relative to it. Parameters without a range are "
         "as in the catalogue.",
         "",
-        f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
-        f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
-        "",
+        *made_by(made_of),
         "| column | description | minimum | median | maximum |",
         "|---|---|---:|---:|---:|",
         *(f"| `{each.name}` | {each.description} | {_spread(table, each)} |" for each in shown),
         "",
         "No design is left out: one that was refused, or whose run ended early, has a row that says so.",
         "",
-        *_endings("refused", "refused", kinds["refused"], table.num_rows),
-        *_endings("ending", "ended early", kinds["ending"], table.num_rows),
-        *_endings("accuracy_warning", "with a warning", kinds["accuracy_warning"], table.num_rows),
+        *_endings(table, "refused", "refused"),
+        *_endings(table, "ending", "ended early"),
+        *_endings(table, "accuracy_warning", "with a warning"),
         "",
         "Caveats: simulated, not measured; grid and time step are chosen so that the standard deviation is "
         "within 1 % of its converged value up to 95 % of the wave speed, where no warning says more; a model "
@@ -122,20 +127,14 @@ def _spread(table: Any, column: Column) -> str:
     return " | ".join(f"{float(f'{each:.4g}'):g}" for each in (values.min(), np.median(values), values.max()))
 
 
-def _reasons(texts: Sequence[str]) -> list[tuple[str, int]]:
-    """Reasons with their counts; texts that differ only in numbers count as one reason."""
-    same: dict[str, list[str]] = {}
-    for text in texts:
-        if text:
-            same.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "#", text), []).append(text)
-    counts = Counter({group[0]: len(group) for group in same.values()})
-    return counts.most_common()
-
-
-def _endings(column: str, words: str, reasons: Sequence[tuple[str, int]], count: int) -> list[str]:
-    number = sum(each for _, each in reasons)
-    head = f"- {number:,} of {count:,} {words} (`{column}`){':' if reasons else '.'}"
-    return [head, *(f"  - {each:,} such as: {text}" for text, each in reasons)]
+def _endings(table: Any, column: str, words: str) -> list[str]:
+    """Reasons of a column with their counts; texts that differ only in numbers count as one reason."""
+    texts = [text for text in table[column].to_pylist() if text]
+    kinds = [re.sub(r"[-+]?\d[\d.e+-]*", "#", text) for text in texts]
+    first = dict(zip(reversed(kinds), reversed(texts), strict=True))  # text of each kind
+    counts = Counter(first[kind] for kind in kinds)
+    head = f"- {len(texts):,} of {table.num_rows:,} {words} (`{column}`){':' if texts else '.'}"
+    return [head, *(f"  - {each:,} such as: {text}" for text, each in counts.most_common())]
 
 
 REWARD = (
@@ -174,9 +173,7 @@ def card_of_episodes(
         "",
         description(settings, policy_set),
         "",
-        f"Made by panto-env {made_of['version']}, commit {made_of['commit'] or 'unknown'}, sources "
-        f"{made_of['sources']}. Licence: MIT. `panto dataset verify` checks the files.",
-        "",
+        *made_by(made_of),
         "| policy | noise | line | episodes | steps | return | σ (N) | mean force (N) | ended early |",
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
         *_table(settings, rows),
@@ -216,11 +213,11 @@ def summary(episode: Episode) -> dict[str, float]:
 
 
 def _table(settings: EpisodesSettings, rows: Sequence[tuple[Plan, Mapping[str, Any]]]) -> list[str]:
-    kinds = dict.fromkeys((plan.policy, plan.noise, plan.place) for plan, _ in rows)
+    kinds = defaultdict(list)
+    for plan, figures in rows:
+        kinds[plan.policy, plan.noise, plan.place].append(figures)
     lines = []
-    for kind in kinds:
-        own = [figures for plan, figures in rows if (plan.policy, plan.noise, plan.place) == kind]
-        policy, noise, place = kind
+    for (policy, noise, place), own in kinds.items():
         steps, early = (int(sum(each[name] for each in own)) for name in ("steps", "terminated"))
         means = [np.mean([each[name] for each in own]) for name in ("return", "std", "mean")]
         lines.append(

@@ -54,9 +54,9 @@ def episodes(
     if json:
         print_json([asdict(each) | {"folder": str(each.folder)} for each in made])
         return
-    rows = tuple(
+    rows = [
         (each.dataset_id, f"{each.episodes:,}", f"{each.steps:,}", f"{each.megabytes:.1f}") for each in made
-    )
+    ]
     print_table(Table("data sets", ("Minari's name", "episodes", "steps", "MB"), rows))
     console.print(f"MINARI_DATASETS_PATH={output.resolve()}", highlight=False)
 

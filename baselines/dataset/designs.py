@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -22,11 +23,10 @@ from panto_env.base.settings import Settings, parse
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.metrics.figures import Figures
 
-from ..line import of_run
+from ..line import as_clause, of_run
 
 SPAN_LENGTH = "catenary.span_length"
-MOST = 2**20
-"""Maximum number of designs of a table: some hours on many cores."""
+MOST = 2**20  # maximum number of designs of a table: some hours on many cores
 
 
 class DesignsSettings(Settings):
@@ -60,37 +60,26 @@ class DesignsSettings(Settings):
                 continue
             if family not in entries:
                 raise ValueError(f"{name} must be {SPEED} or begin with 'catenary.' or 'pantograph.'")
-            try:
-                check_name(name, entries[family])
-            except InputError as error:
-                raise ValueError(str(error).rstrip(".")) from error
+            as_clause(partial(check_name, name))(entries[family])
         return self
 
     def entries(self) -> Mapping[str, Any]:
         """Line and pantograph of the catalogue that the designs vary, by family."""
         return {"catenary": load_catenary(self.catenary), "pantograph": load_pantograph(self.pantograph)}
 
-    def labels(self) -> dict[str, str]:
-        """Description of each parameter, with its unit."""
-        entries = self.entries()
-        return {
-            name: "speed of the train (km/h)"
-            if name == SPEED
-            else _label(name, entries[name.partition(".")[0]])
-            for name in self.ranges
-        }
-
-
-def _label(name: str, entry: Settings) -> str:
-    """Description of a parameter of an entry, with its unit, from its schema."""
-    words = []
-    for key in name.split(".")[1:]:
-        if isinstance(entry, Settings):
-            words.append(type(entry).model_fields[key].description or key.replace("_", " "))
-            entry = getattr(entry, key)
-        else:
-            words[-1] = f"place {key} of {words[-1]}"
-    return ": ".join(words)
+    def label(self, name: str) -> str:
+        """Description of a parameter, with its unit, from its schema."""
+        if name == SPEED:
+            return "speed of the train (km/h)"
+        family, *keys = name.split(".")
+        entry, words = self.entries()[family], list[str]()
+        for key in keys:
+            if isinstance(entry, Settings):
+                words.append(type(entry).model_fields[key].description or key.replace("_", " "))
+                entry = getattr(entry, key)
+            else:
+                words[-1] = f"place {key} of {words[-1]}"
+        return ": ".join(words)
 
 
 def load_designs(path: str | Path) -> DesignsSettings:
@@ -119,17 +108,13 @@ def draw(settings: DesignsSettings, first: int, last: int) -> Array:
             sequence.fast_forward(first)
         points = sequence.random(last - first)
     low, high = np.array(list(settings.ranges.values())).T
-    values: Array = low + points * (high - low)
-    return values
+    return np.asarray(low + points * (high - low))
 
 
 def simulate_designs(settings: DesignsSettings, first: int, last: int, path: Path) -> None:
     """Simulate the designs first to last - 1 and write their rows to a JSON file, whole or not at all."""
-    values = draw(settings, first, last).tolist()
-    rows = [
-        design(settings, first + k, dict(zip(settings.ranges, each, strict=True)))
-        for k, each in enumerate(values)
-    ]
+    values = [dict(zip(settings.ranges, each, strict=True)) for each in draw(settings, first, last).tolist()]
+    rows = [design(settings, number, each) for number, each in enumerate(values, start=first)]
     write_checked(path, {"rows": rows})
 
 
@@ -146,17 +131,20 @@ def design(settings: DesignsSettings, number: int, values: dict[str, float]) -> 
             return row | {"refused": str(error)}
     found = dict.fromkeys(str(each.message) for each in caught if issubclass(each.category, AccuracyWarning))
     figures = {} if run.terminated else run.summary().as_dict()
-    outcome = {
-        "ending": run.ending,
-        "accuracy_warning": " ".join(found),
-        "nominal_force": run.nominal_force,
-        "wave_speed": run.line.wave_speed,
-        "time_step": run.time_step,
-        "spacing": run.identity.spacing,
-    }
     # One that the run does not have, such as uplift on a line without supports, is null.
-    kept = {name: figures[name] for name in FIGURES if name in figures}
-    return row | outcome | {name: None if np.isnan(value) else value for name, value in kept.items()}
+    kept = {name: figures[name] for name in FIGURES if not np.isnan(figures.get(name, np.nan))}
+    return (
+        row
+        | kept
+        | {
+            "ending": run.ending,
+            "accuracy_warning": " ".join(found),
+            "nominal_force": run.nominal_force,
+            "wave_speed": run.line.wave_speed,
+            "time_step": run.time_step,
+            "spacing": run.identity.spacing,
+        }
+    )
 
 
 def designed(settings: DesignsSettings, values: dict[str, float]) -> tuple[Settings, Settings]:

@@ -67,10 +67,8 @@ def record(settings: EpisodesSettings, plans: Sequence[Plan], path: Path) -> Non
     arrays: dict[str, NDArray[Any]] = {}
     stage = Stage(settings)
     for plan in plans:
-        episode = stage.play(plan)
-        for name, value in episode._asdict().items():
-            values = value if isinstance(value, dict) else {"": value}
-            for key, array in values.items():
+        for name, value in stage.play(plan)._asdict().items():
+            for key, array in (value if isinstance(value, dict) else {"": value}).items():
                 arrays[f"{plan.number}|{name}|{key}"] = np.asarray(array)
     write_arrays(path, {}, arrays)
 
@@ -194,10 +192,8 @@ def _kept(info: dict[str, Any], policy_action: NDArray[Any]) -> dict[str, Any]:
     return {name: info[name] for name in INFOS} | terms | {"policy_action": policy_action}
 
 
-STEPS = "steps.parquet"
-"""Name of the table in a data set's folder."""
-PER_GROUP = 100
-"""Episodes per row group."""
+STEPS = "steps.parquet"  # name of the table in a data set's folder
+PER_GROUP = 100  # episodes per row group
 
 
 COLUMNS = {
@@ -218,7 +214,6 @@ class StepsTable:
     """Writes the table; a context manager."""
 
     def __init__(self, path: Path) -> None:
-        """path: of the file to write."""
         self._path = path
         self._writer: Any = None
         self._waiting: list[Any] = []
@@ -274,8 +269,7 @@ def _column(array: Any) -> Any:
     return pa.FixedSizeListArray.from_arrays(pa.array(array.ravel()), array.shape[1])
 
 
-KEY = "panto_env"
-"""Key of a data set's identity in its metadata."""
+KEY = "panto_env"  # key of a data set's identity in its metadata
 
 
 def write_minari(
@@ -302,51 +296,37 @@ def write_minari(
         data, env_spec=env.spec, observation_space=env.observation_space, action_space=env.action_space
     )
     env.close()
-    version = f"panto-env {made_of['version']}"
-    noises = sorted(noise for noise in policy_set.noise if noise)
-    added = f", with white noise of rms {', '.join(f'{noise:g}' for noise in noises)} on the action"
+    commit = f", commit {made_of['commit']}" if made_of["commit"] else ""
+    noises = ", ".join(f"{noise:g}" for noise in sorted(policy_set.noise) if noise)
+    added = f", with white noise of rms {noises} on the action" if noises else ""
     storage.update_metadata(
         {
             "dataset_id": settings.dataset_id(policy_set),
             "minari_version": minari.__version__,
             "author": {settings.author},
-            "algorithm_name": " and ".join(policy_set.policies) + (added if noises else ""),
-            "code_permalink": f"{version}, commit {made_of['commit']}" if made_of["commit"] else version,
+            "algorithm_name": " and ".join(policy_set.policies) + added,
+            "code_permalink": f"panto-env {made_of['version']}{commit}",
             "description": description,
             "requirements": [f"panto-env=={__version__}"],
             KEY: dict(made_of),
         }
     )
     for plan, episode in episodes:
-        storage.update_episodes(
-            [
-                EpisodeBuffer(
-                    seed=plan.seed,
-                    options=settings.options(plan) or None,
-                    observations=episode.observations,
-                    actions=episode.actions,
-                    rewards=episode.rewards,
-                    terminations=episode.terminations,
-                    truncations=episode.truncations,
-                    infos=_nested(episode.infos),
-                )
-            ]
-        )
-        storage.update_episode_metadata([_facts(settings, plan, episode)], [plan.number])
-
-
-def _facts(settings: EpisodesSettings, plan: Plan, episode: Episode) -> dict[str, Any]:
-    """Metadata of an episode; figures that it does not have are infinite."""
-    place = settings.places[plan.place]
-    facts = {
-        "policy": plan.policy,
-        "noise": plan.noise,
-        "catenary": place.catenary,
-        "pantograph": place.pantograph,
-        "speed_kmh": float(episode.infos["speed_kmh"][0]),
-        "return": float(np.sum(episode.rewards)),
-    }
-    return facts | {f"figures/{name}": value for name, value in episode.figures.items()}
+        kept = episode._asdict() | {"infos": _nested(episode.infos)}
+        figures = kept.pop("figures")  # those that the episode does not have are infinite
+        options = settings.options(plan) or None
+        storage.update_episodes([EpisodeBuffer(seed=plan.seed, options=options, **kept)])
+        place = settings.places[plan.place]
+        facts = {
+            "policy": plan.policy,
+            "noise": plan.noise,
+            "catenary": place.catenary,
+            "pantograph": place.pantograph,
+            "speed_kmh": float(episode.infos["speed_kmh"][0]),
+            "return": float(np.sum(episode.rewards)),
+        }
+        facts |= {f"figures/{name}": value for name, value in figures.items()}
+        storage.update_episode_metadata([facts], [plan.number])
 
 
 def _nested(infos: Mapping[str, Any]) -> dict[str, Any]:

@@ -81,9 +81,11 @@ def _verify(folder: Path) -> int:
                 f"{folder / name} does not match {LIST}: it was damaged or changed; make or download the "
                 "data set anew."
             )
-    extra = next((name for name in found if name not in listed), None)
-    if extra is not None:
-        raise InputError(f"{folder / extra} is not in {LIST}; move it elsewhere, it is not part of the data.")
+    for name in found:
+        if name not in listed:
+            raise InputError(
+                f"{folder / name} is not in {LIST}; move it elsewhere, it is not part of the data."
+            )
     return len(listed)
 
 
@@ -93,8 +95,7 @@ def _files(folder: Path) -> list[str]:
     return sorted(path.as_posix() for path in paths if not any(p.startswith(".") for p in path.parts))
 
 
-DESIGNS_PER_PART = 64
-"""Designs per part: some seconds of work."""
+DESIGNS_PER_PART = 64  # designs per part: some seconds of work
 TABLE_KEY = b"panto_env"
 """Key of the table's identity in the schema's metadata; a column's metadata hold its description."""
 
@@ -147,7 +148,13 @@ def make_designs(
             _assemble_designs(settings, folder, list(jobs), made_of)
             remove_parts(parts)
             remove_if_empty(output / PARTS)
-    return _made_designs(folder, kept=there)
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(folder / TABLE, columns=["refused", "ending", "accuracy_warning"])
+    refused, ended, warned = (int(pc.sum(pc.not_equal(each, "")).as_py()) for each in table.columns)
+    size = (folder / TABLE).stat().st_size / 1e6
+    return MadeTable(folder, table.num_rows, refused, ended, warned, size, there)
 
 
 def read_identity(path: Path) -> dict[str, Any]:
@@ -194,22 +201,9 @@ def _whole_folder(folder: Path) -> Iterator[Path]:
     unfinished.rename(folder)
 
 
-def _made_designs(folder: Path, *, kept: bool) -> MadeTable:
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(folder / TABLE, columns=["refused", "ending", "accuracy_warning"])
-    refused, ended, warned = (
-        int(pc.sum(pc.not_equal(table[name], "")).as_py()) for name in table.column_names
-    )
-    size = (folder / TABLE).stat().st_size / 1e6
-    return MadeTable(folder, table.num_rows, refused, ended, warned, size, kept)
-
-
 EPISODES_PER_PART = 10
 """Episodes per part: a second or two of work, so that little is lost by an interruption."""
-NAMESPACE_FILE = "namespace_metadata.json"
-"""File by which Minari recognises a folder of data sets."""
+NAMESPACE_FILE = "namespace_metadata.json"  # file by which Minari recognises a folder of data sets
 
 
 @dataclass(frozen=True)
@@ -244,24 +238,21 @@ def make_episodes(
     check_places(settings)
     with alone_in(output, "makes data in"):
         sets = [_Order.of(settings, policy_set, output) for policy_set in settings.sets]
-        kept = [each.kept() for each in sets]
+        missing = [one for one in sets if not one.kept()]
         jobs: dict[Path, PartJob] = {}
-        for one, there in zip(sets, kept, strict=True):
-            if not there:
-                open_parts(one.parts, one.made_of)
-                jobs |= one.jobs(settings)
+        for one in missing:
+            open_parts(one.parts, one.made_of)
+            jobs |= {path: partial(record, settings, group) for path, group in one.groups.items()}
         make_parts(jobs, read_part, workers=workers, ray=ray, progress=progress)
-        for one, there in zip(sets, kept, strict=True):
-            if not there:
-                _assemble_episodes(settings, one)
-                remove_parts(one.parts)
+        for one in missing:
+            _assemble_episodes(settings, one)
+            remove_parts(one.parts)
         remove_if_empty(output / PARTS)
     made = []
-    for one, there in zip(sets, kept, strict=True):
-        metadata = _metadata(one.folder)
+    for one in sets:
+        episodes, steps = (_metadata(one.folder)[name] for name in ("total_episodes", "total_steps"))
         size = sum(path.stat().st_size for path in one.folder.rglob("*") if path.is_file()) / 1e6
-        counts = metadata["total_episodes"], metadata["total_steps"]
-        made.append(Made(one.name, one.folder, *counts, size, there))
+        made.append(Made(one.name, one.folder, episodes, steps, size, one not in missing))
     return made
 
 
@@ -288,9 +279,6 @@ class _Order:
         table = settings.model_copy(update={"sets": (policy_set,)}).model_dump(mode="json")
         return cls(policy_set, name, output / name, parts, groups, identity("episodes", table))
 
-    def jobs(self, settings: EpisodesSettings) -> dict[Path, PartJob]:
-        return {path: partial(record, settings, group) for path, group in self.groups.items()}
-
     def kept(self) -> bool:
         """Whether the data set exists. Raises InputError if a different one with its id exists."""
         if not (self.folder / LIST).is_file():
@@ -305,7 +293,12 @@ class _Order:
 
 
 def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
-    _make_namespaces(one.folder)
+    make_folder(one.folder.parent)
+    for above in (one.folder.parent, one.folder.parent.parent):  # as Minari makes them
+        if not (above / NAMESPACE_FILE).is_file():
+            (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
+        if above.name == NAMESPACE:
+            break
     rows: list[tuple[Plan, dict[str, float]]] = []
 
     def episodes() -> Iterator[tuple[Plan, Episode]]:
@@ -315,25 +308,15 @@ def _assemble_episodes(settings: EpisodesSettings, one: _Order) -> None:
                 table.add(plan, episode)
                 yield plan, episode
 
-    paragraph = description(settings, one.policy_set)
     env = make(settings)
     layout = env.unwrapped.task.layout  # type: ignore[attr-defined]
     env.close()
     with _whole_folder(one.folder) as unfinished:
         with StepsTable(unfinished / STEPS) as table:
-            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, paragraph)
+            words = description(settings, one.policy_set)
+            write_minari(unfinished, settings, one.policy_set, episodes(), one.made_of, words)
         text = card_of_episodes(settings, one.policy_set, rows, layout, one.made_of)
         (unfinished / "card.md").write_text(text, encoding="utf-8")
-
-
-def _make_namespaces(folder: Path) -> None:
-    """Make the folders above a data set in the way that Minari does."""
-    make_folder(folder.parent)
-    for above in (folder.parent, folder.parent.parent):
-        if not (above / NAMESPACE_FILE).is_file():
-            (above / NAMESPACE_FILE).write_text("{}", encoding="utf-8")
-        if above.name == NAMESPACE:
-            break
 
 
 def _metadata(folder: Path) -> dict[str, Any]:

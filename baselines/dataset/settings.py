@@ -7,7 +7,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from panto_configs import find
 from panto_env.base.errors import InputError
@@ -17,12 +17,10 @@ from panto_env.control.settings import description
 from panto_env.policies import check_named
 
 from ..benchmark.settings import DATA
-from ..line import distinct
+from ..line import Distinct, distinct
 
-ENVIRONMENT = "Pantograph-v0"
-"""Id of the environment that episodes are recorded in."""
-NAMESPACE = "pantograph"
-"""First part of the ids of all data sets."""
+ENVIRONMENT = "Pantograph-v0"  # id of the environment that episodes are recorded in
+NAMESPACE = "pantograph"  # first part of the ids of all data sets
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*[a-z0-9]$")]
 _Speed = Annotated[float, Between(1, 600, "km/h")]
 
@@ -43,19 +41,14 @@ class PolicySet(Settings):
     """One data set: episodes of each policy, with each noise, at each place."""
 
     name: _Name = Field(description="last part of its id, before the version: small letters, digits and '-'")
-    policies: tuple[str, ...] = Field(min_length=1, description="names, or model files, as the benchmark's")
-    noise: tuple[NonNegative, ...] = Field(
+    policies: Distinct[str] = Field(min_length=1, description="names, or model files, as the benchmark's")
+    noise: Distinct[NonNegative] = Field(
         (0.0,), min_length=1, description="rms of the noise added to each action, drawn at each step (-)"
     )
     episodes: Annotated[int, Field(gt=0)] = Field(
         description="number of episodes for each policy, noise and place"
     )
     description: str = Field("", description="purpose of the set, in a sentence or two")
-
-    @field_validator("policies", "noise")
-    @classmethod
-    def _without_repetition(cls, value: tuple[Any, ...]) -> tuple[Any, ...]:
-        return distinct(value)
 
 
 class Plan(NamedTuple):
@@ -87,9 +80,9 @@ class EpisodesSettings(Settings):
     def _possible(self) -> Self:
         distinct(tuple(each.name for each in self.sets))
         distinct(tuple((each.catenary, each.pantograph) for each in self.places))
-        of_a_place = next((key for key in EpisodePlace.model_fields if key in self.environment), None)
-        if of_a_place is not None:
-            raise ValueError(f"{of_a_place} belongs into places, not into environment")
+        for key in EpisodePlace.model_fields:
+            if key in self.environment:
+                raise ValueError(f"{key} belongs into places, not into environment")
         most = max(self.count(each) for each in self.sets)
         if self.seed + most > len(DATA):
             raise ValueError(
@@ -103,8 +96,7 @@ class EpisodesSettings(Settings):
 
     def count(self, policy_set: PolicySet) -> int:
         """Number of episodes of a data set."""
-        kinds = len(self.places) * len(policy_set.policies) * len(policy_set.noise)
-        return kinds * policy_set.episodes
+        return len(self.places) * len(policy_set.policies) * len(policy_set.noise) * policy_set.episodes
 
     def plans(self, policy_set: PolicySet) -> Iterator[Plan]:
         """Episodes of a data set in order: places, policies and noises alternate, each episode with its own
@@ -131,15 +123,16 @@ def load_episodes(path: str | Path) -> EpisodesSettings:
     whose code would run from a path.
     """
     settings = parse(EpisodesSettings, read_toml(find(path, "dataset")), str(path))
-    for policy in (policy for each in settings.sets for policy in each.policies):
-        check_named(policy, path)
+    for each in settings.sets:
+        for policy in each.policies:
+            check_named(policy, path)
     return settings
 
 
 def chosen(settings: EpisodesSettings, names: tuple[str, ...]) -> EpisodesSettings:
     """Settings with only the named sets. Raises InputError for a name that no set has."""
     known = {each.name: each for each in settings.sets}
-    wrong = next((name for name in names if name not in known), None)
-    if wrong is not None:
-        raise InputError(f"There is no set '{wrong}' in this file; its sets are {', '.join(known)}.")
+    for name in names:
+        if name not in known:
+            raise InputError(f"There is no set '{name}' in this file; its sets are {', '.join(known)}.")
     return settings.model_copy(update={"sets": tuple(known[name] for name in dict.fromkeys(names))})

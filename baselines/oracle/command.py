@@ -84,17 +84,11 @@ def oracle(
         print_table(report.stored_table(stored_cells()))
         return
 
-    changes: dict[str, Any] = {
-        "seeds": seed or None,
-        "spans": parse_spans(spans),
-        "starts": start or None,
-        "hops": hops,
-        **{name: given.pop(name, None) for name in CONDITIONS},
-    }
+    changes = {"seeds": seed or None, "spans": parse_spans(spans), "starts": start or None, "hops": hops}
+    changes |= {name: given.pop(name, None) for name in CONDITIONS}
     only = given | ({"speeds_kmh": speed} if speed else {})
     settings = oracle_settings(config, {key: each for key, each in changes.items() if each is not None}, only)
-    command = this_command()
-    requested = requests(settings)
+    command, requested = this_command(), requests(settings)
     before = read(output)["cells"] if output is not None and os.path.exists(output) else []
     done: list[dict[str, Any] | None] = [
         next((each for each in before if each["asked"] == one), None) for one in requested
@@ -107,6 +101,11 @@ def oracle(
             f"{output} holds all these cells already, so there is no search to plot; omit --plot."
         )
     found: list[Oracle] = []
+
+    def print_progress(start: str, each: Iteration) -> None:
+        if progress_console.is_terminal:
+            progress_console.print(f"{start} {each.number}: σ {each.std:.3f} N, mean {each.mean:.2f} N")
+
     for k, values in enumerate(settings.runs()):
         if done[k] is not None:
             continue
@@ -115,7 +114,7 @@ def oracle(
         for number in settings.seeds:
             neighbour = passes[-1] if passes and not another_line else None
             problem = Problem(values, number, settings.spans)
-            passes.append(find(problem, settings.starts, _print_progress, neighbour, settings.hops))
+            passes.append(find(problem, settings.starts, print_progress, neighbour, settings.hops))
             if not json:
                 print_table(report.convergence(passes[-1]))
         done[k] = cell(requested[k], passes)
@@ -133,11 +132,3 @@ def oracle(
         if found:
             print_table(report.summary(found))
         console.print(report.LEGEND, style="dim")
-
-
-def _print_progress(start: str, iteration: Iteration) -> None:
-    """Print one line of progress, if stderr is a terminal."""
-    if progress_console.is_terminal:
-        progress_console.print(
-            f"{start} {iteration.number}: σ {iteration.std:.3f} N, mean {iteration.mean:.2f} N"
-        )

@@ -32,10 +32,8 @@ from panto_env.plant.state import SAMPLE_ROWS, Place, Row
 
 from ..benchmark.settings import Tape
 
-HALVINGS = 50
-"""Number of halvings of the range in which the command for a knot is searched for."""
-NEAR = 0.01
-"""A force counts as at a limit if it differs by less than this share of the limit."""
+HALVINGS = 50  # number of halvings of the range in which the command for a knot is searched for
+NEAR = 0.01  # a force counts as at a limit if it differs by less than this share of the limit
 
 
 class Limits(NamedTuple):
@@ -73,12 +71,12 @@ class Knots:
         maximum command: w[k] - w[k-1] <= reached (limit - w[k-1]), and the same downwards.
         """
         one, before = eye_array(count, format="csc"), eye_array(count, k=-1, format="csc")
-        parts, bounds = [one], [self.limit]
+        rows = [(one, self.limit)]
         if math.isfinite(self._rate):
-            parts, bounds = [*parts, one - before], [*bounds, self.maximum_change]
+            rows.append((one - before, self.maximum_change))
         if self.reached < 1.0:
-            parts.append(one - (1.0 - self.reached) * before)
-            bounds.append(self.reached * self.limit)
+            rows.append((one - (1.0 - self.reached) * before, self.reached * self.limit))
+        parts, bounds = zip(*rows, strict=True)
         return Limits(csc_matrix(vstack(parts)), np.repeat(bounds, count))
 
     def within(self, knots: Array) -> Array:
@@ -95,14 +93,12 @@ class Knots:
 
     def commands(self, knots: Array) -> Array:
         """Commands (N), (..., count, places), within the limit, that take the force from knot to knot."""
-        before = np.zeros_like(knots)
-        before[..., 1:, :] = knots[..., :-1, :]
+        before = _before(knots)
         return np.clip(before + self._lead(knots - before), -self.limit, self.limit)
 
     def free_commands(self, knots: Array) -> Array:
         """Like ``commands``, for an actuator without limits of force and rate (``without_limits``)."""
-        before = np.zeros_like(knots)
-        before[..., 1:, :] = knots[..., :-1, :]
+        before = _before(knots)
         return np.asarray(before + (knots - before) / self.reached)
 
     def _lead(self, change: Array) -> Array:
@@ -121,6 +117,13 @@ class Knots:
         return np.asarray(np.copysign(high, change))
 
 
+def _before(knots: Array) -> Array:
+    """The knot before each of (..., count, places); 0 before the first."""
+    before = np.zeros_like(knots)
+    before[..., 1:, :] = knots[..., :-1, :]
+    return before
+
+
 def without_limits(actuator: ActuatorSettings) -> ActuatorSettings:
     """The actuator without limits of force and rate, so that a change of one knot affects no other knot.
 
@@ -131,8 +134,7 @@ def without_limits(actuator: ActuatorSettings) -> ActuatorSettings:
     return actuator
 
 
-PUSHED = 48
-"""Number of lanes of a group that compute responses to test forces."""
+PUSHED = 48  # number of lanes of a group that compute responses to test forces
 
 
 class Stretch:
@@ -142,8 +144,7 @@ class Stretch:
         self, settings: RunSettings, trim: Trim | None, seed: int, begin: int, control_steps: int
     ) -> None:
         """begin: control steps before the stretch; control_steps: within it; seed: of line and noise."""
-        self._settings, self._trim, self._seed = settings, trim, seed
-        self._begin, self._control_steps = begin, control_steps
+        self._group = partial(_Group, settings, trim, seed, begin, control_steps)
         self._groups: dict[int, list[_Group]] = {}  # by the lanes of each
 
     def forces(self, commands: Array) -> Array:
@@ -164,11 +165,10 @@ class Stretch:
         """
         pushes = [(step, place) for step in range(len(commands)) for place in range(commands.shape[1])]
         jobs = workers_for(len(pushes), None)
-        groups, shares = self._of(PUSHED, jobs), [pushes[job::jobs] for job in range(jobs)]
         found = in_threads(
             [
-                partial(group.changes, commands, push, steps, share)
-                for group, share in zip(groups, shares, strict=True)
+                partial(group.changes, commands, push, steps, pushes[job::jobs])
+                for job, group in enumerate(self._of(PUSHED, jobs))
             ]
         )
         changes = np.empty((len(pushes), found[0].shape[1]))
@@ -180,9 +180,7 @@ class Stretch:
         """Groups of lanes, made when first needed: ``jobs`` groups of ``lanes`` lanes."""
         groups = self._groups.setdefault(lanes, [])
         while len(groups) < jobs:
-            groups.append(
-                _Group(self._settings, self._trim, self._seed, lanes, self._begin, self._control_steps)
-            )
+            groups.append(self._group(lanes))
         return groups[:jobs]
 
 
@@ -190,7 +188,7 @@ class _Group:
     """Lanes that one thread runs."""
 
     def __init__(
-        self, settings: RunSettings, trim: Trim | None, seed: int, lanes: int, begin: int, control_steps: int
+        self, settings: RunSettings, trim: Trim | None, seed: int, begin: int, control_steps: int, lanes: int
     ) -> None:
         task = Task(settings, lanes=lanes, keep_samples=False, trim=trim)
         task.reset(np.arange(lanes), lambda _: np.random.default_rng(seed))
@@ -208,14 +206,18 @@ class _Group:
         self._plant.advance_passively(rest, task.plant.samples(1)._replace(uplift=np.zeros((lanes, 0, 1))))
         moving = self._plant.model.wire, self._plant.actuators, self._plant.run
         self._moving = list(arrays_of(moving))
-        self._start = [(array, array.copy()) for array in self._moving]
+        self._start = [array.copy() for array in self._moving]
 
     def run(self, commands: Array) -> Array:
         """Contact force (N), (lanes, samples), under commands (N), (lanes, steps, places)."""
-        for array, content in self._start:
-            np.copyto(array, content)
+        self._restore(self._start)
         self._advance(commands)
         return self._force.copy()
+
+    def _restore(self, contents: list[Array]) -> None:
+        """Give the arrays of the plant's state their contents of an earlier time."""
+        for array, content in zip(self._moving, contents, strict=True):
+            np.copyto(array, content)
 
     def changes(self, commands: Array, push: Array, steps: int, pushes: list[tuple[int, int]]) -> Array:
         """Responses of the force (N), (pushes, samples), to test forces, each at a step and place, by step.
@@ -224,18 +226,16 @@ class _Group:
         of the next tests they all have the same state; each lane then runs ahead with its own test force, and
         its state is restored.
         """
-        for array, content in self._start:
-            np.copyto(array, content)
+        self._restore(self._start)
         lanes, end, now = len(self._force), len(commands), 0
         forces = np.zeros((len(pushes), self._force.shape[1]))
         reach = []  # for each test force, the range of samples over which its response is followed
         for first in range(0, len(pushes), lanes):
             block = pushes[first : first + lanes]
-            self._advance(
-                np.broadcast_to(commands[now : block[0][0]], (lanes, *commands[now : block[0][0]].shape))
-            )
+            between = commands[now : block[0][0]]
+            self._advance(np.broadcast_to(between, (lanes, *between.shape)))
             now, last = block[0][0], min(end, block[-1][0] + steps)
-            here = [(array, array.copy()) for array in self._moving]
+            here = [array.copy() for array in self._moving]
             changed = np.repeat(commands[None, now:last], lanes, axis=0)
             for lane, (step, place) in enumerate(block):
                 tested = changed[lane, step - now : step - now + len(push), place]
@@ -243,8 +243,7 @@ class _Group:
             self._advance(changed)
             forces[first : first + len(block)] = self._force[: len(block)]
             reach += [(step * self._steps, min(last, step + steps) * self._steps) for step, _ in block]
-            for array, content in here:
-                np.copyto(array, content)
+            self._restore(here)
         self._advance(np.broadcast_to(commands[now:], (lanes, *commands[now:].shape)))
         plain = self._force[0]
         for force, (begin, stop) in zip(forces, reach, strict=True):
@@ -265,10 +264,8 @@ class _Group:
             self._plant.advance(now, self._steps, self._samples)
 
 
-LEAD = 2.0
-"""Time (s) before the evaluated spans from which the actuator may act."""
-MEMORY = 3.0
-"""Time (s) after which a change of a knot hardly affects the contact force any more."""
+LEAD = 2.0  # time (s) before the evaluated spans from which the actuator may act
+MEMORY = 3.0  # time (s) after which a change of a knot hardly affects the contact force any more
 PUSH = 5.0
 """Change of a knot (N) by which responses are measured: with less, each slackening dropper shows singly."""
 RESOLUTION = 0.01
@@ -301,9 +298,7 @@ class Problem:
         if passive.terminated:
             raise InputError(f"There is no oracle, because the passive run has no figures. {passive.ending}")
         covered = passive.spans(spans)
-        self.spans = covered
-        self.figures = passive.summary(spans)
-        self.chosen = spans
+        self.spans, self.chosen, self.figures = covered, spans, passive.summary(spans)
         self.places = len(settings.actuator.places)
         self.interval = settings.control_interval
         self.steps = whole_steps(self.interval, passive.time_step)

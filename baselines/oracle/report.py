@@ -79,17 +79,8 @@ def summary(oracles: Sequence[Oracle]) -> Table:
                 number(figures.contact_loss, 2),
             )
         )
-    headings = (
-        "pass",
-        "passive mean (N)",
-        "σ (N)",
-        "oracle mean (N)",
-        "σ (N)",
-        "change (%)",
-        "spread of starts (N)",
-        "CL (%)",
-    )
-    return Table("Oracles", headings, rows)
+    headings = "pass, passive mean (N), σ (N), oracle mean (N), σ (N), change (%), spread of starts (N)"
+    return Table("Oracles", (*headings.split(", "), "CL (%)"), rows)
 
 
 def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
@@ -100,30 +91,22 @@ def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
         preset = next(
             (name for name, one in ACTUATOR_PRESETS.items() if one == actuator), cell["actuator"]["kind"]
         )
-        changes = [100 * (each["oracle"]["std"] / each["passive"]["std"] - 1) for each in passes]
+        passive, oracle = ([each[run]["std"] for each in passes] for run in ("passive", "oracle"))
+        changes = [100 * (one / other - 1) for one, other in zip(oracle, passive, strict=True)]
         rows.append(
             (
                 cell["catenary"] + which_of_train(cell.get("pantographs", ()), cell.get("controlled", ())),
                 f"{preset}, {actuator.place}",
                 number(cell["speed_kmh"], 0),
                 in_words(tuple(cell["spans"])),
-                number(float(np.mean([each["passive"]["std"] for each in passes])), 2),
-                number(float(np.mean([each["oracle"]["std"] for each in passes])), 2),
+                number(float(np.mean(passive)), 2),
+                number(float(np.mean(oracle)), 2),
                 number(100 * (cell["ratio"] - 1), 1),
                 f"{min(changes):.1f} to {max(changes):.1f}" if len(changes) > 1 else "–",
             )
         )
-    headings = (
-        "line",
-        "actuator",
-        "km/h",
-        "spans",
-        "passive σ (N)",
-        "oracle σ (N)",
-        "change (%)",
-        "by seed (%)",
-    )
-    return Table("Stored oracles", headings, rows, text_columns=2)
+    headings = "line, actuator, km/h, spans, passive σ (N), oracle σ (N), change (%), by seed (%)"
+    return Table("Stored oracles", tuple(headings.split(", ")), rows, text_columns=2)
 
 
 def plot(oracle: Oracle) -> Figure:
@@ -144,10 +127,7 @@ def plot(oracle: Oracle) -> Figure:
         axis.set_xlim(position[0], position[-1])
     for each in oracle.searches:
         search.plot(
-            [one.number for one in each.iterations],
-            [one.std for one in each.iterations],
-            "o-",
-            label=each.start,
+            *zip(*((one.number, one.std) for one in each.iterations), strict=True), "o-", label=each.start
         )
     search.axhline(problem.figures.std, color="0.6", linestyle=":", label="passive")
     search.set(xlabel="iteration", ylabel="σ (N)", ylim=(0, None))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csc_matrix, eye_array, kron
@@ -25,16 +24,14 @@ from panto_env.metrics.low_pass import zero_phase_low_pass
 from ..policies.mpc import quadratic_solver
 from .problem import Limits, Problem
 
-SHARES = (1.0, 0.6, 0.3, 0.1)
-"""Shares of a step that are tried, all at once."""
+SHARES = (1.0, 0.6, 0.3, 0.1)  # shares of a step that are tried, all at once
 DAMPING = 0.1
 """Initial weight of the step's own size, relative to the mean square of the response to one knot."""
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Factors on the last damping, tried in each iteration: for large steps the linear model is wrong."""
 MEAN_TOLERANCE = 5e-4
 """Maximum difference of the mean force from the passive run's at the end of a search, as a share of it."""
-MEAN_WEIGHT = 2.0
-"""Weight of the mean's error (N) in the merit; a lower mean by 1 N lowers σ by a few tenths."""
+MEAN_WEIGHT = 2.0  # weight of the mean's error (N) in the merit; a lower mean by 1 N lowers σ by a few tenths
 MEAN_STIFFNESS = 1e3
 """Weight of the mean's squared error, relative to σ squared; hundredths of a newton remain."""
 WORTH, ENOUGH = 2e-2, 5e-4
@@ -92,15 +89,23 @@ def descend(
     matrix = csc_matrix(kron(one.matrix, eye_array(problem.places)))
     limits = Limits(matrix, np.repeat(one.bound, problem.places))
     force, damping = problem.forces(knots[None])[0], DAMPING
-    found = [_iteration(problem, 0, knots, force, 0.0)]
-    if progress is not None:
-        progress(start, found[-1])
-    response, fresh = _response(problem, knots, basis), True
+    found: list[Iteration] = []
+
+    def note(share: float) -> None:
+        at_limits = problem.knots.at_limits(knots)
+        found.append(Iteration(len(found), float(force.std()), float(force.mean()), at_limits, share))
+        if progress is not None:
+            progress(start, found[-1])
+
+    def measured() -> Array:
+        return problem.response(knots) if basis is None else problem.response_along(knots, basis)
+
+    note(0.0)
+    response, fresh = measured(), True
     while len(found) <= iterations or (not _mean_met(problem, force) and len(found) <= 2 * iterations):
         before = merit(problem, force)
-        model = Model.of(problem, response, force, basis)
         weights = damping * np.array(DAMPINGS)
-        best_steps = [model.best_step(knots.ravel(), limits, weight) for weight in weights]
+        best_steps = _best_steps(problem, response, force, knots.ravel(), limits, basis, weights)
         steps = np.array([share * step for step in best_steps for share in SHARES])
         tried = knots + (steps if basis is None else steps @ basis.T).reshape(-1, *knots.shape)
         forces = problem.forces(tried)
@@ -114,20 +119,14 @@ def descend(
             damping = weights[best // len(SHARES)]
         else:
             damping = weights[-1]
-        found.append(_iteration(problem, len(found), knots, force, share))
-        if progress is not None:
-            progress(start, found[-1])
+        note(share)
         gain = (before - merit(problem, force)) / before
         if gain < ENOUGH and fresh and _mean_met(problem, force):
             break
         fresh = gain < WORTH
         if fresh:
-            response = _response(problem, knots, basis)
+            response = measured()
     return Descent(start, knots, tuple(found))
-
-
-def _response(problem: Problem, knots: Array, basis: Array | None) -> Array:
-    return problem.response(knots) if basis is None else problem.response_along(knots, basis)
 
 
 def merit(problem: Problem, force: Array) -> float:
@@ -141,45 +140,44 @@ def _mean_met(problem: Problem, force: Array) -> bool:
     return abs(float(force.mean()) - required) <= MEAN_TOLERANCE * required
 
 
-class Model(NamedTuple):
-    """Quadratic model of a step: squares of the filtered force about its mean, and of the mean's error."""
+def _best_steps(
+    problem: Problem,
+    response: Array,
+    force: Array,
+    knots: Array,
+    limits: Limits,
+    basis: Array | None,
+    dampings: Array,
+) -> list[Array]:
+    """Best steps along each direction (N) within the limits, one for each damping: see ``DAMPING``.
 
-    hessian: Array  # (directions, directions)
-    gradient: Array  # (directions,)
-    size: float  # of ``hessian``: mean of its diagonal
-    basis: Array | None
-
-    @classmethod
-    def of(cls, problem: Problem, response: Array, force: Array, basis: Array | None) -> Self:
-        """Model about the present filtered force, (samples,) (N); response: (rows, directions) (N/N)."""
-        compared = force[:: problem.every]
-        mean = response.mean(axis=0)
-        stiffness = MEAN_STIFFNESS * len(compared)
-        missing = problem.figures.mean - float(force.mean())
-        about_mean = response - mean
-        hessian = about_mean.T @ about_mean
-        size = float(np.trace(hessian)) / len(hessian)
-        hessian += stiffness * np.outer(mean, mean)
-        gradient = about_mean.T @ (compared - compared.mean()) - stiffness * missing * mean
-        return cls(hessian, gradient, size, basis)
-
-    def best_step(self, knots: Array, limits: Limits, damping: float) -> Array:
-        """Best step along each direction (N) within the limits; damping: see ``DAMPING``.
-
-        knots: the present knots, flat (N). Without a basis each direction is a knot.
-        Raises InputError if OSQP finds no step.
-        """
-        now = limits.matrix @ knots
-        matrix = limits.matrix if self.basis is None else csc_matrix(limits.matrix @ self.basis)
-        hessian = self.hessian + damping * self.size * np.eye(len(self.hessian))
+    They minimise a quadratic model: squares of the filtered force, (samples,) (N), about its mean, and of the
+    mean's error. response: (rows, directions) (N/N); knots: the present ones, flat (N). Without a basis each
+    direction is a knot. Raises InputError if OSQP finds no step.
+    """
+    compared = force[:: problem.every]
+    mean = response.mean(axis=0)
+    stiffness = MEAN_STIFFNESS * len(compared)
+    missing = problem.figures.mean - float(force.mean())
+    about_mean = response - mean
+    plain = about_mean.T @ about_mean
+    size = float(np.trace(plain)) / len(plain)
+    plain += stiffness * np.outer(mean, mean)
+    gradient = about_mean.T @ (compared - compared.mean()) - stiffness * missing * mean
+    now = limits.matrix @ knots
+    matrix = limits.matrix if basis is None else csc_matrix(limits.matrix @ basis)
+    steps = []
+    for damping in dampings:
+        hessian = plain + damping * size * np.eye(len(plain))
         scale = 1.0 / float(np.diag(hessian).max())
         solver = quadratic_solver("An oracle")
         low, high = -limits.bound - now, limits.bound - now
-        solver.setup(csc_matrix(np.triu(scale * hessian)), scale * self.gradient, matrix, low, high, **OSQP)
+        solver.setup(csc_matrix(np.triu(scale * hessian)), scale * gradient, matrix, low, high, **OSQP)
         answer = solver.solve(raise_error=False)
         if answer.x is None or not np.isfinite(answer.x).all():
             raise InputError(f"The search for an oracle stopped: OSQP says '{answer.info.status}'.")
-        return np.asarray(answer.x)
+        steps.append(np.asarray(answer.x))
+    return steps
 
 
 def corrected(response: Array, step: Array, change: Array) -> Array:
@@ -190,26 +188,16 @@ def corrected(response: Array, step: Array, change: Array) -> Array:
     return np.asarray(response + np.outer(change - response @ step, step) / (step @ step))
 
 
-def _iteration(problem: Problem, number: int, knots: Array, force: Array, share: float) -> Iteration:
-    at_limits = problem.knots.at_limits(knots)
-    return Iteration(number, float(force.std()), float(force.mean()), at_limits, share)
-
-
 STARTS = ("zero", "periodic", "random")
 """Starts of a search: zero force; the best force that repeats from span to span; noise."""
-HARMONICS = 14
-"""Number of harmonics of the span in a force that repeats."""
+HARMONICS = 14  # number of harmonics of the span in a force that repeats
 PERIODIC_ITERATIONS = 15
-RANDOM_FORCE, RANDOM_TIME = 20.0, 0.05
-"""Rms of the noise (N), and the time over which it is smoothed (s)."""
-HOP_FORCE = 5.0
-"""Rms of the noise (N) that is added to the best knots for a hop."""
-DECIMALS = 2
-"""Decimals of the commands (N) that are replayed and stored."""
+RANDOM_FORCE, RANDOM_TIME = 20.0, 0.05  # rms of the noise (N), and the time over which it is smoothed (s)
+HOP_FORCE = 5.0  # rms of the noise (N) that is added to the best knots for a hop
+DECIMALS = 2  # decimals of the commands (N) that are replayed and stored
 METHOD = 2
 """Version of the search; raised by changes that give other commands, so that older results are redone."""
-MEAN_TOLERANCE_OF_RUN = 1e-3
-"""Maximum difference of the mean force from the passive run's, as a share of it."""
+MEAN_TOLERANCE_OF_RUN = 1e-3  # maximum difference of the mean force from the passive run's, as a share of it
 
 
 @dataclass(frozen=True)
@@ -226,12 +214,16 @@ class Oracle:
     @property
     def best(self) -> Descent:
         """The search that reached the minimum σ."""
-        return min(self.searches, key=lambda search: search.std)
+        return _best(self.searches)
 
     @property
     def change(self) -> float:
         """Relative change of σ from the passive run."""
         return self.figures.std / self.problem.figures.std - 1.0
+
+
+def _best(searches: Sequence[Descent]) -> Descent:
+    return min(searches, key=lambda search: search.std)
 
 
 def find(
@@ -255,10 +247,9 @@ def find(
         name = f"seed {neighbour.problem.seed}"
         searches = [descend(problem, name, neighbour.best.knots, progress=progress)]
     for hop in range(1, hops + 1):
-        shaken = min(searches, key=lambda search: search.std).knots + noise(problem, HOP_FORCE, hop)
+        shaken = _best(searches).knots + noise(problem, HOP_FORCE, hop)
         searches.append(descend(problem, f"hop {hop}", problem.knots.within(shaken), progress=progress))
-    best = min(searches, key=lambda search: search.std)
-    commands = np.round(problem.knots.commands(best.knots), DECIMALS)
+    commands = np.round(problem.knots.commands(_best(searches).knots), DECIMALS)
     run = problem.replay(commands)
     if run.terminated:
         raise InputError(f"The oracle's pass has no figures. {run.ending}")
@@ -268,26 +259,18 @@ def find(
             f"The oracle's mean force is {figures.mean:.2f} N, but the passive run's is {mean:.2f} N; search "
             "from other starts."
         )
-    passive = problem.passive
-    forces = (
-        zero_phase_low_pass(passive.contact_force, passive.time_step),
-        zero_phase_low_pass(run.contact_force, run.time_step),
+    passive, own = (
+        zero_phase_low_pass(each.contact_force, each.time_step) for each in (problem.passive, run)
     )
-    return Oracle(problem, tuple(searches), commands, run, figures, forces)
+    return Oracle(problem, tuple(searches), commands, run, figures, (passive, own))
 
 
 def _searches(problem: Problem, start: str, progress: Progress | None) -> Iterator[Descent]:
     """The search from a start, preceded by the search for that start if it has one."""
     knots: Array = np.zeros((problem.count, problem.places))
     if start == "periodic":
-        repeated = descend(
-            problem,
-            "repeated",
-            knots,
-            basis=span_periodic(problem),
-            iterations=PERIODIC_ITERATIONS,
-            progress=progress,
-        )
+        basis, most = span_periodic(problem), PERIODIC_ITERATIONS
+        repeated = descend(problem, "repeated", knots, basis=basis, iterations=most, progress=progress)
         yield repeated
         knots = repeated.knots
     elif start == "random":
@@ -314,8 +297,6 @@ def span_periodic(problem: Problem) -> Array:
 def noise(problem: Problem, force: float = RANDOM_FORCE, draw: int = 0) -> Array:
     """Smooth noise (N), (count, places), with this rms force (N); the same for the same pass and draw."""
     length = max(1, round(RANDOM_TIME / problem.interval))
-    white = np.random.default_rng([problem.seed, draw]).standard_normal(
-        (problem.count + length, problem.places)
-    )
-    total = np.cumsum(white, axis=0)
+    random = np.random.default_rng([problem.seed, draw])
+    total = np.cumsum(random.standard_normal((problem.count + length, problem.places)), axis=0)
     return np.asarray(force / np.sqrt(length) * (total[length:] - total[:-length]))

@@ -21,15 +21,10 @@ from panto_env.base.settings import Positive, Settings, parse
 from panto_env.catalog.loader import is_entry
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.record import OF_TRAINS
-from panto_env.control.settings import (
-    ControlInterval,
-    PantographScatter,
-    SpeedDrift,
-    run_settings,
-)
+from panto_env.control.settings import ControlInterval, PantographScatter, SpeedDrift, run_settings
 from panto_env.plant.line_condition import LINE_CONDITIONS
 
-from ..line import CONDITIONS, Actuator, Condition, LineAndTrain, Span, of_run
+from ..line import CONDITIONS, Actuator, Condition, Distinct, LineAndTrain, Span, of_run
 from .search import METHOD, STARTS, Oracle
 
 MOST_HOPS = 1000
@@ -41,7 +36,7 @@ class OracleCell(LineAndTrain):
     """A train with an actuator on a line, and the speeds to run at."""
 
     actuator: Actuator = of_run("actuator")
-    speeds_kmh: tuple[Positive, ...] = Field((300.0,), min_length=1, description="km/h")
+    speeds_kmh: Distinct[Positive] = Field((300.0,), min_length=1, description="km/h")
 
 
 class OracleSettings(Settings):
@@ -73,14 +68,10 @@ class OracleSettings(Settings):
 
     def runs(self) -> Iterator[dict[str, Any]]:
         """Settings of a run, by name, for each cell at each speed."""
+        common = {"spans": self.line_spans} | {name: getattr(self, name) for name in CONDITIONS}
         for cell in self.cells:
             for speed in cell.speeds_kmh:
-                yield self.given(cell, speed)
-
-    def given(self, cell: OracleCell, speed_kmh: float) -> dict[str, Any]:
-        """Settings of a run, by name, for a cell at a speed (km/h)."""
-        own = cell.settings | {"speed_kmh": speed_kmh, "actuator": cell.actuator, "spans": self.line_spans}
-        return own | {name: getattr(self, name) for name in CONDITIONS}
+                yield cell.settings | {"speed_kmh": speed, "actuator": cell.actuator} | common
 
 
 def oracle_settings(
@@ -129,7 +120,6 @@ def fingerprint(given: Mapping[str, Any]) -> str:
     InputError for a value that is not valid.
     """
     settings = run_settings(given)
-    # Without defaults: a setting added later changes no oracle while it is off; a different kind does.
     matter = {*MATTER, *(OF_TRAINS if settings.pantographs else ())}
     plain = settings.model_dump(mode="json", include=matter, serialize_as_any=True, exclude_defaults=True)
     for name in ("catenary", "pantograph"):
@@ -184,17 +174,16 @@ def as_data(cells: Sequence[Mapping[str, Any]], command: str) -> dict[str, Any]:
 
 
 def _pass(oracle: Oracle) -> dict[str, Any]:
-    problem = oracle.problem
     return {
-        "seed": problem.seed,
-        "passive": problem.figures.as_dict(),
+        "seed": oracle.problem.seed,
+        "passive": oracle.problem.figures.as_dict(),
         "oracle": oracle.figures.as_dict(),
         "searches": [
             {"start": each.start, "std": each.std, "iterations": len(each.iterations) - 1}
             for each in oracle.searches
         ],
         "at_limits": oracle.best.iterations[-1].at_limits,
-        "first_step": problem.begin,
+        "first_step": oracle.problem.begin,
         "commands": oracle.commands,
     }
 
@@ -236,19 +225,16 @@ def stored_actions(given: Mapping[str, Any]) -> NDArray[np.float64] | None:
         return None
     actuator = settings.actuator.model_dump(mode="json")
     for one in stored_cells():
-        same = (
+        if (
             "pantographs" not in one
             and one["speed_kmh"] == settings.speed_kmh[0]
             and one["actuator"] == actuator
-        )
-        same = same and is_entry(settings.line, one["catenary"], None)
-        if same and is_entry(settings.pantograph, one["pantograph"], None):
-            found = one["passes"][0]
-            commands = np.array(found["commands"])
-            before = np.zeros((found["first_step"], commands.shape[1]))
-            return np.asarray(
-                np.concatenate([before, commands]) / settings.actuator.force_limit, dtype=np.float64
-            )
+            and is_entry(settings.line, one["catenary"], None)
+            and is_entry(settings.pantograph, one["pantograph"], None)
+        ):
+            commands = np.array(one["passes"][0]["commands"])
+            before = np.zeros((one["passes"][0]["first_step"], commands.shape[1]))
+            return np.asarray(np.concatenate([before, commands]) / settings.actuator.force_limit)
     return None
 
 

@@ -22,16 +22,12 @@ SIGNALS = {
     "contact force": 30.0,
 }
 """Entries fed back, and the unit that their gains count in (m, m/s, N): their spread in a passive run."""
-HISTORY = 3
-"""Control steps of each signal that count, the present one included."""
-COMMANDS = 2
-"""Commands before the present one that count: what is still on its way through the actuator."""
-COMMAND_UNIT = 10.0
-"""N, likewise."""
+HISTORY = 3  # control steps of each signal that count, the present one included
+COMMANDS = 2  # commands before the present one that count: what is still on its way through the actuator
+COMMAND_UNIT = 10.0  # N, likewise
 AVERAGED = 1.0
 """Time constant (s) of the slow average that is subtracted from each signal; some spans pass in it."""
-COUNT = HISTORY * len(SIGNALS) + COMMANDS
-"""Number of gains."""
+COUNT = HISTORY * len(SIGNALS) + COMMANDS  # number of gains
 FEEDBACK_GAINS = {
     **{f"{name}, {step} steps ago": Gain(3.0 * 0.5) for step in range(HISTORY) for name in SIGNALS},
     **{f"command, {step + 1} steps ago": Gain(3.0 * 0.2) for step in range(COMMANDS)},
@@ -152,8 +148,7 @@ class FittedFeedback(TunableLaw):
         return force
 
 
-OWN = COUNT + len(Pace._fields)
-"""Number of gains of feedback and learning; they stand last."""
+OWN = COUNT + len(Pace._fields)  # number of gains of feedback and learning; they stand last
 
 
 class Adaptive(Repetitive):

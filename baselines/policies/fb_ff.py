@@ -16,8 +16,7 @@ from panto_env.control.observation import Context
 from .feedback import ForceLaw, number, time_constant
 from .lanes_law import Array, Gain, Observations, Source, TunableLaw
 
-FORCE_RANGE = (0.0, 300.0)
-"""Range (N) to which the feedback clips the contact force (paper 1)."""
+FORCE_RANGE = (0.0, 300.0)  # range (N) to which the feedback clips the contact force (paper 1)
 READINGS = ("span", "printed")
 SPEED_UNITS = {"km/h": METRES_PER_SECOND, "m/s": 1.0}
 
@@ -87,12 +86,9 @@ class FeedbackFeedforward(ForceLaw):
         values = [self.gains[speed] for speed in speeds]
         self._gain = float(np.interp(to_kmh(context.speed), speeds, values))
         length = context.alignment.mean_length
-        if self.reading == "span":
-            self._wavenumber = 2 * math.pi / length
-        else:
-            speed = context.speed * SPEED_UNITS[self.speed_unit]
-            w = 2 * speed / length  # Eq. 12
-            self._wavenumber = w * math.pi / (2 * length)  # Eq. 11
+        w = 2 * (context.speed * SPEED_UNITS[self.speed_unit]) / length  # Eq. 12
+        printed = w * math.pi / (2 * length)  # Eq. 11
+        self._wavenumber = 2 * math.pi / length if self.reading == "span" else printed
         self._share: float | None = None  # of a span, when last seen
         self._spans = 0  # begun since the start
 
@@ -151,5 +147,4 @@ class TunedFeedbackFeedforward(TunableLaw):
         contact_force = np.clip(self.read(observations, "contact force"), *FORCE_RANGE)
         angle = self.span_angle(observations)
         feedforward = sine * np.sin(angle) + cosine * np.cos(angle)
-        force: Array = gain * (self.context.nominal_force - contact_force) + feedforward + bias
-        return force
+        return np.asarray(gain * (self.context.nominal_force - contact_force) + feedforward + bias)

@@ -89,9 +89,8 @@ class Skyhook(TunableLaw):
     def forces(self, observations: Observations) -> Array:
         """Force (N) of each lane, (lanes,), before the limit, for observations, (lanes, entries)."""
         frame, head = self.gains
-        velocities = [self.read(observations, f"{mass} velocity") for mass in ("frame", "head")]
-        force: Array = -frame * velocities[0] - head * velocities[1]
-        return force
+        of_frame, of_head = (self.read(observations, f"{mass} velocity") for mass in ("frame", "head"))
+        return np.asarray(-frame * of_frame - head * of_head)
 
 
 class Proportional(ForceLaw):

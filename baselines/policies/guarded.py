@@ -37,19 +37,15 @@ Observation = NDArray[np.float32]
 
 SAME = 5e-5
 """Difference of two readings, in the observation's scale, below which a sensor seems to stand still."""
-STANDS = 2
-"""Control steps in a row without a change after which a reading is held."""
+STANDS = 2  # control steps in a row without a change after which a reading is held
 PATIENCE, RETURN = 1.2, 0.5
 """Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
 (s) for which they must move again before it comes back."""
-LISTENING = 2.0
-"""Time (s) at the start in which the pantograph is passive and is listened to."""
-WINDOW, SHORT_WINDOW = 1.5, 0.4
-"""Time constants (s) of the means and variances that the monitor compares."""
+LISTENING = 2.0  # time (s) at the start in which the pantograph is passive and is listened to
+WINDOW, SHORT_WINDOW = 1.5, 0.4  # time constants (s) of the means and variances that the monitor compares
 FORCES = ("contact force", "force deviation", f"contact force{DEVIATION}")
 """Names of the entry that has the contact force, by kind of observation."""
-SETTLED = 1.0
-"""Time (s) of control, or without it, after which the windows hold nothing else."""
+SETTLED = 1.0  # time (s) of control, or without it, after which the windows hold nothing else
 HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
 """Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
 ``SETTLED``, before, and over the short window."""
@@ -64,19 +60,16 @@ window nor a single peak is control's doing."""
 SHIFT, SHIFT_WINDOW = 0.03, 5.0
 """Share of the nominal force by which control may move the mean force, by the model; time constant of that
 mean (s)."""
-LOW = 0.2
-"""Share of the nominal force below which the command may not take more away."""
+LOW = 0.2  # share of the nominal force below which the command may not take more away
 FADE_OUT, FADE_IN, PROBE = 0.2, 0.5, 3.0
 """Times (s) in which the command fades out; in, after readings were held; and in after a pause, so slowly
 that harm is seen while it is small."""
-HIGHEST = 20.0
-"""Frequency (Hz) up to which the force's spread is compared, as in figures."""
+HIGHEST = 20.0  # frequency (Hz) up to which the force's spread is compared, as in figures
 PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
 """First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
 CALMER = 0.85
 """Ratio of the spread heard in a pause to that over the short window before, above which it was no harm."""
-GOOD = 20.0
-"""Time (s) of control without harm after which the next pause is the first again."""
+GOOD = 20.0  # time (s) of control without harm after which the next pause is the first again
 FASTER = 1.2
 """Ratio of speeds, of now and of when it last listened, from which on it listens anew. Up to it the spread
 that it heard is taken to grow with the square of the speed."""
@@ -243,17 +236,12 @@ class Readings:
             seen[past] = self._shown[-min(k, len(self._shown))]
         seen[self.present] = shown
         self._shown = [*self._shown[-8:], shown]
-        if self.memory and self._sound_for < len(self._faulty):
-            self._forget(seen)
-        return seen
-
-    def _forget(self, seen: Observation) -> None:
-        """Take for unknown what memory has of times in which a reading was faulty."""
-        for place, spans, ahead in self.memory:
+        # What memory has of times in which a reading was faulty is taken for unknown.
+        for place, spans, ahead in self.memory if self._sound_for < len(self._faulty) else ():
             ago = round(spans / self._per_step - ahead)
-            recent = [self._faulty[-k] for k in range(max(ago - 3, 1), ago + 4) if k <= len(self._faulty)]
-            if any(recent):
+            if any(self._faulty[-k] for k in range(max(ago - 3, 1), min(ago + 3, len(self._faulty)) + 1)):
                 seen[place] = self.unknown
+        return seen
 
 
 class Monitor:
@@ -280,7 +268,7 @@ class Monitor:
         self.shares = 1 - np.exp(-self._interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW]))
         self._means = np.zeros((2, 3))  # over both windows: of the force, without control, and what that adds
         self._squares, self._added = np.zeros((2, 3)), 0.0
-        self._begun = False
+        self._past: Array | None = None  # of the low-pass
         self.low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
         self.at_rest = lfilter_zi(*self.low_pass)
         self.gate, self.low = 0.0, False
@@ -290,7 +278,7 @@ class Monitor:
         self._listened, self._most, self._deviation = 0.0, math.inf, 0.0  # from the mean (N)
         self._before = math.inf  # spread when it last faded (N)
         self._speed = names.index("speed") if "speed" in names else None
-        self._to_speed = layout.entries[self._speed] if self._speed is not None else None
+        self._entries = layout.entries
 
     def __call__(self, seen: Observation, readings: Readings) -> float:
         """Gate for this control step; seen: the checked observation."""
@@ -305,11 +293,11 @@ class Monitor:
             self._add(force, added)
         deviations = np.sqrt(np.maximum(self._squares, 1e-9))
         self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
-        speed = self._speed_of(seen)
-        if self._passive_for == 0.0:
-            self._listened = 0.0
-        else:
-            self._listened = max(self._listened, abs(self._deviation))
+        speed = self._heard_at
+        if self._speed is not None:
+            entry = self._entries[self._speed]
+            speed = float(entry.centre + entry.scale * seen[self._speed])
+        self._listened = max(self._listened, abs(self._deviation)) if self._passive_for > 0.0 else 0.0
         if self._passive_for > SETTLED:
             self._heard, self._heard_at = float(deviations[0, 0]), speed
             self._most = self._listened
@@ -327,8 +315,7 @@ class Monitor:
                 self._before, self._waits, self._fade_in = float(deviations[1, 0]), self._pause, PROBE
                 self._pause = min(GROWTH * self._pause, LONGEST_PAUSE)
             elif not 1 / FASTER < speed / self._heard_at < FASTER:
-                self._before, self._waits = 0.0, PAUSE
-                self._fade_in = FADE_IN
+                self._before, self._waits, self._fade_in = 0.0, PAUSE, FADE_IN
         if 0.0 < self._waits <= self._interval and self._heard > CALMER * self._before:
             self._pause = PAUSE  # it was no better without
         self._waits = max(self._waits - self._interval, 0.0)
@@ -339,24 +326,17 @@ class Monitor:
 
     def _add(self, force: float, added: float) -> None:
         now = np.array([force, force - added, added])
-        if not self._begun:
-            self._means[:], self._begun = now, True
-            self._past = np.multiply.outer(self.at_rest, now)
+        if self._past is None:
+            self._means[:], self._past = now, np.multiply.outer(self.at_rest, now)
         (b0, b1, b2), (_, a1, a2) = self.low_pass
         first, second = self._past
         passed = b0 * now + first
         self._past = np.array([b1 * now - a1 * passed + second, b2 * now - a2 * passed])
-        now = passed
-        shares = self.shares[:2, None]
+        now, shares = passed, self.shares[:2, None]
         self._deviation = float(now[0] - self._means[0, 0])
         self._means += shares * (now - self._means)
         self._squares += shares * ((now - self._means) ** 2 - self._squares)
         self._added += self.shares[2] * (added - self._added)
-
-    def _speed_of(self, seen: Observation) -> float:
-        if self._to_speed is None:
-            return self._heard_at
-        return float(self._to_speed.centre + self._to_speed.scale * seen[self._speed])
 
     def _does_harm(self, deviations: Array, speed: float) -> bool:
         (acted, without, _), (acted_lately, without_lately, added) = deviations

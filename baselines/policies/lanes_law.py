@@ -27,10 +27,8 @@ from panto_env.plant.state import Place
 
 Source = str | Sequence[float]
 GAINS_FOLDER = FOLDER / "policies"
-MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)
-"""How the names begin of what lines are drawn from."""
-REACH = 12.5
-"""Gains are used up to this far (km/h) beyond the tuned speeds: half a usual step."""
+MANY_LINES = tuple(f"{kind}:" for kind in DRAWN)  # how the names begin of what lines are drawn from
+REACH = 12.5  # gains are used up to this far (km/h) beyond the tuned speeds: half a usual step
 
 
 class Tuning(Settings):
@@ -65,16 +63,16 @@ class Tuning(Settings):
             raise ValueError("speeds_kmh must rise")
         return self
 
-    def is_for(self, catenary: CatenaryData, pantograph: PantographData, place: str) -> bool:
-        """Whether it was made for this line and pantograph, by their values, and place of the actuator."""
-        return self._is_of(pantograph, place) and is_entry(catenary, self.catenary, self.catenary_sha256)
+    def is_for(self, catenary: CatenaryData | None, pantograph: PantographData, place: str) -> bool:
+        """Whether it was made for this line and pantograph, by their values, and place of the actuator.
 
-    def is_for_any_line(self, pantograph: PantographData, place: str) -> bool:
-        """Whether it was made on many lines, drawn from a family or a section, for this pantograph."""
-        return self._is_of(pantograph, place) and self.catenary.startswith(MANY_LINES)
-
-    def _is_of(self, pantograph: PantographData, place: str) -> bool:
-        return place == self.place and is_entry(pantograph, self.pantograph, self.pantograph_sha256)
+        Without a line: whether it was made on many lines, drawn from a family or a section.
+        """
+        if place != self.place or not is_entry(pantograph, self.pantograph, self.pantograph_sha256):
+            return False
+        if catenary is None:
+            return self.catenary.startswith(MANY_LINES)
+        return is_entry(catenary, self.catenary, self.catenary_sha256)
 
 
 class GainFile(Settings):
@@ -111,24 +109,23 @@ def find_gains(source: Source, names: Sequence[str], context: Context) -> NDArra
         if len(source) != len(names):
             raise InputError(f"There must be {len(names)} gains ({', '.join(names)}), not {len(source)}.")
         return np.array(source, dtype=float)
-    path = gain_file(source)
+    path, line, pantograph = gain_file(source), context.catenary, context.pantograph
     place = "both" if len(context.channels) > 1 else Place(context.channels[0]).name.lower()
     tunings = load_gains(path).tunings
     able = [each for each in tunings if each.washout in (0.0, context.washout)]
     able.sort(key=lambda each: each.washout != context.washout)
-    own = [each for each in able if each.is_for(context.catenary, context.pantograph, place)]
-    others = [each for each in able if each.is_for_any_line(context.pantograph, place)]
-    if own or others:
-        return _at_speed((*own, *others)[0], names, to_kmh(context.speed), path)
-    line, pantograph = context.catenary.name, context.pantograph.name
-    named = (line, pantograph, place) in ((each.catenary, each.pantograph, each.place) for each in tunings)
-    but = ", only for others of these names with other values" if named else ""
+    own = [each for where in (line, None) for each in able if each.is_for(where, pantograph, place)]
+    if own:
+        return _at_speed(own[0], names, to_kmh(context.speed), path)
+    but, case = "", (line.name, pantograph.name, place)
+    if case in ((each.catenary, each.pantograph, each.place) for each in tunings):
+        but = ", only for others of these names with other values"
     for each in tunings:
-        if each not in able and each.is_for(context.catenary, context.pantograph, place):
+        if each not in able and each.is_for(line, pantograph, place):
             but = f", only for a washout of {each.washout:g} s, which the policy must then have"
     raise InputError(
-        f"{path.name} has no gains for the pantograph '{pantograph}' on the line '{line}' with an actuator "
-        f"at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
+        f"{path.name} has no gains for the pantograph '{pantograph.name}' on the line '{line.name}' with an "
+        f"actuator at {place}{but}: make them with `panto tune`, give them ({', '.join(names[:4])}"
         f"{', ...' if len(names) > 4 else ''}) as the parameter gains, or take a policy that needs none."
     )
 
@@ -203,8 +200,7 @@ class LanesLaw(ABC):
                 "h-infinity, or repetitive:place='counted'."
             )
         ahead = 2 * np.pi * lead * self.read(observations, "speed") / self.context.alignment.mean_length
-        angle: Array = np.arctan2(sine, cosine) + ahead
-        return angle
+        return np.asarray(np.arctan2(sine, cosine) + ahead)
 
 
 class Gain(NamedTuple):

@@ -24,10 +24,8 @@ from panto_env.plant.pantograph.schema import STRIP_STIFFNESS, matrices
 
 DELAY, LAG = 0.010, 0.015
 """Delay of actuator and sensors together, and lag of the actuator (s), from the presets "realistic"."""
-RATE = 2500.0
-"""Limit of the actuator's rate (N/s), likewise."""
-SHORTEST_LAG = 1e-3
-"""Minimum lag (s); a smaller one is replaced by it, which makes no difference at 100 Hz."""
+RATE = 2500.0  # limit of the actuator's rate (N/s), likewise
+SHORTEST_LAG = 1e-3  # minimum lag (s); a smaller one is replaced by it, which makes no difference at 100 Hz
 OUTPUTS = ("contact force", "head displacement", "frame displacement", "head velocity", "frame velocity")
 """Outputs of the model, in order (N, m, m/s), named as the entries of the observation."""
 

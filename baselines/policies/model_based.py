@@ -15,18 +15,14 @@ from panto_env.estimation.kalman import steady_gain
 from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLaw
 from .line_model import DELAY, LAG, OUTPUTS, LineModel, MeanLine, Sampled, line_model, mean_line
 
-HIGHEST = 8.0
-"""Maximum frequency (Hz) of the span's harmonics in the model of the wire's height."""
-FADING = 0.05
-"""Damping ratio of these harmonics: it sets the filter's memory and bandwidth."""
-HEIGHT = 1e-3
-"""Unit (m) of the noise that drives heights."""
+HIGHEST = 8.0  # maximum frequency (Hz) of the span's harmonics in the model of the wire's height
+FADING = 0.05  # damping ratio of these harmonics: it sets the filter's memory and bandwidth
+HEIGHT = 1e-3  # unit (m) of the noise that drives heights
 READING_NOISE = (2.0, 1e-3, 1e-3, 2e-2, 2e-2)
 """Rms noise of ``OUTPUTS`` (N, m, m/s), mostly the model's own error; the force is trusted most."""
 ROUNDING = 1e-14
 """Variance added to each state's noise, without which the Riccati equation is too badly conditioned."""
-AVERAGED = 2.0
-"""Time constant (s) of the slow averages that are subtracted from readings."""
+AVERAGED = 2.0  # time constant (s) of the slow averages that are subtracted from readings
 HELD = 0.7
 """Frequency (Hz) below which the integral of the command costs more than the command: it keeps the mean."""
 
@@ -102,7 +98,7 @@ class Disturbed:
         interval, span_rate = context.control_interval, context.speed / context.alignment.mean_length
         count = max(1, int(HIGHEST / span_rate))
         size, own = sampled.size, 2 * count + 1
-        self.a = np.zeros((size + own, size + own))
+        self.a = np.zeros((size + own + 1, size + own + 1))
         self.a[:size, :size] = sampled.a
         rows = np.zeros(own)
         for k in range(1, count + 1):
@@ -112,24 +108,19 @@ class Disturbed:
             turn = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
             self.a[place : place + 2, place : place + 2] = fading * np.array(turn)
             rows[2 * k - 2] = 1.0
-        self.a[-1, -1] = np.exp(-interval * 2 * np.pi * span_rate)
+        self.a[-2, -2] = np.exp(-interval * 2 * np.pi * span_rate)
         rows[-1] = 1.0
-        self.a[:size, size:] = np.outer(sampled.height, rows)
-        self.b = np.concatenate([sampled.b, np.zeros(own)])
-        self.c = np.hstack([sampled.c, np.outer(sampled.d_height, rows)])
+        self.a[:size, size:-1] = np.outer(sampled.height, rows)
+        # The last state is the integral of the command (N s), which is known without being read.
+        self.a[-1, -1] = 1.0
+        self.b = np.concatenate([sampled.b, np.zeros(own), [interval]])
+        self.c = np.hstack([sampled.c, np.outer(sampled.d_height, rows), np.zeros((len(sampled.c), 1))])
         strength = interval * HEIGHT**2
         # Heights of high harmonics are small: their noise falls with the number.
         falling = np.repeat(1.0 / np.arange(1, count + 1) ** 2, 2)
         self.noise = np.zeros(len(self.a))
-        self.noise[size:-1] = strength * harmonics**2 * falling
-        self.noise[-1] = strength * wandering**2
-        # The integral of the command (N s), which is known without being read.
-        size = len(self.a)
-        whole = np.eye(size + 1)
-        whole[:size, :size] = self.a
-        self.a, self.b = whole, np.append(self.b, interval)
-        self.c = np.hstack([self.c, np.zeros((len(self.c), 1))])
-        self.noise = np.append(self.noise, 0.0)
+        self.noise[size:-2] = strength * harmonics**2 * falling
+        self.noise[-2] = strength * wandering**2
 
 
 def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> Array:
@@ -143,14 +134,11 @@ def regulator(a: Array, b: Array, force: Array, effort: float, held: float) -> A
     cost[-1, -1] += effort * (2 * np.pi * held) ** 2
     with one_thread():
         p = solve_discrete_are(a, b[:, None], cost, np.array([[effort]]))
-        gains: Array = (b @ p @ a) / (effort + b @ p @ b)
-    return gains
+        return np.asarray((b @ p @ a) / (effort + b @ p @ b))
 
 
-CORNER = 30.0
-"""Angular frequency (rad/s) up to which the height of the wire is expected to vary."""
-WIDTH = 0.7
-"""Damping ratio of the weight on the contact force, which sets the width of its band."""
+CORNER = 30.0  # angular frequency (rad/s) up to which the height of the wire is expected to vary
+WIDTH = 0.7  # damping ratio of the weight on the contact force, which sets the width of its band
 NEAR = 1.1
 """Ratio of the bound used to the minimum one: a controller at the minimum bound is badly conditioned."""
 SMALLEST, LARGEST, STRIDE, HALVINGS = 1e-3, 1e6, 4.0, 10
@@ -225,8 +213,7 @@ class Weighted(NamedTuple):
     c2: Array  # (5, states)
 
 
-Controller = tuple[Array, Array, Array]
-"""Matrices A, B and C of x' = A x + B readings, u = C x."""
+Controller = tuple[Array, Array, Array]  # matrices A, B and C of x' = A x + B readings, u = C x
 
 
 def weighted(model: LineModel, performance: float, centre: float, height: float) -> Weighted:

@@ -15,16 +15,11 @@ from .lanes_law import Array, FromAverage, Gain, Observations, Source, TunableLa
 from .line_model import DELAY, LAG, RATE
 from .preview import Preview, preview
 
-HORIZON = 30
-"""Control steps of the prediction: 0.3 s, about a period of the frame under the wire."""
-LENGTH = 120
-"""Control steps after which the response to a command has died out."""
-HELD = 0.4
-"""Frequency (Hz) below which the integral of the command costs more than a force of the same size."""
-TOLERANCE = 1e-3
-"""Tolerance of the solver (N, and relative)."""
-AVERAGED = 2.0
-"""Time constant (s) of the slow average that is subtracted from the contact force."""
+HORIZON = 30  # control steps of the prediction: 0.3 s, about a period of the frame under the wire
+LENGTH = 120  # control steps after which the response to a command has died out
+HELD = 0.4  # frequency (Hz) below which the integral of the command costs more than a force of the same size
+TOLERANCE = 1e-3  # tolerance of the solver (N, and relative)
+AVERAGED = 2.0  # time constant (s) of the slow average that is subtracted from the contact force
 
 
 class PredictiveControl(TunableLaw):

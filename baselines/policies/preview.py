@@ -27,12 +27,9 @@ from panto_env.policies import Policy, find_policy, wishes
 from ..benchmark.settings import TRAINING
 
 Array = NDArray[np.float64]
-SETTLED = 9
-"""Spans after which the force nearly repeats with the span."""
-CLEAR = 8
-"""Spans of the line beyond those run, so that its end has no effect."""
-PULSE = 20.0
-"""Test force (N): small beside the contact force, large beside rounding."""
+SETTLED = 9  # spans after which the force nearly repeats with the span
+CLEAR = 8  # spans of the line beyond those run, so that its end has no effect
+PULSE = 20.0  # test force (N): small beside the contact force, large beside rounding
 
 
 class Preview(NamedTuple):
@@ -50,21 +47,19 @@ class Preview(NamedTuple):
 
 def preview(context: Context, length: int, delay: float, lag: float) -> Preview:
     """Preview for an episode. length: steps of the responses; delay, lag: of the actuator (s)."""
-    place = Place(context.channels[0]).name.lower()
-    speed, interval = context.speed, context.control_interval
-    return _preview(context.catenary, context.pantograph, place, speed, interval, length, delay, lag)
+    line, place = context.catenary, Place(context.channels[0]).name.lower()
+    actuator = LaggedActuator(place=place, delay=delay, lag=lag, force_limit=PULSE)
+    return _preview(line, context.pantograph, actuator, context.speed, context.control_interval, length)
 
 
 @remembered
 def _preview(
     catenary: CatenaryData,
     pantograph: PantographData,
-    place: str,
+    actuator: LaggedActuator,
     speed: float,
     interval: float,
     length: int,
-    delay: float,
-    lag: float,
 ) -> Preview:
     stride, alignment = speed * interval, catenary.alignment()
     first = math.ceil(alignment.support(SETTLED) / stride)
@@ -76,7 +71,7 @@ def _preview(
             "catenary": catenary,
             "pantograph": pantograph,
             "speed_kmh": to_kmh(speed),
-            "actuator": LaggedActuator(place=place, delay=delay, lag=lag, force_limit=PULSE),
+            "actuator": actuator,
             "accuracy": "fast",
             "distance": alignment.support(spans),
             "spans": spans + CLEAR,
@@ -98,40 +93,21 @@ def _preview(
         if k < last:
             task.step(action)
     passive = force[first : first + steps, 0]
-    response = np.array(
-        [
-            force[first + i + 1 : first + i + 1 + length, 1 + i]
-            - force[first + i + 1 : first + i + 1 + length, 0]
-            for i in range(steps)
-        ]
-    )
+    windows = [slice(first + i + 1, first + i + 1 + length) for i in range(steps)]
+    response = np.array([force[own, 1 + i] - force[own, 0] for i, own in enumerate(windows)])
     start = first * stride - alignment.support(SETTLED)
     return Preview(start, stride, passive - passive.mean(), response / PULSE)
 
 
-PLACES = tuple(range(0, 31, 2))
-"""Places ahead (m) at which the force in front is observed."""
-PASSES, EXCITED = 6, 3
-"""Passes without control, and with test forces, from which gains are fitted."""
-DISTANCE = 1500.0
-"""Length of these passes (m)."""
-BEGIN = 120
-"""Control steps of a pass that are left out at its start, while waves build up."""
-PULSES, PULSE_STEPS = 20.0, 5
-"""Test forces (N), up or down at random, and control steps that each is held."""
-RESPONSE = 40
-"""Control steps in which a command acts on the contact force."""
+PLACES = tuple(range(0, 31, 2))  # places ahead (m) at which the force in front is observed
+PASSES, EXCITED = 6, 3  # passes without control, and with test forces, from which gains are fitted
+DISTANCE = 1500.0  # length of these passes (m)
+BEGIN = 120  # control steps of a pass that are left out at its start, while waves build up
+PULSES, PULSE_STEPS = 20.0, 5  # test forces (N), up or down at random, and control steps that each is held
+RESPONSE = 40  # control steps in which a command acts on the contact force
 PAST = range(2, 60, 3)
 """Control steps ago at which the force in front at the own place is remembered, for waves that come late."""
-RIDGE = 0.3
-"""Weight of the squared command beside the squared force that it leaves."""
-
-
-class Gains(NamedTuple):
-    """Gains for one line, speed and train."""
-
-    mean: float  # contact force in front (N)
-    gains: Array  # (places, then times of ``PAST``): command by its deviation (N/N)
+RIDGE = 0.3  # weight of the squared command beside the squared force that it leaves
 
 
 class FrontPreview:
@@ -160,22 +136,19 @@ class FrontPreview:
         """
         self._assumed = base, actuator, sensors
         self._base = find_policy(base or "passive")
-        for name, value in _wished(self._base).items():
-            setattr(self, name, value)
+        vars(self).update(_wished(self._base))
 
     def reset(self, context: Context) -> None:
         """Find the gains. Raises InputError where no pantograph is in front."""
-        train, number = context.train, context.collector
+        number, collectors = context.collector, context.train.collectors
         if number == 0:
             raise InputError("front-preview needs a pantograph in front: control one behind another.")
-        distances = tuple(own.distance for own in train.collectors)
-        pantographs = tuple(own.pantograph for own in train.collectors)
         if len(context.channels) > 1:
             raise InputError("front-preview drives one actuator, on frame or head, not both.")
-        self._gains = _gains(
+        self._mean, self._gains = _gains(
             context.catenary,
-            pantographs,
-            distances[1:],
+            tuple(own.pantograph for own in collectors),
+            tuple(own.distance for own in collectors[1:]),
             number + 1,
             context.speed,
             context.control_interval,
@@ -187,14 +160,14 @@ class FrontPreview:
         self._columns = [layout.index(f"front force, {metres:g} m ahead") for metres in PLACES]
         self._scale = layout.scale[self._columns]
         self._limit = context.force_limit
-        self._past = np.full(max(PAST) + 1, self._gains.mean)
+        self._past = np.full(max(PAST) + 1, self._mean)
 
     def act(self, observation: NDArray[np.float32]) -> Array:
         """Action, (1,), for an observation."""
         ahead = observation[self._columns] * self._scale
         self._past = np.append(self._past[1:], ahead[0])
-        observed = np.append(ahead, self._past[[-1 - steps for steps in PAST]]) - self._gains.mean
-        more = observed @ self._gains.gains / self._limit
+        observed = np.append(ahead, self._past[[-1 - steps for steps in PAST]]) - self._mean
+        more = observed @ self._gains / self._limit
         return np.clip(self._base.act(observation) + more, -1.0, 1.0)
 
 
@@ -208,7 +181,8 @@ def _gains(
     interval: float,
     place: str,
     assumed: tuple[str, str, str],
-) -> Gains:
+) -> tuple[float, Array]:
+    """Mean force in front (N), and gains of its deviations (N/N) at ``PLACES``, then times of ``PAST``."""
     base, actuator, sensors = assumed
     policy = find_policy(base or "passive")
     settings = run_settings(
@@ -230,17 +204,15 @@ def _gains(
     passes = [_Pass(settings, policy, seed) for seed in TRAINING[:PASSES]]
     response = _response(settings, policy, passes[:EXCITED])
     mean = float(np.mean([own.observed[BEGIN:, 0].mean() for own in passes]))
-    observed, moved, deviations = [], [], []
-    for own in passes:
-        features = own.features(mean)
-        acted = np.stack([np.convolve(each, response)[: len(each)] for each in features.T], axis=1)
-        force = own.force[BEGIN:]
-        observed.append(features[BEGIN:])
-        moved.append(acted[BEGIN:])
-        deviations.append(force - force.mean())
-    x, z, y = np.concatenate(moved), np.concatenate(observed), np.concatenate(deviations)
+    observed = [own.features(mean) for own in passes]
+    moved = [
+        np.stack([np.convolve(each, response)[: len(each)] for each in features.T], axis=1)
+        for features in observed
+    ]
+    x, z = (np.concatenate([each[BEGIN:] for each in some]) for some in (moved, observed))
+    y = np.concatenate([own.force[BEGIN:] - own.force[BEGIN:].mean() for own in passes])
     normal = x.T @ x + RIDGE * z.T @ z + 1e-3 * len(x) * np.eye(x.shape[1])
-    return Gains(mean, np.linalg.solve(normal, -x.T @ y))
+    return mean, np.linalg.solve(normal, -x.T @ y)
 
 
 def _wished(policy: Policy) -> dict[str, Any]:

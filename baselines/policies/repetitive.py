@@ -67,27 +67,20 @@ class Washout:
         return change
 
 
-PLACES = ("read", "counted")
-"""Where the place within the span comes from."""
+PLACES = ("read", "counted")  # where the place within the span comes from
 
 
-HIGHEST = 16.0
-"""Maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz."""
-LISTENING = 3.0
-"""Spans without control at the start; the last two give the approximate passive sigma."""
-TOLERATED = 1.05
-"""Ratio of a span's sigma to the passive one above which the control backs off."""
+HIGHEST = 16.0  # maximum frequency (Hz) of the span's harmonics that are learnt. Sigma covers up to 20 Hz.
+LISTENING = 3.0  # spans without control at the start; the last two give the approximate passive sigma
+TOLERATED = 1.05  # ratio of a span's sigma to the passive one above which the control backs off
 ANOTHER = 0.03
 """Relative change of the measured speed from which on it learns at another speed; a train's drift is less."""
-SMOOTHED = 0.5
-"""Time constant (s) of the measured speed."""
+SMOOTHED = 0.5  # time constant (s) of the measured speed
 BACK_OFF, RECOVERY = 0.5, 1.05
 """Factor on the learnt force and on the speed of learning after a span in which the control backs off; factor
 by which learning recovers after any other span, up to its full speed."""
-OVER = 1.5
-"""Maximum peak of the learnt force, relative to the actuator's limit: clipping it gains a little."""
-PEAKS = 128
-"""Number of places of a span at which the peak of the learnt force is searched for."""
+OVER = 1.5  # maximum peak of the learnt force, relative to the actuator's limit: clipping it gains a little
+PEAKS = 128  # number of places of a span at which the peak of the learnt force is searched for
 
 
 class Pace(NamedTuple):
@@ -98,8 +91,7 @@ class Pace(NamedTuple):
     response: float  # response of the contact force below which learning slows down (N/N)
 
 
-PACE = Pace(0.65, 0.01, 0.5)
-"""Best of several values on training seeds of four lines."""
+PACE = Pace(0.65, 0.01, 0.5)  # best of several values on training seeds of four lines
 
 
 def harmonics(span_rate: float) -> Array:
@@ -136,8 +128,7 @@ class SpanLearner:
         """numbers: of the harmonics, (k,); answers: G_k, (k,); share: spans per control step; limit: of the
         actuator's force (N).
         """
-        learning, forgetting, response = np.abs(np.array(pace))
-        self._pace, self._limit = (learning, forgetting, response), OVER * limit
+        self._pace, self._limit = np.abs(np.array(pace)), OVER * limit
         self._learnt: NDArray[np.complex128] = np.zeros((lanes, 0), dtype=complex)
         self._ledger, self._trust = _Ledger(lanes), np.ones(lanes)
         self._tune(numbers, answers, share)
@@ -172,18 +163,13 @@ class SpanLearner:
             self._learnt[worse] *= BACK_OFF
             self._trust = np.minimum(1.0, self._trust * np.where(worse, BACK_OFF, RECOVERY))
         if self._ledger.spans >= LISTENING:
-            self._learnt = self._kept * self._learnt - self._towards * (
-                (self._trust * error)[:, None] * np.conj(turns)
-            )
-            self._hold_within_limit()
+            felt = (self._trust * error)[:, None] * np.conj(turns)
+            self._learnt = self._kept * self._learnt - self._towards * felt
+            # Forces whose peak exceeds the actuator's are scaled down: otherwise learning would never end.
+            if (np.abs(self._learnt).sum(axis=1) > self._limit).any():
+                peaks = np.abs((self._learnt @ self._around).real).max(axis=1)
+                self._learnt *= np.minimum(1.0, self._limit / np.maximum(peaks, self._limit))[:, None]
         return np.asarray((self._learnt * turns).real.sum(axis=1))
-
-    def _hold_within_limit(self) -> None:
-        """Scale down forces whose peak exceeds the actuator's: otherwise learning would never end."""
-        limit = self._limit
-        if (np.abs(self._learnt).sum(axis=1) > limit).any():
-            peaks = np.abs((self._learnt @ self._around).real).max(axis=1)
-            self._learnt *= np.minimum(1.0, limit / np.maximum(peaks, limit))[:, None]
 
 
 class _Ledger:
@@ -256,15 +242,14 @@ class Repetitive(TunableLaw):
     def begin(self, context: Context, lanes: int) -> None:
         """Prepare for episodes in this number of lanes."""
         super().begin(context, lanes)
-        model = line_model(context, mean_line(context), *self.delays)
         interval, limit = context.control_interval, context.force_limit
         pace = Pace(*self.gains[-len(Pace._fields) :])
-        self._model, self._speed, self._learns_at = model, context.speed, context.speed
+        self._model = line_model(context, mean_line(context), *self.delays)
+        self._speed = self._learns_at = context.speed
         self._learner = SpanLearner(pace, *self._at(context.speed), limit, lanes)
-        span_rate = context.speed / context.alignment.mean_length
-        self._sampled = Sampled(model, interval)
+        self._sampled = Sampled(self._model, interval)
         self._state = np.zeros((self._sampled.size, lanes))
-        self._from_average = FromAverage(interval, 1 / span_rate)
+        self._from_average = FromAverage(interval, 1 / (context.speed / context.alignment.mean_length))
         self._washout = Washout(WASHED, interval, limit, (lanes,))
         self._counted = np.zeros(lanes)
 

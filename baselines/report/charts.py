@@ -11,10 +11,8 @@ WIDTH, HEIGHT = 420.0, 230.0
 LEFT, RIGHT, TOP, BOTTOM = 44.0, 8.0, 10.0, 38.0
 """Size of a chart and margins around its axes, in units of its view box."""
 TICKS = 5
-LETTER, LINE = 6.0, 12.0
-"""Approximate width and height of a letter of a label."""
-RADIUS, GAP = 5.0, 7.0
-"""Radius of a dot, and distance from its centre to its label."""
+LETTER, LINE = 6.0, 12.0  # approximate width and height of a letter of a label
+RADIUS, GAP = 5.0, 7.0  # radius of a dot, and distance from its centre to its label
 
 
 class Tick(NamedTuple):
@@ -52,10 +50,10 @@ class Chart:
     y_label: str
     x_ticks: list[Tick]
     y_ticks: list[Tick]
-    curves: list[Curve]
-    dots: list[Dot]
-    supports: list[float]  # x of vertical lines
-    level: float | None  # y of a dotted line
+    curves: Sequence[Curve] = ()
+    dots: Sequence[Dot] = ()
+    supports: Sequence[float] = ()  # x of vertical lines
+    level: float | None = None  # y of a dotted line
 
 
 class Scale(NamedTuple):
@@ -109,17 +107,9 @@ def curves(
         for line in lines
     ]
     ticks = [Tick(x(value), f"{value:g}") for value in _nice(x.lowest, x.highest) if value <= x.highest]
-    return Chart(
-        title=title,
-        x_label=labels[0],
-        y_label=labels[1],
-        x_ticks=[tick for tick in ticks if tick.at >= LEFT],
-        y_ticks=y_ticks,
-        curves=drawn,
-        dots=[],
-        supports=[x(each) for each in supports],
-        level=None if level is None else y(level),
-    )
+    ticks = [tick for tick in ticks if tick.at >= LEFT]
+    level = None if level is None else y(level)
+    return Chart(title, *labels, ticks, y_ticks, drawn, supports=[x(each) for each in supports], level=level)
 
 
 def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart | None:
@@ -143,7 +133,7 @@ def dots(title: str, labels: tuple[str, str], points: Sequence[Point]) -> Chart 
             taken.append((free[0][0], free[0][0] + width, height))
         label, before = (policy, free[0][1]) if free else ("", False)
         drawn.append(Dot(policy, training, at, height, label, before, hollow))
-    return Chart(title, *labels, x_ticks, y_ticks, [], drawn, [], None)
+    return Chart(title, *labels, x_ticks, y_ticks, dots=drawn)
 
 
 def _is_free(begin: float, end: float, height: float, taken: Sequence[tuple[float, float, float]]) -> bool:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,13 +20,14 @@ from panto_env.report.page import page_template
 from panto_env.terminal import announce_overwriting, console
 
 from ..benchmark.actions import Trace
+from ..benchmark.overall import with_feedback
 from ..benchmark.report import LEGEND, LEGEND_OF_HARM, spans_in_words
 from ..benchmark.run import Result, read_result
 from ..benchmark.settings import BLIND, REFERENCE, TAPE, LineAtSpeed, control_of, policy_of
 from ..benchmark.statistics import Cell
 from ..line import as_toml
 from .charts import BOTTOM, GAP, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Chart, Line, Point, curves, dots
-from .tables import BAR, FAR_OFF, PageTable, leaderboard, signed, table_of_cells, tables_of
+from .tables import BAR, FAR_OFF, leaderboard, signed, table_of_cells, tables_of
 
 CONTROLS = {
     BLIND: "A control: {}, given its first observation at every step.",
@@ -54,159 +54,99 @@ def what_is(policy: str) -> str:
     return "It is not installed where this page was made."
 
 
-STRONGEST = 0.6
-"""Opacity of a heat map's strongest colour, so that text on it stays legible."""
+STRONGEST = 0.6  # opacity of a heat map's strongest colour, so that text on it stays legible
 
 
-@dataclass(frozen=True)
-class Shade:
-    """A coloured cell of a table: its text, and its strength from -1 (better) through 0 to 1 (worse)."""
-
-    text: str
-    strength: float
-    disqualified: bool = False
-    note: str = ""
-
-    @property
-    def kind(self) -> str:
-        """Name of its colour."""
-        return "better" if self.strength < 0 else "worse"
-
-    @property
-    def opacity(self) -> float:
-        """Opacity of its colour."""
-        return round(STRONGEST * min(abs(self.strength), 1.0), 3)
+Shade = dict[str, Any] | None
+"""A coloured cell of a table: its text, and name and opacity of its colour."""
 
 
-@dataclass(frozen=True)
-class Section:
-    """Table and charts of one line at one speed."""
-
-    title: str
-    table: PageTable
-    charts: list[Chart]
+def _shade(text: str, strength: float, disqualified: bool = False, note: str = "") -> Shade:
+    """strength: from -1 (better) through 0 to 1 (worse)."""
+    opacity = round(STRONGEST * min(abs(strength), 1.0), 3)
+    colour = {"kind": "better" if strength < 0 else "worse", "opacity": opacity}
+    return {"text": text, "disqualified": disqualified, "note": note, **colour}
 
 
-@dataclass(frozen=True)
-class About:
-    """One policy: its description, its rank, and the cell where it is worst."""
-
-    name: str
-    text: str
-    rank: int | None
-    worst: Cell
-    disqualified: list[Cell]
-    everywhere: bool
-    method: str  # of which it is a training, or ""
-
-
-@dataclass(frozen=True)
-class Track:
+def track(result: Result) -> dict[str, Any]:
     """Everything that the page shows of one result."""
-
-    result: Result
-    settings: str  # as TOML
-    numbers: dict[str, int]  # of policies, for their colours
-    shown_first: set[str]  # policies whose traces are shown when the page opens
-    leaderboard: PageTable
-    lines: list[tuple[LineAtSpeed, int]]  # the first place of each line, and at how many speeds it is run
-    heat: dict[str, list[Shade | None]]  # by policy, over all places
-    pairs: dict[str, list[Shade | None]]  # by policy, over all others
-    overview: Chart | None
-    sections: list[Section]
-    policies: list[About]
-
-
-def track(result: Result) -> Track:
-    """Contents of the page for a result."""
     ranked = [one for one in result.by_rank if one.rank]
     first = {REFERENCE, *(next(iter(one.trainings), one.policy) for one in ranked[:3])}
     method_of = result.method_of
     methods = dict.fromkeys(method_of.values())
-    return Track(
-        result=result,
-        settings=as_toml(result.settings),
-        numbers={policy: number for number, policy in enumerate([*result.policies, *methods])},
-        shown_first=first if len(ranked) > 2 else set(result.policies[:4]) | first,
-        leaderboard=leaderboard(result),
-        lines=[
-            (places[0], len(places))
-            for places in (list(own) for _, own in groupby(result.places, key=lambda place: place.line))
-        ],
-        heat=_heat(result),
-        pairs=_pairs(result),
-        overview=dots(
-            "Δσ over effort, all lines and speeds",
-            ("effort, mean over lines and speeds (N)", "Δσ (%)"),
-            [
-                Point(method_of[one.policy], *at, one.policy)
-                if one.policy in method_of
-                else Point(one.policy, *at)
-                for one in result.standings
-                for at in [(one.effort, one.change, bool(one.disqualified))]
-            ],
-        ),
-        sections=[_section(result, place) for place in result.places],
-        policies=[_about(result, policy) for policy in result.policies],
-    )
-
-
-def _heat(result: Result) -> dict[str, list[Shade | None]]:
-    """Heat map of changes of σ; the strongest colour is the maximum change, up to ``FAR_OFF``."""
-    cells = {(cell.policy, cell.place): cell for cell in result.cells}
-    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
-    maximum = min(max([1.0, *sizes]), FAR_OFF)
+    lines = [list(own) for _, own in groupby(result.places, key=lambda place: place.line)]
+    points = [
+        Point(method_of[one.policy], *at, one.policy) if one.policy in method_of else Point(one.policy, *at)
+        for one in result.standings
+        for at in [(one.effort, one.change, bool(one.disqualified))]
+    ]
+    axes = "effort, mean over lines and speeds (N)", "Δσ (%)"
     return {
-        policy: [_shade(cells.get((policy, place)), maximum) for place in result.places]
-        for policy in result.policies
+        "result": result,
+        "heading": with_feedback(result.title, result.standings),
+        "settings": as_toml(result.settings),
+        # numbers of policies, for their colours, and those whose traces are shown when the page opens
+        "numbers": {policy: number for number, policy in enumerate([*result.policies, *methods])},
+        "shown_first": first if len(ranked) > 2 else set(result.policies[:4]) | first,
+        "leaderboard": leaderboard(result),
+        # the first place of each line, and at how many speeds it is run
+        "lines": [(places[0], len(places)) for places in lines],
+        "heat": _heat(result),
+        "pairs": _pairs(result),
+        "overview": dots("Δσ over effort, all lines and speeds", axes, points),
+        "sections": [_section(result, place) for place in result.places],
+        "policies": [_about(result, policy) for policy in result.policies],
     }
 
 
-def _shade(cell: Cell | None, maximum: float) -> Shade | None:
-    if cell is None:
-        return None
-    strength = cell.change / maximum if isfinite(cell.change) else 0.0
-    return Shade(signed(cell.change, 1), strength, bool(cell.disqualified))
+def _heat(result: Result) -> dict[str, list[Shade]]:
+    """Changes of σ by policy, over all places; the strongest colour is the maximum, up to ``FAR_OFF``."""
+    cells = {(cell.policy, cell.place): cell for cell in result.cells}
+    sizes = [abs(cell.change) for cell in result.cells if isfinite(cell.change)]
+    maximum = min(max([1.0, *sizes]), FAR_OFF)
+
+    def shade(cell: Cell | None) -> Shade:
+        if cell is None:
+            return None
+        strength = cell.change / maximum if isfinite(cell.change) else 0.0
+        return _shade(signed(cell.change, 1), strength, bool(cell.disqualified))
+
+    return {
+        policy: [shade(cells.get((policy, place))) for place in result.places] for policy in result.policies
+    }
 
 
-def _pairs(result: Result) -> dict[str, list[Shade | None]]:
+def _pairs(result: Result) -> dict[str, list[Shade]]:
     """Share of passes in which the row's policy has a smaller change of σ than the column's."""
     compared = [one for one in result.standings if one.policy not in result.method_of]
     shares = {one.policy: [one.better_than.get(other.policy) for other in compared] for one in compared}
     return {
         policy: [
-            one if one is None else Shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
+            one if one is None else _shade(f"{100 * one.share:.0f} %", 1 - 2 * one.share, note=one.between)
             for one in each
         ]
         for policy, each in shares.items()
     }
 
 
-def _section(result: Result, place: LineAtSpeed) -> Section:
+def _section(result: Result, place: LineAtSpeed) -> dict[str, Any]:
+    """Table and charts of one line at one speed."""
     cells = [cell for cell in result.cells if cell.place == place]
-    title = f"{place.name} at {place.speed_kmh:g} km/h"
     windows = result.windows[list(dict.fromkeys(each.line for each in result.places)).index(place.line)]
     first, last = windows.early
     count = f"{cells[0].seeds} seed{'s' if cells[0].seeds > 1 else ''}"
-    points = [
-        Point(
-            cell.policy,
-            cell.figures.get("effort", nan),
-            cell.figures.get("std", nan),
-            bool(cell.disqualified),
-        )
-        for cell in cells
-    ]
-    over_effort = dots("σ over effort", ("effort, rms (N)", "σ (N)"), points)
+    at = [(each.figures.get("effort", nan), each.figures.get("std", nan)) for each in cells]
+    points = [Point(one.policy, *xy, bool(one.disqualified)) for one, xy in zip(cells, at, strict=True)]
     traces = [trace for trace in result.traces if trace.place == place]
-    return Section(
-        title=title,
-        table=table_of_cells(cells, f"{spans_in_words(windows).capitalize()}, {count}"),
-        charts=[
-            *(_traces(traces, (max(first, last - 1), last), cells[0].nominal_force) if traces else []),
-            *([over_effort] if over_effort else []),
-        ],
-    )
+    charts: list[Chart | None] = []
+    if traces:
+        charts += _traces(traces, (max(first, last - 1), last), cells[0].nominal_force)
+    charts.append(dots("σ over effort", ("effort, rms (N)", "σ (N)"), points))
+    return {
+        "title": f"{place.name} at {place.speed_kmh:g} km/h",
+        "table": table_of_cells(cells, f"{spans_in_words(windows).capitalize()}, {count}"),
+        "charts": [chart for chart in charts if chart is not None],
+    }
 
 
 def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> list[Chart]:
@@ -232,18 +172,19 @@ def _traces(traces: Sequence[Trace], spans: tuple[int, int], nominal: float) -> 
     ]
 
 
-def _about(result: Result, policy: str) -> About:
+def _about(result: Result, policy: str) -> dict[str, Any]:
+    """One policy: its description, its rank, and the cell where it is worst."""
     own = [cell for cell in result.cells if cell.policy == policy]
     standing = next((one for one in result.standings if one.policy == policy), None)
-    return About(
-        name=policy,
-        text=what_is(policy),
-        rank=None if standing is None else standing.rank,
-        worst=max(own, key=lambda cell: cell.change if isfinite(cell.change) else -float("inf")),
-        disqualified=[cell for cell in own if cell.disqualified],
-        everywhere=standing is not None,
-        method=result.method_of.get(policy, ""),
-    )
+    return {
+        "name": policy,
+        "text": what_is(policy),
+        "rank": None if standing is None else standing.rank,
+        "worst": max(own, key=lambda cell: cell.change if isfinite(cell.change) else -float("inf")),
+        "disqualified": [cell for cell in own if cell.disqualified],
+        "everywhere": standing is not None,
+        "method": result.method_of.get(policy, ""),  # of which it is a training
+    }
 
 
 def page(results: Sequence[Result]) -> str:
@@ -255,15 +196,8 @@ def page(results: Sequence[Result]) -> str:
     return template.render(
         tracks=[track(result) for result in results],
         legend=f"{LEGEND} {LEGEND_OF_HARM}",
-        box={
-            "width": WIDTH,
-            "height": HEIGHT,
-            "left": LEFT,
-            "right": WIDTH - RIGHT,
-            "top": TOP,
-            "bottom": HEIGHT - BOTTOM,
-            "gap": GAP,
-        },
+        box={"width": WIDTH, "height": HEIGHT, "gap": GAP, "left": LEFT, "right": WIDTH - RIGHT}
+        | {"top": TOP, "bottom": HEIGHT - BOTTOM},
         bar=BAR,
     )
 
@@ -317,14 +251,10 @@ def report(
     path = with_suffix(files[0], PAGES[0]) if output is None else output
     check_output(path, PAGES)
     announce_overwriting(path)
-    if of_runs:
-        _of_runs(files, path, figures, droppers)
+    if not of_runs:
+        save([read_result(file) for file in files], path)
+        console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
         return
-    save([read_result(file) for file in files], path)
-    console.print(f"The page is {path}.", highlight=False, soft_wrap=True)
-
-
-def _of_runs(files: list[Path], path: Path, figures: str | None, droppers: str | None) -> None:
     from panto_env import Trajectory, report
     from panto_env.metrics.run_tables import save_droppers, save_figures
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import compress
 from math import isfinite, isnan, nan
 from statistics import mean
 from types import MappingProxyType
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from panto_env.base.table import Table
 from panto_env.terminal import number
@@ -21,20 +20,10 @@ from ..benchmark.single_pass import ROW_LABELS
 from ..benchmark.statistics import Cell
 from .charts import Scale
 
-BAR = 96.0
-"""Width of the picture of an interval, in units of its view box."""
+BAR = 96.0  # width of the picture of an interval, in units of its view box
 FAR_OFF = 25.0
 """Change of σ (%) beyond which a disqualified policy is left out of the scales of pictures and colours."""
 R = TypeVar("R", Standing, Cell)
-
-
-class Bar(NamedTuple):
-    """A change and its interval, as positions along a picture ``BAR`` wide; no interval: low = high."""
-
-    zero: float
-    low: float
-    high: float
-    at: float
 
 
 class Entry(NamedTuple):
@@ -43,52 +32,52 @@ class Entry(NamedTuple):
     text: str
     key: str = ""  # sort key: a number, or a text; "" comes last
     note: str = ""
-    bar: Bar | None = None
+    # positions along a picture ``BAR`` wide: of 0, low and high end of the interval, and the change itself
+    bar: dict[str, float] | None = None
 
 
-class Column(NamedTuple, Generic[R]):
-    """One column: its heading, and the function that makes its entry for a row."""
-
-    heading: str
-    entry: Callable[[R], Entry]
+Column = tuple[str, Callable[[R], Entry]]
+"""One column: its heading, and the function that makes its entry for a row."""
 
 
-class Row(NamedTuple):
-    """One policy's row."""
-
-    policy: str
-    disqualified: str
-    best: bool
-    entries: list[Entry]
-
-
-@dataclass(frozen=True)
-class PageTable:
+class PageTable(NamedTuple):
     """A sortable table; its second column, the policy, is the heading of each row."""
 
     caption: str
     headings: list[str]
-    rows: list[Row]
+    rows: list[dict[str, Any]]  # policy, whether it is disqualified or best, and its entries
 
 
 def leaderboard(result: Result) -> PageTable:
     """Table of the policies that ran on every line, over all lines, speeds and seeds."""
     after = next_in_ranking(result.standings)
+
+    def better(one: Standing) -> Entry:
+        share = one.better_than.get(after.get(one.policy) or "")
+        return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
+
     columns: list[Column[Standing]] = [
         *_first_columns(result.standings, result.method_of),
-        Column("CL (%)", lambda one: _figure(one.contact_loss, 2)),
-        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
-        Column("worst quarter, Δσ (%)", lambda one: _signed(one.worst_quarter, 1)),
-        Column("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
-        Column("passes improved", lambda one: _share(one.improved)),
+        ("CL (%)", lambda one: _figure(one.contact_loss, 2)),
+        ("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
+        ("worst quarter, Δσ (%)", lambda one: _signed(one.worst_quarter, 1)),
+        ("worst cell, Δσ (%)", lambda one: _signed(one.worst, 1, f"at {one.worst_at}")),
+        ("passes improved", lambda one: _share(one.improved)),
         *_by_window(result.standings),
-        *_HARM,
-        Column("better than the next in", lambda one: _better(one, after.get(one.policy))),
-        Column("effort (N)", lambda one: _figure(one.effort, 1)),
-        Column("mechanical power (W)", lambda one: _figure(one.power, 1)),
-        Column("at limit", lambda one: _share(one.saturation)),
-        Column("mean moved in", lambda one: _moved(one.moved, one.passes)),
-        Column("maximum ΔF_m of a pass (%)", lambda one: _signed(one.most_moved, 1)),
+        ("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
+        ("σ higher in", lambda one: _figure(one.harm.sigma, 0)),
+        ("CL higher in", lambda one: _figure(one.harm.loss, 0)),
+        ("contact lost in", lambda one: _figure(one.harm.lost, 0)),
+        ("minimum lower in", lambda one: _figure(one.harm.minimum, 0)),
+        ("at most by (N)", lambda one: _figure(max(0.0, one.harm.lowest_minimum), 0)),
+        ("uplift higher in", lambda one: _figure(one.harm.uplift, 0)),
+        ("at most by (mm)", lambda one: _figure(max(0.0, 1e3 * one.harm.most_uplift), 1)),
+        ("better than the next in", better),
+        ("effort (N)", lambda one: _figure(one.effort, 1)),
+        ("mechanical power (W)", lambda one: _figure(one.power, 1)),
+        ("at limit", lambda one: _share(one.saturation)),
+        ("mean moved in", lambda one: _moved(one.moved, one.passes)),
+        ("maximum ΔF_m of a pass (%)", lambda one: _signed(one.most_moved, 1)),
     ]
     return _table("All lines, speeds and seeds", columns, result.by_rank)
 
@@ -98,40 +87,32 @@ def _by_window(rows: Sequence[R]) -> list[Column[R]]:
     if all(one.late is None for one in rows):
         return []
     return [
-        Column("Δσ early (%)", lambda one: _signed(one.early, 1)),
-        Column("Δσ late (%)", lambda one: _signed(nan if one.late is None else one.late, 1)),
+        ("Δσ early (%)", lambda one: _signed(one.early, 1)),
+        ("Δσ late (%)", lambda one: _signed(nan if one.late is None else one.late, 1)),
     ]
-
-
-_HARM: list[Column[Standing]] = [
-    Column("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
-    Column("σ higher in", lambda one: _count(one.harm.sigma)),
-    Column("CL higher in", lambda one: _count(one.harm.loss)),
-    Column("contact lost in", lambda one: _count(one.harm.lost)),
-    Column("minimum lower in", lambda one: _count(one.harm.minimum)),
-    Column("at most by (N)", lambda one: _figure(max(0.0, one.harm.lowest_minimum), 0)),
-    Column("uplift higher in", lambda one: _count(one.harm.uplift)),
-    Column("at most by (mm)", lambda one: _figure(max(0.0, 1e3 * one.harm.most_uplift), 1)),
-]
-
-
-def _count(passes: int) -> Entry:
-    return Entry(str(passes), _key(passes))
 
 
 def table_of_cells(cells: Sequence[Cell], caption: str) -> PageTable:
     """Table of all policies on one line at one speed."""
-    figures = {name: _of_figure(name, decimals) for name, decimals in FIGURES.items()}
+
+    def of_figure(name: str) -> Column[Cell]:
+        label = ROW_LABELS[name]
+        return (
+            label.short_heading.removesuffix(" (-)"),
+            lambda one: _figure(label.scale * one.figures.get(name, nan), FIGURES[name]),
+        )
+
+    first = ("std", "contact_loss", "cost_function")
     columns: list[Column[Cell]] = [
         *_first_columns(cells),
-        *(figures.pop(name) for name in ("std", "contact_loss", "cost_function")),
-        Column("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
-        Column("passes improved", lambda one: _share(one.improved)),
+        *map(of_figure, first),
+        ("ΔCF (%)", lambda one: _signed(one.cost_change, 0)),
+        ("passes improved", lambda one: _share(one.improved)),
         *_by_window(cells),
-        Column("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
-        Column("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
-        Column("mean moved in", lambda one: _moved(one.moved, one.seeds)),
-        *figures.values(),
+        ("worst pass, Δσ (%)", lambda one: _signed(one.harm.worst, 1, one.harm.worst_at)),
+        ("ΔF_m (%)", lambda one: _signed(one.mean_change, 1)),
+        ("mean moved in", lambda one: _moved(one.moved, one.seeds)),
+        *(of_figure(name) for name in FIGURES if name not in first),
     ]
     return _table(caption, columns, sorted(cells, key=lambda one: (one.rank is None, one.rank or 0)))
 
@@ -148,32 +129,22 @@ def _first_columns(rows: Sequence[R], method_of: Mapping[str, str] = MappingProx
 
     scale = _scale(rows)
     columns: list[Column[R]] = [
-        Column("rank", lambda one: Entry("–") if one.rank is None else Entry(str(one.rank), str(one.rank))),
-        Column("policy", name),
-        Column("Δσ (%)", lambda one: _change(one, scale)),
+        ("rank", lambda one: Entry("–") if one.rank is None else Entry(str(one.rank), str(one.rank))),
+        ("policy", name),
+        ("Δσ (%)", lambda one: _change(one, scale)),
     ]
     if any(one.oracle_share is not None for one in rows):
-        columns.append(Column("of the oracle's gain", lambda one: _share(one.oracle_share)))
+        columns.append(("of the oracle's gain", lambda one: _share(one.oracle_share)))
     return columns
 
 
 def _table(caption: str, columns: Sequence[Column[R]], rows: Sequence[R]) -> PageTable:
-    return PageTable(
-        caption=caption,
-        headings=[column.heading for column in columns],
-        rows=[
-            Row(one.policy, one.disqualified, one.rank == 1, [column.entry(one) for column in columns])
-            for one in rows
-        ],
-    )
-
-
-def _of_figure(name: str, decimals: int) -> Column[Cell]:
-    label = ROW_LABELS[name]
-    return Column(
-        label.short_heading.removesuffix(" (-)"),
-        lambda cell: _figure(label.scale * cell.figures.get(name, nan), decimals),
-    )
+    made = [
+        {"policy": one.policy, "disqualified": one.disqualified, "best": one.rank == 1}
+        | {"entries": [entry(one) for _, entry in columns]}
+        for one in rows
+    ]
+    return PageTable(caption, [heading for heading, _ in columns], made)
 
 
 def _figure(value: float, decimals: int) -> Entry:
@@ -198,11 +169,6 @@ def _share(value: float | None) -> Entry:
     return Entry(f"{100 * value:.0f} %", _key(value))
 
 
-def _better(one: Standing, other: str | None) -> Entry:
-    share = one.better_than.get(other or "")
-    return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
-
-
 def _moved(passes: int, of: int) -> Entry:
     return Entry(f"{passes} of {of}", _key(passes / of))
 
@@ -218,8 +184,10 @@ def _change(one: Standing | Cell, scale: Scale) -> Entry:
     note = "" if one.interval is None else f"{signed(low, 1)} to {signed(high, 1)}"
     if isinstance(one, Standing) and one.interval_for_lines is not None:
         note += "; other lines {} to {}".format(*(signed(end, 1) for end in one.interval_for_lines))
-    inside = scale.lowest <= low and high <= scale.highest
-    bar = Bar(scale(0.0), scale(low), scale(high), scale(one.change)) if inside else None
+    bar = None
+    if scale.lowest <= low and high <= scale.highest:
+        places = {"zero": 0.0, "low": low, "high": high, "at": one.change}
+        bar = {name: scale(value) for name, value in places.items()}
     return Entry(signed(one.change, 1), _key(one.change), note, bar)
 
 
@@ -237,16 +205,19 @@ def _scale(rows: Sequence[Standing | Cell]) -> Scale:
 
 OVERALL = ("all", "95 %", "CL (%)", "ΔCF (%)", "worst quarter", "better than next", "mean moved in")
 """Headings of the columns over all passes."""
-TRAINING = "· "
-"""Before the name of a method's training."""
+TRAINING = "· "  # before the name of a method's training
 
 
 def tables_of(result: Result) -> list[Table]:
     """Tables of a track for a document: the ranking, then cases, kilometres and margins where it has them."""
-    along = kilometre_tables(result.title, result.cells)
-    margins = margins_table(result.title, result.settings.get("lines", ()), result.cells)
     by_case = [summary(result)] if any(place.case for place in result.places) else []
-    return [ranking(result), *by_case, *along, *([] if margins is None else [margins])]
+    margins = margins_table(result.title, result.settings.get("lines", ()), result.cells)
+    tables = [ranking(result), *by_case, *kilometre_tables(result.title, result.cells), margins]
+    return [table for table in tables if table is not None]
+
+
+def _indented(result: Result, one: Standing) -> str:
+    return f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
 
 
 def ranking(result: Result) -> Table:
@@ -259,14 +230,15 @@ def ranking(result: Result) -> Table:
     after = next_in_ranking(result.standings)
     rows: list[tuple[str, ...]] = []
     for one in result.by_rank:
-        name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
+        name = _indented(result, one)
         windows = signed(one.early, 1), signed(nan if one.late is None else one.late, 1)
         figures = number(one.contact_loss, 2), number(one.cost_change, 0), signed(one.harm.worst, 0)
         if one.disqualified:
             out = f"({number(one.change, 1)})", "", ""
             rows.append((name, *out, *windows, *figures, "", why(one.disqualified)))
             continue
-        intervals = ("" if each is None else "{:.1f} to {:.1f}".format(*each) for each in _intervals(one))
+        between = one.interval, one.interval_for_lines
+        intervals = ("" if each is None else "{:.1f} to {:.1f}".format(*each) for each in between)
         better = str(one.better_than.get(after.get(one.policy) or "", ""))
         rows.append((name, f"{one.change:.1f}", *intervals, *windows, *figures, better, ""))
     headings = ("policy", "Δσ (%)", "95 %", "other lines", "spans 10-19", "100 spans on", "CL (%)", "ΔCF (%)",
@@ -280,10 +252,6 @@ def ranking(result: Result) -> Table:
         tuple(compress(headings, known)),
         [tuple(compress(row, known)) for row in rows],
     )
-
-
-def _intervals(one: Standing) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    return one.interval, one.interval_for_lines
 
 
 def summary(result: Result) -> Table:
@@ -300,9 +268,8 @@ def summary(result: Result) -> Table:
     after = next_in_ranking(result.standings)
     rows = []
     for one in result.by_rank:
-        name = f"{TRAINING}{one.policy}" if one.policy in result.method_of else one.policy
         own = [[cells[run, place] for run in one.trainings or (one.policy,)] for place in result.places]
-        rows.append((name, *map(_text, own), *_overall(one, after.get(one.policy))))
+        rows.append((_indented(result, one), *map(_text, own), *_overall(one, after.get(one.policy))))
     oracles = {cell.place: f"{cell.oracle:.1f}" for cell in result.cells if cell.oracle is not None}
     if oracles:
         changes = (oracles.get(place, "–") for place in result.places)

@@ -13,7 +13,6 @@ import numpy as np
 from panto_env.base.errors import InputError
 from panto_env.control import Task
 from panto_env.control.lines import draws_line, on_drawn_line
-from panto_env.control.observation import Context
 from panto_env.control.settings import RunSettings, far_enough
 from panto_env.metrics.figures import chosen_spans
 from panto_env.metrics.low_pass import low_pass
@@ -53,7 +52,8 @@ def run_batch(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[i
     """
     if draws_line(settings):
         lines = [on_drawn_line(settings, partial(np.random.default_rng, seed)) for seed in seeds]
-        values = _one_length([_in_parts(own, laws, [seed]) for own, seed in zip(lines, seeds, strict=True)])
+        each = [_in_parts(own, laws, [seed]) for own, seed in zip(lines, seeds, strict=True)]
+        values = np.concatenate(_one_length(each), axis=1)
     else:
         values = _in_parts(settings, laws, seeds)
     return Forces(values, values.mean(axis=2), values.std(axis=2))
@@ -66,11 +66,10 @@ def _in_parts(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[i
     return np.concatenate(parts)
 
 
-def _one_length(forces: Sequence[Array]) -> Array:
-    """Forces of lines of different lengths, each (laws, 1, samples), thinned to the fewest samples."""
-    count = min(each.shape[2] for each in forces)
-    kept = [each[..., np.rint(np.linspace(0, each.shape[2] - 1, count)).astype(int)] for each in forces]
-    return np.concatenate(kept, axis=1)
+def _one_length(forces: Sequence[Array]) -> list[Array]:
+    """Forces, each (..., samples), thinned to the samples of the shortest, equally spaced."""
+    count = min(each.shape[-1] for each in forces)
+    return [each[..., np.rint(np.linspace(0, each.shape[-1] - 1, count)).astype(int)] for each in forces]
 
 
 def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) -> Array:
@@ -78,7 +77,14 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
     task = Task(settings, lanes=len(laws) * len(seeds))
     task.reset(np.arange(task.lanes), lambda lane: np.random.default_rng(seeds[lane % len(seeds)]))
     context, results = task.context(0), task.results
-    unable = _begin(laws, context, len(seeds))
+    unable: dict[int, InputError] = {}
+    for k, law in enumerate(laws):
+        try:
+            law.begin(context, len(seeds))
+        except InputError as error:
+            unable[k] = error
+    if len(unable) == len(laws):
+        raise unable[0]
     owned = [slice(k * len(seeds), (k + 1) * len(seeds)) for k in range(len(laws))]
     actions = np.zeros((task.lanes, context.actions))
     ended = np.zeros(task.lanes, dtype=np.bool_)
@@ -99,19 +105,6 @@ def _run(settings: RunSettings, laws: Sequence[LanesLaw], seeds: Sequence[int]) 
     return values
 
 
-def _begin(laws: Sequence[LanesLaw], context: Context, lanes: int) -> set[int]:
-    """Begin all laws and return the indices of those that cannot. Raises InputError if none can."""
-    unable: dict[int, InputError] = {}
-    for k, law in enumerate(laws):
-        try:
-            law.begin(context, lanes)
-        except InputError as error:
-            unable[k] = error
-    if len(unable) == len(laws):
-        raise unable[0]
-    return set(unable)
-
-
 def _low_passed(task: Task) -> Array:
     """Low-passed contact force of the controlled pantograph over the evaluated spans, (lanes, samples), N.
 
@@ -125,10 +118,8 @@ def _low_passed(task: Task) -> Array:
     spans = chosen_spans(None, task.length.own_distance, alignment, task.plant.catenary.ends)
     assert spans is not None  # None stands for the choice "all" only
     places = [task.plant.position(lane, middle, collector) for lane in range(task.lanes)]
-    inside = [alignment.within(own, spans) for own in places]
-    count = min(int(own.sum()) for own in inside)
-    chosen = [own[where] for own, where in zip(low_pass(force, time_step), inside, strict=True)]
-    kept = np.array([own[np.rint(np.linspace(0, len(own) - 1, count)).astype(int)] for own in chosen])
+    passed = zip(low_pass(force, time_step), places, strict=True)
+    kept = np.array(_one_length([own[alignment.within(at, spans)] for own, at in passed]))
     return np.asarray(kept[:, :: max(1, round(1 / (KEPT_RATE * time_step)))])
 
 

@@ -1,20 +1,13 @@
 """Contexts and observations by hand, and a law in closed loop with the linear model of the mean line."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import OUTPUTS, Sampled, line_model, mean_line
 from panto_env.control import Task
-from panto_env.control.observation import Context
 from panto_env.control.settings import run_settings
 
-Array = NDArray[np.float64]
 
-
-def a_context(speed_kmh: float = 250.0, **settings: Any) -> Context:
+def a_context(speed_kmh=250.0, **settings):
     """The context of an episode."""
     task = Task(run_settings({"speed_kmh": speed_kmh, "accuracy": "fast"} | settings), keep_samples=False)
     task.reset(0, np.random.default_rng(0))
@@ -25,7 +18,7 @@ CONTEXT = a_context()
 MODEL = line_model(CONTEXT, mean_line(CONTEXT))
 
 
-def seen(context: Context = CONTEXT, angle: float = 0.0, **values: float) -> NDArray[np.float32]:
+def seen(context=CONTEXT, angle=0.0, **values):
     """An observation, (1, entries), at an angle of the span, with these values (spaces as underscores)."""
     place = {"sine_of_span_position": np.sin(angle), "cosine_of_span_position": np.cos(angle)}
     observation = np.zeros((1, len(context.layout.entries)), dtype=np.float32)
@@ -35,9 +28,7 @@ def seen(context: Context = CONTEXT, angle: float = 0.0, **values: float) -> NDA
     return observation
 
 
-def repeated(
-    law: LanesLaw, spans: int, sign: float = 1.0, blind: bool = False, speed_error: float = 0.0
-) -> tuple[Array, Array]:
+def repeated(law, spans, sign=1.0, blind=False, speed_error=0.0):
     """Sigma of each span of the model, under a force that repeats with the span, with and without control.
 
     sign: of the plant's answer. blind: the place is not told. speed_error: share by which the speed is read

@@ -4,8 +4,6 @@ Prints the interquartile mean with its 95 % interval at each speed and over all 
 same lines, speeds and noise.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -4,8 +4,6 @@ Prints the tables of docs/train.md: the share of the variance behind that a filt
 explains, and what policies gain behind on lines as built that no gain was fitted on.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from rich.console import Console
 from rich.table import Table

@@ -44,10 +44,8 @@ def nothing_left():
 
 def play(policy, seed=1, **given):
     table = {"actuator": "realistic", "sensors": "realistic", "line_condition": "as-built"} | given
-    line = Line(distance=310.0)
-    return run_pass(
-        parse(BenchmarkSettings, table, "the benchmark"), line, Windows((3, 5)), policy, 300.0, seed
-    )
+    settings = parse(BenchmarkSettings, table, "the benchmark")
+    return run_pass(settings, Line(distance=310.0), Windows((3, 5)), policy, 300.0, seed)
 
 
 def written(folder, body):
@@ -57,12 +55,12 @@ def written(folder, body):
     return f"{path}:Policy"
 
 
-@pytest.mark.parametrize("policy", ["passive", "lqg", "adaptive-fb+ff", "blind of pd", "tape of pd"])
+@pytest.mark.parametrize("policy", ["lqg", "blind of pd", "tape of pd"])
 def test_an_installed_policy_plays_the_same_pass_apart_and_trusted(policy):
     one, other = (play(policy, trusted=trusted) for trusted in (False, True))
     assert one.row == other.row
     np.testing.assert_array_equal(one.played.actions, other.played.actions)
-    assert one.played.actions.any() == (policy != "passive")
+    assert one.played.actions.any()
 
 
 @pytest.mark.parametrize(

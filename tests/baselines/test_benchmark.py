@@ -1,7 +1,5 @@
 """The benchmark: paired passes, statistics, the rule of the mean force, and its command."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -10,16 +8,12 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command, report
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.run import Benchmark, read_result
+from panto_baselines.benchmark.run import read_result
 from panto_baselines.benchmark.settings import (
     ORACLE_TAPE,
     OTHER_SEED,
@@ -40,56 +34,48 @@ from panto_env.base.checksums import read_checked
 from panto_env.base.settings import parse
 from panto_env.policies import find_policy
 
+from . import commands
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 P = "p:gain=0.1"
-LINE: dict[str, Any] = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
+LINE = {"distance": 310.0, "speeds_kmh": [300], "spans": (3, 5)}
 
 
-def settings(**given: Any) -> BenchmarkSettings:
+def settings(**given):
     table = {"policies": [P], "lines": [LINE], "seeds": 2} | given
     return parse(BenchmarkSettings, table, "the benchmark")
 
 
 @pytest.fixture(scope="module")
-def outcome() -> Benchmark:
+def outcome():
     return benchmark.run(settings(), workers=1)
 
 
-def called(*arguments: str) -> Any:
+def called(*arguments):
     """The command's result, run as a program would run it."""
-    app = typer.Typer()
-    app.command()(command.benchmark)
-    short = ("--seeds", "1", "--workers", "1", "--speed", "300", *arguments)
-    return CliRunner().invoke(app, short, env={"COLUMNS": "120"})
+    short = ("--seeds", 1, "--workers", 1, "--speed", 300, *arguments)
+    return commands.called(command.benchmark, *short, columns=120)
 
 
-# --- passes --------------------------------------------------------------------------------------
-
-
-def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome: Benchmark) -> None:
-    assert [(row.policy, row.seed) for row in outcome.rows] == [
-        *(("passive", 0), ("passive", 1)),
-        *((P, 0), (P, 1)),
-    ]
+def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome):
+    rows = [(row.policy, row.seed) for row in outcome.rows]
+    assert rows == [("passive", 0), ("passive", 1), (P, 0), (P, 1)]
     assert outcome.windows == (Windows((3, 5)),)
     run = simulate(policy=P, seed=1, distance=310.0, line_condition="smooth", record_droppers=False)
     assert outcome.rows[3].figures == run.summary((3, 5))
-    interval = round(0.01 / run.time_step)
-    steps = np.diff(run.frame_force[run.position > 120][4::interval])
-    assert outcome.rows[3].action_rate == pytest.approx(np.sqrt(np.mean((steps / 0.01) ** 2)), 0.03)
     assert outcome.rows[0].action_rate == outcome.rows[0].figures.effort == 0
 
 
 @pytest.mark.slow
-def test_outcome_does_not_depend_on_workers_and_repeats(outcome: Benchmark) -> None:
-    calls: list[tuple[int, int]] = []
+def test_outcome_does_not_depend_on_workers_and_repeats(outcome):
+    calls = []
     again = benchmark.run(settings(), workers=2, progress=lambda *call: calls.append(call))
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert again == outcome
     assert json.dumps(again.as_dict()) == json.dumps(outcome.as_dict())
 
 
-def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome: Benchmark) -> None:
+def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome):
     assert outcome.rows[0].figures.std != outcome.rows[1].figures.std
     assert outcome.cells[1].interval is not None
     assert outcome.cells[0].interval is None  # passive less itself
@@ -98,7 +84,7 @@ def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome: Benchmark) -
     assert new.cells[1].interval is None
 
 
-def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
+def test_default_spans_leave_out_the_run_in_and_the_end():
     lines = [
         {"speeds_kmh": [300]},
         {"speeds_kmh": [250], "catenary": "periodic-stiffness", "pantograph": "three-mass"},
@@ -110,38 +96,14 @@ def test_default_spans_leave_out_the_run_in_and_the_end() -> None:
     assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
 
 
-@pytest.mark.slow
-def test_a_bias_within_what_qualifies_gains_nothing(tmp_path: Path) -> None:
-    """It lowers sigma, by as much as the passive pantograph's falls at that mean."""
-    path = tmp_path / "mine.py"
-    path.write_text(
-        "from panto_baselines.policies.feedback import ForceLaw\nclass Less(ForceLaw):\n"
-        "    def force(self, observation): return -0.013 * self.context.nominal_force\n"
-    )
-    done = benchmark.run(settings(policies=[f"{path}:Less"]), workers=1)
-    passive, less = done.cells
-    assert less.disqualified == ""
-    assert -1.5 < less.mean_change < -1.2
-    fall = 100 * (less.figures["std"] / passive.figures["std"] - 1)
-    assert fall < -0.1
-    assert abs(less.change) < 0.2 * abs(fall)
-
-
-# --- trainings -----------------------------------------------------------------------------------
-
-
-def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Path) -> None:
+def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path):
     given = settings(policies=["passive"], trainings={"p's": [P, "p:gain=0.2"]})
     done = benchmark.run(given, workers=1)
     assert [cell.policy for cell in done.cells] == ["passive", P, "p:gain=0.2"]
-    assert [(each.policy, each.rank is None) for each in done.standings] == [
-        *(("passive", False), (P, True), ("p:gain=0.2", True), ("p's", False))
-    ]
+    ranked = {each.policy: each.rank is not None for each in done.standings}
+    assert ranked == {"passive": True, P: False, "p:gain=0.2": False, "p's": True}
     done.save(tmp_path / "out.json")
     assert "a training of p&#39;s" in page([read_result(tmp_path / "out.json")])
-
-
-# --- what is not valid ---------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -167,36 +129,22 @@ def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path: Pa
         ({"lines": [{"distance": 200.0}]}, "no spans 10 to 3 to evaluate"),
         ({"lines": [LINE | {"spans": (3, 6)}]}, "Spans 3 to 6 can't be evaluated"),
         ({"lines": [{"speed": 300}]}, "key 'lines.1.speed'"),
-        (
-            {"policies": [P, "adaptive"], "lines": [LINE | {"pantograph": "dsa250"}]},
-            "The policy 'adaptive' failed in reset",
-        ),
-        (
-            {"policies": ["tape of tuned-pd"], "lines": [LINE | {"speeds_kmh": [300, 120]}]},
-            "not for 120 km/h",
-        ),
+        ({"policies": ["adaptive"], "lines": [LINE | {"pantograph": "dsa250"}]}, "'adaptive' failed"),
+        ({"policies": ["tape of tuned-pd"], "lines": [LINE | {"speeds_kmh": [300, 120]}]}, "for 120 km/h"),
         ({"actuator": "strong"}, "key 'actuator': actuator must be 'ideal' or 'realistic'"),
         ({"sensors": {"noise": 1}}, "key 'noise'"),
         ({"control_interval": 0.0}, "must be a number from 0.0001 to 10 s"),
     ],
 )
-def test_bad_settings_are_refused_before_anything_runs(given: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused_before_anything_runs(given, words):
     with pytest.raises(InputError) as caught:
         benchmark.run(settings(**given), workers=1, progress=lambda *_: pytest.fail("it ran"))
     assert words in str(caught.value)
 
 
-def test_no_workers_are_refused() -> None:
-    with pytest.raises(InputError, match="workers must be 1 or more"):
-        benchmark.run(settings(), workers=0)
-
-
-# --- files ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((CONFIGS / "benchmark").glob("*.toml")), ids=lambda path: path.stem)
-def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
+def test_tracks_load_with_every_policy_that_they_name(path):
     track = load_benchmark(f"benchmark/{path.stem}")
     assert track.title != BenchmarkSettings().title
     for policy in set(track.policies) - {ORACLE_TAPE}:
@@ -211,7 +159,7 @@ def test_tracks_load_with_every_policy_that_they_name(path: Path) -> None:
         (None, "does not exist"),
     ],
 )
-def test_a_bad_file_is_named_with_its_key(tmp_path: Path, text: str | None, words: str) -> None:
+def test_a_bad_file_is_named_with_its_key(tmp_path, text, words):
     path = tmp_path / "mine.toml"
     if text is not None:
         path.write_text(text)
@@ -221,9 +169,7 @@ def test_a_bad_file_is_named_with_its_key(tmp_path: Path, text: str | None, word
     assert words in str(caught.value)
 
 
-def test_json_holds_everything_and_the_settings_that_make_it_again(
-    outcome: Benchmark, tmp_path: Path
-) -> None:
+def test_json_holds_everything_and_the_settings_that_make_it_again(outcome, tmp_path):
     outcome.save(tmp_path / "out.json")
     table = read_checked(tmp_path / "out.json")
     assert table == outcome.as_dict()
@@ -234,7 +180,7 @@ def test_json_holds_everything_and_the_settings_that_make_it_again(
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffix: str) -> None:
+def test_rows_can_be_written_as_tables(outcome, tmp_path, suffix):
     import pyarrow.csv
     import pyarrow.parquet
 
@@ -245,7 +191,7 @@ def test_rows_can_be_written_as_tables(outcome: Benchmark, tmp_path: Path, suffi
     assert read(path)[column].to_pylist() == pytest.approx([r.figures.std for r in outcome.rows])
 
 
-def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> None:
+def test_a_picture_shows_every_policy_and_says_its_units(outcome):
     figure = report.plot(outcome)
     forces, sigmas, changes = figure.axes
     *named, limit, none = forces.get_legend_handles_labels()[1]
@@ -265,13 +211,10 @@ def test_a_picture_shows_every_policy_and_says_its_units(outcome: Benchmark) -> 
     assert "(km/h)" in sigmas.get_xlabel()
 
 
-# --- the command ---------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_json_gives(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     files = tmp_path / "out.json", tmp_path / "out.html"
     result = called("p:gain=0.5", "--salt", "draw", "--output", str(files[0]), "--html", str(files[1]))
     assert result.exit_code == 0, result.output
@@ -286,7 +229,7 @@ def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_js
         assert words in wide
 
 
-def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
+def test_command_prints_nothing_but_json_for_machines(tmp_path):
     files = (tmp_path / "out.csv", tmp_path / "out.png")
     result = called("p", "--json", "--output", str(files[0]), "--plot", str(files[1]))
     assert result.exit_code == 0, result.output
@@ -307,9 +250,7 @@ def test_command_prints_nothing_but_json_for_machines(tmp_path: Path) -> None:
         (["p", "--plot", "out.txt"], "out.txt must end in one of .png, .svg, .pdf"),
     ],
 )
-def test_command_raises_one_sentence_and_overwrites_nothing(
-    tmp_path: Path, arguments: list[str], words: str
-) -> None:
+def test_command_raises_one_sentence_and_overwrites_nothing(tmp_path, arguments, words):
     kept = tmp_path / "out.json"
     kept.write_text("kept")
     result = called("--output", str(kept), "--force", *arguments)
@@ -319,7 +260,7 @@ def test_command_raises_one_sentence_and_overwrites_nothing(
     assert kept.read_text() == "kept"
 
 
-def test_the_command_is_looked_up_fast() -> None:
+def test_the_command_is_looked_up_fast():
     code = (
         "import sys, panto_baselines.benchmark.command; "
         "print({'torch', 'matplotlib', 'pyarrow', 'scipy.stats'} & set(sys.modules))"
@@ -338,30 +279,21 @@ def test_a_line_can_have_policies_of_its_own():
     ]
 
 
-def test_skyhook_says_how_to_give_gains_where_none_are_stored() -> None:
-    with pytest.raises(InputError, match=r"give them \(frame, head\) as the parameter gains"):
-        simulate("re250", policy="skyhook", speed_kmh=200.0)
-    run = simulate("re250", policy="skyhook:gains=[100,0]", speed_kmh=200.0, distance=300.0, spans=7)
-    assert np.abs(run.frame_force).max() > 1.0
-
-
-def test_pd_and_fb_ff_are_ranked_with_a_washout() -> None:
+@pytest.mark.slow
+def test_pd_and_fb_ff_are_ranked_with_a_washout():
     """As built, at 300 km/h, as `docs/benchmark.md` has them: in the papers' form they move the mean."""
     laws = ("pd", "fb+ff")
-    line = {"speeds_kmh": [300]}
-    given = load_benchmark("benchmark/as-built").model_dump() | {"seeds": 1, "lines": [line]}
+    given = load_benchmark("benchmark/as-built").model_dump() | {"seeds": 1, "lines": [{"speeds_kmh": [300]}]}
     given["policies"] = [f"{law}{form}" for law in laws for form in ("", ":washout=1")]
-    found = {
-        each.policy: each
-        for each in benchmark.run(parse(BenchmarkSettings, given, "it"), workers=1).standings
-    }
+    done = benchmark.run(parse(BenchmarkSettings, given, "it"), workers=1)
+    found = {each.policy: each for each in done.standings}
     for law in laws:
         assert "washout = 1.0 keeps the mean" in found[law].disqualified
         assert found[f"{law}:washout=1"].disqualified == ""
         assert found[f"{law}:washout=1"].change < -5
 
 
-def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_says() -> None:
+def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_says():
     tapes = range(TEST.start + OTHER_SEED, TEST.stop + OTHER_SEED)
     ordered = sorted((*SEEDS.values(), SALTED, tapes), key=lambda seeds: seeds.start)
     assert all(one.stop <= other.start for one, other in pairwise(ordered))
@@ -374,7 +306,7 @@ def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_sa
         settings(salt="")
 
 
-def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> None:
+def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
     track = load_benchmark("benchmark/known-line")
     rows = [
         run_pass(track, track.lines[0], Windows((10, 19)), ORACLE_TAPE, 300.0, seed).row for seed in (0, 1)
@@ -391,7 +323,7 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did() -> No
 @pytest.mark.parametrize(
     ("source", "speeds_kmh", "spans"),
     [
-        ("family:high-speed", (260.0, 350.0), (10, 19)),
+        ("family:high-speed", (300.0,), (10, 19)),
         # The shortest has 36 spans, and its end is felt in 8 of them.
         pytest.param("section:main-line", (160.0,), (10, 28), marks=pytest.mark.slow),
     ],
@@ -403,14 +335,6 @@ def test_a_family_or_a_section_is_a_line_of_a_benchmark(source, speeds_kmh, span
     found = benchmark.run(given, workers=1)
     assert found.windows == (Windows(spans),)
     for row in found.rows:
-        policy = None if row.policy == "passive" else row.policy
-        alone = simulate(
-            source,
-            speed_kmh=row.speed_kmh,
-            seed=3,
-            policy=policy,
-            line_condition="smooth",
-            record_droppers=False,
-        )
-        assert row.figures.std == alone.summary(spans).std
+        run = {"speed_kmh": row.speed_kmh, "policy": row.policy, "line_condition": "smooth"}
+        assert row.figures.std == simulate(source, seed=3, **run, record_droppers=False).summary(spans).std
         assert row.catenary == source

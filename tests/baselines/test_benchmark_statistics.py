@@ -67,10 +67,7 @@ def test_a_policy_that_presses_in_one_pass_of_four_is_not_ranked():
     for repeated in (1, 4):
         cell, standing = judged(repeated * [0.0, 0.2, 0.0, 0.0])
         assert (cell.mean_change, cell.rank, standing.rank) == (0.0, None, None)
-        moved = (
-            "it moves the mean force by +20.0 % in one pass, more than 5 % (a policy's attribute washout = "
-        )
-        assert cell.disqualified.startswith(moved)
+        assert cell.disqualified.startswith("it moves the mean force by +20.0 % in one pass, more than 5 % (")
     cell, standing = judged([0.0] * 30 + [-0.0501])  # and however seldom it does
     assert (cell.rank, standing.rank) == (None, None)
     cell, standing = judged([0.0] * 30 + [-0.0499])
@@ -177,14 +174,6 @@ def test_a_standing_s_effort_power_and_saturation_are_means_of_the_cells():
     assert (found.effort, found.power, found.saturation) == pytest.approx(tuple(expected))
 
 
-def test_who_does_not_qualify_in_one_cell_has_no_standing():
-    rows = two_cells("passive", [1.0], [1.0])
-    rows += [row("a", std=0.5, line="easy"), row("a", std=0.5, line="hard", mean=100.0)]
-    passive, a = standings(rows, statistics.compare(rows))
-    assert (passive.rank, a.rank) == (1, None)
-    assert a.disqualified.startswith("hard at 300 km/h: it moves the mean force by -9.1 %")
-
-
 def test_share_of_a_stored_oracle():
     rows = [
         row(line="easy"),
@@ -204,12 +193,9 @@ def test_share_of_a_stored_oracle():
 
 def test_the_share_of_an_oracle_is_over_the_passes_that_it_ran():
     """The third seed, where the policy is at its worst, was not the oracle's."""
-    rows = [
-        *(row(seed=k) for k in range(3)),
-        *(row("a", k, std=std) for k, std in enumerate((0.8, 0.6, 2.0))),
-    ]
+    rows = [row(seed=k, line="easy") for k in range(3)]
+    rows += [row("a", k, line="easy", std=std) for k, std in enumerate((0.8, 0.6, 2.0))]
     place = LineAtSpeed("easy", "pantograph", 300.0)
-    rows = [replace(each, catenary="easy") for each in rows]
     found = statistics.compare(rows, {place: {0: -40.0, 1: -60.0, 7: -99.0}})[1]
     assert found.oracle_share == pytest.approx(30 / 50)
     assert found.oracle == pytest.approx(-50.0)

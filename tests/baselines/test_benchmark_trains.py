@@ -10,7 +10,6 @@ from panto_baselines.benchmark.run import evaluated_windows
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import run_pass
 from panto_baselines.benchmark.statistics import compare
-from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 
@@ -41,8 +40,7 @@ def ended():
 
 
 def test_figures_are_those_of_the_controlled_pantograph():
-    line = Line(**TRAIN, controlled=2)
-    row = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0).row
+    row = a_pass("pd", 2).row
     run = simulate(**TRAIN, controlled=2, speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
     own = run.train[1]
     assert row.figures == own.summary(SPANS)
@@ -58,14 +56,17 @@ def test_figures_are_those_of_the_controlled_pantograph():
     assert row.pressed_std == pytest.approx(pressed.train[1].summary(SPANS).std)
 
 
+def a_pass(policy, controlled, **given):
+    line = Line(**TRAIN, controlled=controlled)
+    return run_pass(settings(), line, Windows(SPANS), policy, SPEED_KMH, seed=0, **given)
+
+
 def test_its_commands_count_while_it_is_in_the_spans():
-    row = run_pass(settings(), Line(**TRAIN, controlled=2), Windows(SPANS), Shaking(), SPEED_KMH, seed=0).row
-    assert row.action_rate == pytest.approx(80.0 / 0.01)
+    assert a_pass(Shaking(), 2).row.action_rate == pytest.approx(80.0 / 0.01)
 
 
 def test_of_two_the_worst_counts_and_both_play_again():
-    line = Line(**TRAIN, controlled=[1, 2])
-    done = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0)
+    done = a_pass("pd", [1, 2])
     run = simulate(**TRAIN, controlled=[1, 2], speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
     sigmas = [each.summary(SPANS).std for each in run.train]
     assert done.row.figures.std == max(sigmas) > min(sigmas)
@@ -74,15 +75,12 @@ def test_of_two_the_worst_counts_and_both_play_again():
     assert [done.row.as_dict()[name] for name in ("mean_1", "mean_2")] == means
     assert done.played.actions.shape[1] == 2
     assert not np.array_equal(*done.played.actions.T)
-    again = run_pass(settings(), line, Windows(SPANS), "pd", SPEED_KMH, seed=0, played=done.played)
-    assert again.row == done.row
+    assert a_pass("pd", [1, 2], played=done.played).row == done.row
 
 
 def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
     """Passively the second swings more; the policy calms it, and moves the mean of the first."""
-    passive = run_pass(
-        settings(), Line(**TRAIN, controlled=[1, 2]), Windows(SPANS), "passive", SPEED_KMH, seed=0
-    ).row
+    passive = a_pass("passive", [1, 2]).row
     first, second = passive.means
     assert passive.figures.mean == second != first
     for moved in ((1.04 * first, second), (0.96 * first, second), (first, 1.04 * second)):
@@ -90,9 +88,7 @@ def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
         cell = next(each for each in compare([passive, row]) if each.policy == "p")
         assert abs(cell.mean_change) == pytest.approx(4.0)
         assert "it moves the mean force by" in cell.disqualified
-    kept = replace(
-        passive, policy="p", figures=replace(passive.figures, mean=first)
-    )  # the first one is judged
+    kept = replace(passive, policy="p", figures=replace(passive.figures, mean=first))  # that one is judged
     cell = next(each for each in compare([passive, kept]) if each.policy == "p")
     assert cell.mean_change == 0.0
     assert not cell.disqualified
@@ -122,11 +118,3 @@ def test_what_cannot_be_a_train_is_refused_in_a_sentence():
         simulate(**TRAIN, mean_force=[100.0, 100.0, 100.0])
     with pytest.raises(InputError, match="one for each of the 2 controlled pantographs, not 3"):
         simulate(**TRAIN, controlled=[1, 2], policy=["pd"] * 3)
-
-
-@pytest.mark.slow
-def test_no_oracle_of_a_lone_pantograph_is_that_of_a_train():
-    lone = {"pantograph": "dsa380", "speed_kmh": SPEED_KMH}
-    train = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": SPEED_KMH}
-    found = {fingerprint(lone), fingerprint(train), fingerprint(train | {"controlled": 2})}
-    assert len(found) == 3

@@ -4,15 +4,15 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from panto_baselines.benchmark import command
 from panto_baselines.benchmark.settings import BenchmarkSettings, load_benchmark
 
 from ..command import panto
+from .commands import called
 
 CONFIG = """
 policies = ["p"]
@@ -37,23 +37,15 @@ class EnoughError(Exception):
 @pytest.fixture
 def handed(monkeypatch, tmp_path):
     """The settings with which the command would run, from its words; CONFIG is its file."""
-    path = tmp_path / "mine.toml"
+    path, run = tmp_path / "mine.toml", mock.Mock(side_effect=EnoughError)
     path.write_text(CONFIG)
-    got = {}
-
-    def run(settings, workers, progress, ray):
-        got.update(settings=settings, workers=workers, ray=ray)
-        raise EnoughError
-
     monkeypatch.setattr(command, "run", run)
 
     def of(*words, config=True):
-        app = typer.Typer()
-        app.command()(command.benchmark)
-        given = [*words, "--config", str(path)] if config else list(words)
-        done = CliRunner().invoke(app, given)
+        done = called(command.benchmark, *words, *(("--config", path) if config else ()))
         assert isinstance(done.exception, EnoughError), done.output
-        return SimpleNamespace(**got)
+        settings, workers, _, ray = run.call_args.args
+        return SimpleNamespace(settings=settings, workers=workers, ray=ray)
 
     return of
 
@@ -72,10 +64,8 @@ def test_without_options_the_benchmark_is_that_of_its_file_or_the_usual_one(hand
 
 def test_policies_on_the_command_line_replace_the_file_s_and_its_trainings(handed):
     settings = handed("pd", "p:gain=0.5").settings
-    assert settings.policies == ("passive", "pd", "p:gain=0.5")
-    assert settings.trainings == {}
-    assert settings.seeds == (0, 1, 2)
-    assert lines(settings) == lines(handed().settings)
+    assert (settings.policies, settings.trainings) == (("passive", "pd", "p:gain=0.5"), {})
+    assert (settings.seeds, lines(settings)) == ((0, 1, 2), lines(handed().settings))
 
 
 def test_a_line_on_the_command_line_replaces_all_and_a_speed_holds_on_each(handed):
@@ -118,17 +108,9 @@ class Made:
 
 
 def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path):
-    got = []
-
-    def make(several):
-        def made(settings, output, **named):
-            got.append((settings, output, named["workers"], named["ray"]))
-            return [Made()] if several else Made()
-
-        return made
-
-    monkeypatch.setattr("panto_baselines.dataset.make.make_episodes", make(True))
-    monkeypatch.setattr("panto_baselines.dataset.make.make_designs", make(False))
+    episodes, designs = mock.Mock(return_value=[Made()]), mock.Mock(return_value=Made())
+    monkeypatch.setattr("panto_baselines.dataset.make.make_episodes", episodes)
+    monkeypatch.setattr("panto_baselines.dataset.make.make_designs", designs)
     output = tmp_path / "data"
     words = ("--output", output, "--workers", 3)
     shown = panto("dataset", "episodes", "dataset-known-line", *words, "--episodes", 2)
@@ -137,13 +119,13 @@ def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path
     assert all(word in unwrapped for word in ("pantograph/it-v0", "1,200", "34,567", "1.3", str(output)))
     told = json.loads(panto("dataset", "episodes", "dataset-known-line", *words, "--json").stdout)
     assert told == [asdict(Made()) | {"folder": str(Path("data") / "it")}]
-    (fewer, _, *rest), (usual, *_) = got
-    assert rest == [3, None]
+    (fewer, _), (usual, _) = (each.args for each in episodes.call_args_list)
+    assert [episodes.call_args.kwargs[name] for name in ("workers", "ray")] == [3, None]
     assert {each.episodes for each in fewer.sets} == {2}
     assert [each.model_copy(update={"episodes": 2}) for each in usual.sets] == list(fewer.sets)
     shown = panto("dataset", "designs", *words, "--count", 4)
     assert all(word in shown.stdout for word in ("2,048", "3", "1,004", "5", "1.3"))
     told = json.loads(panto("dataset", "designs", *words, "--json").stdout)
     assert told == asdict(Made()) | {"folder": str(Path("data") / "it")}
-    assert got[2][0].count == 4
-    assert got[3][0].count != 4
+    few, usual = (each.args[0].count for each in designs.call_args_list)
+    assert few == 4 != usual

@@ -12,7 +12,6 @@ from panto_baselines.benchmark.report import harm_table, kilometre_tables, margi
 from panto_baselines.benchmark.run import evaluated_windows
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows, load_benchmark
 from panto_baselines.benchmark.statistics import compare
-from panto_baselines.oracle.stored import fingerprint
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 
@@ -104,28 +103,17 @@ def asked(**given):
     return parse(BenchmarkSettings, LATE | given, "the benchmark")
 
 
-def test_both_windows_are_those_of_one_pass():
-    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built")
+def test_both_windows_are_those_of_one_pass_and_the_passive_run_of_the_early_one_may_end_with_it():
+    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
     done = benchmark.run(given, workers=1)
     assert done.windows == (Windows((10, 19), (30, 32)),)
-    found = done.rows[0]
-    run = simulate(speed_kmh=280, seed=0, spans=44, line_condition="as-built", record_droppers=False)
-    assert found.figures == run.summary((10, 19))
-    assert found.late.figures == run.summary((30, 32))
-    assert found.as_dict()["late_std"] == found.late.figures.std
-
-
-def test_the_passive_run_of_the_early_window_may_end_with_it():
-    given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
-    found = next(row for row in benchmark.run(given, workers=1).rows if row.policy != "passive")
-    whole = simulate(
-        speed_kmh=280,
-        seed=0,
-        spans=44,
-        line_condition="as-built",
-        mean_force=found.figures.mean,
-        trimmed_over=(10, 19),
-    )
+    passive, found = done.rows
+    line = {"speed_kmh": 280, "spans": 44, "line_condition": "as-built", "record_droppers": False}
+    run = simulate(**line)
+    assert passive.figures == run.summary((10, 19))
+    assert passive.late.figures == run.summary((30, 32))
+    assert passive.as_dict()["late_std"] == passive.late.figures.std
+    whole = simulate(**line, mean_force=found.figures.mean, trimmed_over=(10, 19))
     assert found.pressed_std == whole.summary((10, 19)).std
 
 
@@ -135,14 +123,6 @@ def test_a_line_that_ends_before_has_one_window():
     early = asked(late_spans=(15, 20))
     with pytest.raises(InputError, match="late_spans must come after spans 10 to 19"):
         evaluated_windows(early, Line())
-
-
-def test_no_oracle_is_that_of_a_line_of_another_length():
-    """An irregular line with more spans is another line under the same seed."""
-    cell = {"speed_kmh": 300.0, "line_condition": "as-built"}
-    found = {fingerprint(cell), fingerprint(cell | {"spans": 122}), fingerprint(cell | {"distance": 3000.0})}
-    assert len(found) == 3
-    assert fingerprint(cell | {"spans": 122}) == fingerprint(cell | {"spans": 122, "distance": 1000.0})
 
 
 @pytest.mark.slow
@@ -166,15 +146,8 @@ def test_a_case_changes_the_runs_of_its_line_and_keeps_its_rows_apart():
     passive, full, alike, weak, slower, _ = (row.figures for row in done.rows)
     assert passive == alike != slower
     assert weak.effort == pytest.approx(0.5 * full.effort, rel=0.1)
-    run = simulate(
-        policy="pd:washout=1",
-        distance=900.0,
-        seed=0,
-        line_condition="smooth",
-        faults="actuator-weak",
-        speed_kmh=280,
-    )
-    assert weak == run.summary((5, 12))
+    own = {"policy": "pd:washout=1", "faults": "actuator-weak", "line_condition": "smooth", "speed_kmh": 280}
+    assert weak == simulate(**own, distance=900.0).summary((5, 12))
 
 
 @pytest.mark.parametrize("run", [{"speed_kmh": 200}, {"catenary": "re330"}, {"wind": 3}, {"spans": 50}])
@@ -197,11 +170,9 @@ def test_kilometres_are_compared_one_by_one():
 
 
 def test_margins_are_where_a_policy_meets_the_passive_pantograph():
-    lines = [
-        {"case": "none", "sweep": {"delay (ms)": 0, "gain": 1}},
-        {"case": "a", "sweep": {"delay (ms)": 20}},
-    ]
-    lines += [{"case": "b", "sweep": {"delay (ms)": 40}}, {"case": "c", "sweep": {"gain": 2}}, {"case": "d"}]
+    sweeps = {"none": {"delay (ms)": 0, "gain": 1}, "a": {"delay (ms)": 20}, "b": {"delay (ms)": 40}}
+    lines = [{"case": case, "sweep": own} for case, own in (sweeps | {"c": {"gain": 2}}).items()]
+    lines.append({"case": "d"})
     stds = {"none": 0.8, "a": 0.9, "b": 1.05, "c": 0.9, "d": 2.0}
     rows = [
         replace(row(name, std=std), case=case)
@@ -212,47 +183,3 @@ def test_margins_are_where_a_policy_meets_the_passive_pantograph():
     assert table.headings == ("policy", "delay (ms)", "gain")
     assert table.cells == [("p", f"{20 + 20 * 10 / 15:.3g}", "> 2")]
     assert margins_table("track", [{"case": "d"}], compare(rows)) is None
-
-
-CHEATS = '''
-import numpy as np
-from panto_baselines.policies.repetitive import Repetitive
-
-class Early(Repetitive):
-    """Acts up to the end of the early window only."""
-    def reset(self, context):
-        super().reset(context)
-        self.step = 0
-    def acts(self, step):
-        return step < 1460
-    def act(self, observation):
-        self.step += 1
-        action = super().act(observation)
-        return action if self.acts(self.step) else np.zeros_like(action)
-
-class Late(Early):
-    """Acts from the late window on only."""
-    def acts(self, step):
-        return step > 2100
-'''
-
-
-@pytest.mark.slow
-def test_who_acts_in_one_window_alone_is_not_ranked_or_loses(tmp_path):
-    """At 280 km/h a span of 60 m takes 77 control steps."""
-    file = tmp_path / "cheats.py"
-    file.write_text(CHEATS)
-    given = asked(
-        policies=["repetitive", f"{file}:Early", f"{file}:Late"],
-        lines=[{"speeds_kmh": [280]}],
-        seeds=2,
-        line_condition="as-built",
-        late_spans=(30, 39),
-    )
-    _, honest, early, late = benchmark.run(given).standings
-    assert honest.rank == 1
-    assert early.rank is None
-    assert "grows along the line" in early.disqualified
-    assert early.early == pytest.approx(honest.early, abs=1.0)
-    assert late.change > honest.change + 5
-    assert late.early == pytest.approx(0, abs=0.5)

@@ -1,17 +1,13 @@
 """Policies made from a model: the model against the plant, each design against what its theory promises."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from panto_baselines.policies.adaptive import HARMONICS, LEAD, Periodic
-from panto_baselines.policies.lanes_law import LanesLaw
 from panto_baselines.policies.line_model import MeanLine, Sampled, line_model, mean_line
 from panto_baselines.policies.model_based import (
     ROUNDING,
@@ -32,13 +28,8 @@ from panto_env.estimation.kalman import steady_gain
 
 from .laws import CONTEXT, MODEL, a_context, repeated
 
-Array = NDArray[np.float64]
 
-
-# --- the model -----------------------------------------------------------------------------------
-
-
-def test_models_response_is_that_of_masses_springs_and_dampers_by_hand() -> None:
+def test_models_response_is_that_of_masses_springs_and_dampers_by_hand():
     frequency = np.array([0.3, 2.0, 9.0])
     pantograph, line = CONTEXT.pantograph, mean_line(CONTEXT)
     (m1, m2), (k1, k2), (c1, c2) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
@@ -56,13 +47,11 @@ def test_models_response_is_that_of_masses_springs_and_dampers_by_hand() -> None
     assert MODEL.response(frequency) == pytest.approx(np.array(expected), rel=1e-9)
 
 
-def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says() -> None:
+def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says():
     """The dashpot of the string's closed form stands for wires, droppers and supports within a quarter."""
-    settings = run_settings(
-        {"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic", "sensors": "ideal"}
-    )
+    settings = run_settings({"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic"})
     amplitude, harmonics = 3.0, (1, 2, 4)
-    laws: list[LanesLaw] = [Still()]
+    laws = [Still()]
     for place in (k - 1 + half for k in harmonics for half in (0, HARMONICS)):
         gains = np.zeros(2 * HARMONICS)
         gains[place] = amplitude
@@ -80,12 +69,12 @@ def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says() -> No
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.004, 0.010, 0.023])
-def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay: float) -> None:
+def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay):
     interval, steps = 0.01, 12
     model = line_model(CONTEXT, MeanLine(600.0, 3000.0), delay)
     commands = np.random.default_rng(1).normal(size=steps)
 
-    def late(time: float) -> float:
+    def late(time):
         step = int(np.floor((time - delay) / interval + 1e-9))
         return float(commands[step]) if 0 <= step < steps else 0.0
 
@@ -111,7 +100,7 @@ def test_sampled_model_is_the_continuous_one_under_held_and_late_commands(delay:
     assert x[: len(state)] == pytest.approx(state, rel=1e-6, abs=1e-10)
 
 
-def test_the_mean_line_is_two_half_strings_and_their_static_stiffness_over_a_span() -> None:
+def test_the_mean_line_is_two_half_strings_and_their_static_stiffness_over_a_span():
     """EN 50318:2002: wires of 20 and 16 kN, 1.35 and 1.07 kg/m, spans of 60 m.
 
     A half string moves at F / sqrt(T mu) under a force F at its end; two share the force.
@@ -124,25 +113,20 @@ def test_the_mean_line_is_two_half_strings_and_their_static_stiffness_over_a_spa
     assert line.spring == pytest.approx(1 / deflection.mean(), rel=1e-4)
 
 
-def test_a_line_without_wires_is_refused() -> None:
+def test_a_line_without_wires_is_refused():
     context = a_context(catenary="periodic-stiffness", speed_kmh=100.0)
     with pytest.raises(InputError, match="has no wires"):
         mean_line(context)
 
 
-# --- repetitive control ----------------------------------------------------------------------------
-
-
-def test_repetitive_control_learns_a_force_that_repeats_to_near_zero() -> None:
+def test_repetitive_control_learns_a_force_that_repeats_to_near_zero():
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.0, 0.05)), 25)
     assert controlled[: int(LISTENING) - 1] == pytest.approx(passive[: int(LISTENING) - 1], rel=1e-6)
     assert controlled[-1] < 0.05 * passive[-1]
 
 
 @pytest.mark.parametrize(("speed_error", "left"), [(0.0, 0.05), (0.005, 0.2)])
-def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_little_wrong(
-    speed_error: float, left: float
-) -> None:
+def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_little_wrong(speed_error, left):
     policy = Repetitive(gains=(0.5, 0.0, 0.05), place="counted")
     controlled, passive = repeated(policy, 25, blind=True, speed_error=speed_error)
     assert controlled[-1] < left * passive[-1]
@@ -150,16 +134,13 @@ def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_lit
         repeated(Repetitive(), 5, blind=True)
 
 
-def test_repetitive_control_backs_off_where_its_model_is_wrong() -> None:
+def test_repetitive_control_backs_off_where_its_model_is_wrong():
     """Under a plant of the opposite sign it would grow without bounds."""
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.05, 0.1)), 40, sign=-1.0)
     assert np.mean(controlled[-10:]) < 1.08 * passive[-1]
 
 
-# --- linear-quadratic-Gaussian ---------------------------------------------------------------------
-
-
-def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
+def test_lqgs_gains_are_what_the_riccati_recursions_converge_to():
     model = Disturbed(Sampled(MODEL, 0.01), CONTEXT, harmonics=1.0, wandering=3.0)
     effort, held = 0.4, 0.7
     a, b, force = model.a, model.b, model.c[0]
@@ -183,10 +164,7 @@ def test_lqgs_gains_are_what_the_riccati_recursions_converge_to() -> None:
     assert gain == pytest.approx(correction, rel=1e-3, abs=1e-6)
 
 
-# --- H-infinity ------------------------------------------------------------------------------------
-
-
-def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
+def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable():
     plant = weighted(MODEL, performance=2.0, centre=12.0, height=2e-3)
     bound, (a, b, c) = minimum_bound(plant)
     n, k = len(plant.a), len(a)
@@ -202,28 +180,19 @@ def test_h_infinity_keeps_its_bound_at_all_frequencies_and_is_stable() -> None:
     assert central(plant, 0.5 * bound) is None
 
 
-# --- predictive control ----------------------------------------------------------------------------
-
-
-def a_program(limit: float = 1e6, rate: float = 1e9) -> tuple[Programs, Array, Array]:
-    rng = np.random.default_rng(3)
+@pytest.mark.parametrize(("limit", "rate"), [(1e6, 1e9), (15.0, 1e9), (100.0, 600.0)])
+def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit, rate):
+    pytest.importorskip("osqp")
+    rng, last, total, change = np.random.default_rng(3), 4.0, 0.3, rate * 0.01
     response = np.exp(-0.1 * np.arange(HORIZON)) * rng.uniform(0.1, 0.4, size=(50, 1))
     response[:, 0] = 0.0  # a delay
-    line = Preview(0.0, 1.2, np.zeros(50), response)
-    return Programs(line, 0.1, limit, rate, 0.01), rng.normal(size=HORIZON) * 20, response
+    programs = Programs(Preview(0.0, 1.2, np.zeros(50), response), 0.1, limit, rate, 0.01)
+    free = rng.normal(size=HORIZON) * 20
 
+    def objective(u):
+        force, sums = free + programs.answers[7] @ u, total + 0.01 * np.cumsum(u)
+        return float(force @ force + 0.1 * u @ u + (2 * np.pi * 0.4) ** 2 * sums @ sums)
 
-def objective(programs: Programs, step: int, free: Array, total: float, u: Array) -> float:
-    force = free + programs.answers[step] @ u
-    sums = total + 0.01 * np.cumsum(u)
-    return float(force @ force + 0.1 * u @ u + (2 * np.pi * 0.4) ** 2 * sums @ sums)
-
-
-@pytest.mark.parametrize(("limit", "rate"), [(1e6, 1e9), (15.0, 1e9), (100.0, 600.0)])
-def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float, rate: float) -> None:
-    pytest.importorskip("osqp")
-    programs, free, _ = a_program(limit, rate)
-    last, total, change = 4.0, 0.3, rate * 0.01
     between = np.eye(HORIZON) - np.eye(HORIZON, k=-1)
     before = np.zeros(HORIZON)
     before[0] = last
@@ -232,7 +201,7 @@ def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float,
         {"type": "ineq", "fun": lambda u: change + (between @ u - before)},
     ]
     best = minimize(
-        lambda u: objective(programs, 7, free, total, u),
+        objective,
         np.zeros(HORIZON),
         method="SLSQP",
         bounds=[(-limit, limit)] * HORIZON,
@@ -243,17 +212,12 @@ def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit: float,
     assert programs.first(7, free, last, total) == pytest.approx(best.x[0], abs=0.1)
 
 
-def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() -> None:
+def test_preview_predicts_what_the_line_as_designed_does_under_other_commands():
     context = a_context(actuator="realistic")
     length, first = 100, 780
     line = preview(context, length, 0.005, 0.015)
-    settings = {
-        "speed_kmh": 250.0,
-        "accuracy": "fast",
-        "actuator": {"delay": 0.005, "lag": 0.015},
-        "distance": 900.0,
-        "spans": 23,
-    }
+    settings = {"speed_kmh": 250.0, "accuracy": "fast", "distance": 900.0, "spans": 23}
+    settings["actuator"] = {"delay": 0.005, "lag": 0.015}
     task = Task(run_settings(settings), lanes=2, keep_samples=False)
     task.reset(np.arange(2), np.random.default_rng(0))
     entry = task.layout.index("contact force")
@@ -272,8 +236,6 @@ def test_preview_predicts_what_the_line_as_designed_does_under_other_commands() 
     assert np.std(seen) > 0.2
     assert np.std(seen - predicted[: len(seen)]) < 0.05 * np.std(seen)
 
-
-# --- preview of a pantograph behind another ----------------------------------------------------------
 
 TRAIN = {
     "catenary": "re330", "pantographs": ["dsa380"] * 2, "distances": [100.0], "controlled": 2,

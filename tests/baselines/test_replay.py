@@ -1,18 +1,13 @@
 """A result keeps its actions, from which its rows follow; submissions to the leaderboard."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer import Typer
-from typer.testing import CliRunner
 
-from panto_baselines.benchmark import actions
-from panto_baselines.benchmark import command as replay_command
+from panto_baselines.benchmark import actions, command
 from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
@@ -21,6 +16,8 @@ from panto_baselines.benchmark.submission import replay
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.settings import parse
+
+from .commands import called
 
 TRACK = """
 actuator = "realistic"
@@ -49,18 +46,12 @@ class Leaning:
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory) -> Path:
+def result(tmp_path_factory):
     table = {"policies": ["pd", "fb+ff:gain=0.3"], "lines": [LINE], "seeds": 1, "salt": "a pinch"}
     outcome = benchmark.run(parse(BenchmarkSettings, table, "the benchmark"), workers=1)
     path = tmp_path_factory.mktemp("result") / "out.json"
     outcome.save(path)
     return path
-
-
-def called(*arguments):
-    app = Typer()
-    app.command()(replay_command.replay)
-    return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
 def changed(result, folder, change):
@@ -76,8 +67,7 @@ def changed(result, folder, change):
 @pytest.mark.slow
 def test_every_figure_follows_from_the_actions(result):
     again = replay(result, workers=1)
-    assert len(again.rows) == 3
-    assert {each.difference for each in again.rows} == {0.0}
+    assert [each.difference for each in again.rows] == [0.0] * 3
     assert again.follows
     some = replay(result, ["pd"], workers=1)
     assert [each.row["policy"] for each in some.rows] == ["pd"]
@@ -107,10 +97,10 @@ def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
     differences = [each.difference for each in replay(path, workers=1).rows]
     assert differences[:-1] == [0.0] * 2
     assert 0 < differences[-1] < 1e-4
-    done = called(path, "--workers", 1)
+    done = called(command.replay, path, "--workers", 1)
     assert done.exit_code == 1
     assert "1 of 3 rows do not follow" in " ".join(done.stdout.split())
-    assert called(path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
+    assert called(command.replay, path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
 
 
 def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
@@ -176,9 +166,6 @@ def test_with_a_washout_the_rate_is_that_of_what_the_plant_was_commanded():
     assert again.row.figures == done.row.figures
 
 
-# --- submissions -----------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def folder(tmp_path):
     return Path(shutil.copytree(Path(__file__).parents[2] / "examples" / "submission", tmp_path / "mine"))
@@ -186,8 +173,8 @@ def folder(tmp_path):
 
 def checked(folder, *arguments):
     (folder.parent / "track.toml").write_text(TRACK)
-    words = ["check", str(folder), "--config", str(folder.parent / "track.toml"), "--workers", "1"]
-    return CliRunner().invoke(replay_command.submission, [*words, *arguments], env={"COLUMNS": "200"})
+    words = ("check", folder, "--config", folder.parent / "track.toml", "--workers", 1)
+    return called(command.submission, *words, *arguments)
 
 
 @pytest.mark.slow
@@ -205,8 +192,7 @@ def test_one_that_presses_would_not(folder):
         "import numpy as np\nclass DampedFrame:\n    def reset(self, context): pass\n"
         "    def act(self, observation): return np.full(1, 0.2)\n"
     )
-    done = checked(folder, "--salt", "today", "--json")
-    table = json.loads(done.stdout)
+    table = json.loads(checked(folder, "--salt", "today", "--json").stdout)
     assert table["card"]["name"] == "Damped frame"
     assert min(row["seed"] for row in table["result"]["rows"]) >= 2**52
     mine, tape = table["result"]["standings"][-2:]
