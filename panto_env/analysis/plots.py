@@ -52,21 +52,16 @@ def save(figure: Figure, path: str | Path, dpi: int = 120) -> None:
     """
     check_output(path, PICTURES)
     _leave_odd_names(figure)
-    picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
-    figure.savefig(picture, dpi=dpi, format=Path(path).suffix[1:].lower())
-    content = picture.getvalue()
-    with write_whole(path) as temporary:
-        temporary.write_bytes(with_palette(content) if suffix_of(path) == PICTURES[0] else content)
-
-
-def with_palette(png: bytes) -> bytes:
-    """A PNG with a palette of 256 colours instead of three bytes a pixel."""
     from PIL import Image
 
-    smaller = BytesIO()
-    with Image.open(BytesIO(png)) as image:
-        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(smaller, "PNG", optimize=True)
-    return smaller.getvalue()
+    picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
+    figure.savefig(picture, dpi=dpi, format=Path(path).suffix[1:].lower())
+    if suffix_of(path) == PICTURES[0]:
+        with Image.open(picture) as image:
+            picture = BytesIO()
+            image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(picture, "PNG", optimize=True)
+    with write_whole(path) as temporary:
+        temporary.write_bytes(picture.getvalue())
 
 
 def _leave_odd_names(figure: Figure) -> None:

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from panto_env import InputError, simulate
+from panto_env import InputError
 from panto_env.catalog import load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
@@ -137,16 +137,6 @@ def test_policies_and_estimator_may_know_another_pantograph_than_the_true_one():
     right, wrong = readings(true, 300), readings(mistaken, 300)
     assert len(mistaken.sensors.shape) == 3
     assert np.std(wrong - right) > 1.0
-
-
-def test_policies_run_on_the_estimate_as_on_a_measurement():
-    spreads = {
-        observation: simulate(**FLEXIBLE, policy="p", observation=observation).summary().std
-        for observation in ("measured", "estimated")
-    }
-    passive = simulate(**FLEXIBLE).summary().std
-    assert spreads["measured"] != spreads["estimated"]
-    assert max(spreads.values()) < passive
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ NUMERICS = Numerics(accuracy="fast", precision="double")
 DROPPER_SPANS, SUPPORT_SPANS = 3, 6
 
 
-@pytest.fixture(params=["en50318-2002", "re250", ROOT / "examples" / "overlap.toml"], ids=str)
+@pytest.fixture(scope="module", params=["en50318-2002", ROOT / "examples" / "overlap.toml"], ids=str)
 def passes(request):
-    """On spans that are alike, with stitch wires, and with an overlap of two contact wires."""
+    """On spans that are alike, and with an overlap of two contact wires."""
     line, pantograph = load_catenary(request.param), load_pantograph("dsa380")
     spans = line.spans if line.ends else 18
     distance = float(line.alignment(spans).support(spans - 2))

@@ -11,7 +11,7 @@ from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.metrics.by_span import by_span, by_stretch, moving_droppers
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.run_tables import droppers, of_spans, of_stretches
+from panto_env.metrics.run_tables import droppers, of_stretches
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import droppers_at_rest
 
@@ -62,12 +62,6 @@ def test_each_dropper_has_a_row_with_what_it_is_at_rest(run):
         assert each.largest == row["largest"] == run.dropper_force[inside, column].max()
         assert each.largest > rest.static_force
     assert len({row["length"] for row in rows}) > 20  # they are not those of one span
-
-
-def test_the_table_by_spans_names_its_units(run):
-    sheet = of_spans(run, (3, 4))
-    assert list(sheet.columns["span"]) == [3, 4]
-    assert sheet.headings["uplift"] == "maximum uplift at its first support (m)"
 
 
 def test_figures_of_all_spans_follow_from_those_of_each_by_its_length(run):

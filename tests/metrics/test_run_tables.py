@@ -131,17 +131,6 @@ def test_commands_write_them(tmp_path):
     assert first[0].set_index("key").loc["std", "value"] == pytest.approx(run.summary().std)
 
 
-def test_a_sweep_has_units_in_its_headings(tmp_path):
-    light = ("catenary.mean_stiffness=3000,4000", "--catenary", "periodic-stiffness", "--speed", 250)
-    result = panto("sweep", *light, "--pantograph", "three-mass", "--output", tmp_path / "sweep.xlsx")
-    assert result.returncode == 0, result.stderr
-    frame = pandas.read_excel(tmp_path / "sweep.xlsx")
-    assert frame["catenary.mean_stiffness (N/m)"].tolist() == [3000, 4000]
-    assert frame["speed (km/h)"].tolist() == [250, 250]
-    assert {"mean (N)", "std (N)", "contact_loss (%)", "max_uplift (m)", "time_step (s)"} <= set(frame)
-    assert frame["mean (N)"].notna().all()
-
-
 def test_a_run_that_ends_early_still_ends_with_1_and_writes_no_figures(tmp_path):
     """Of a line with next to no room at its supports."""
     text = (FOLDERS["catenary"] / "en50318-2002.toml").read_text()
