@@ -88,13 +88,6 @@ def test_sensors_with_a_gain_and_a_zero_make_no_line_unhealthy(healthy_record, k
     assert diagnose_records([record], known).healthy
 
 
-def test_the_mean_of_records_is_judged(healthy_record, known):
-    own, healthy, _ = measured_passes([healthy_record, record_of({}, seed=4, position_error=0.0)], known)
-    assert own.force.shape[0] == 2
-    both, one = (np.std(force - healthy.force.mean(axis=0)) for force in (own.force.mean(axis=0), own.force))
-    assert both < 0.9 * one
-
-
 def test_a_record_with_a_gap_is_judged_by_its_longest_piece_and_says_so(healthy_record, known):
     (piece,) = healthy_record.pieces
     ends = piece.position < 610.0, piece.position > 630.0

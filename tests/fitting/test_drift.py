@@ -76,7 +76,7 @@ def test_it_is_least_squares_on_both_records():
 
 def test_intervals_hold_changes_as_often_as_they_say():
     random, shares = np.random.default_rng(1), []
-    for seed in range(40):
+    for seed in range(60):
         change = SMALLER * TOLERANCE * random.standard_normal(COUNT)
         found = drift(*made_up(seed, change)[0]).found
         shares += [(each.difference - by) / each.deviation for each, by in zip(found, change, strict=True)]
