@@ -223,9 +223,8 @@ def placed(settings: Mapping[str, Any], values: Mapping[str, float]) -> tuple[fl
     """Distances of a train (m) with swept values in their places. InputError where they do not increase."""
     several, given = riding(settings), settings[DISTANCES]
     distances = list(given) if isinstance(given, list | tuple) else [given]
-    for name, value in values.items():
-        if is_distance(name):
-            distances[place(name, len(several) - 1)] = value
+    for name in filter(is_distance, values):
+        distances[place(name, len(several) - 1)] = values[name]
     return run_settings({"pantographs": several, DISTANCES: distances}).distances
 
 

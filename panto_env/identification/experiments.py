@@ -89,11 +89,11 @@ def add_noise(
 ) -> Record:
     """The record with white noise on every sensor: of displacements (rms, m), and FORCE_NOISE."""
     noise = displacement * generator.standard_normal((3, len(record.plate)))
-    seen = np.array(list(record.displacements.values())) + noise
+    plate, head, support = np.array(list(record.displacements.values())) + noise
     force = record.force
     if force is not None:
         force = force + FORCE_NOISE * generator.standard_normal(len(force))
-    return Record(record.time_step, *seen, force, record.start)
+    return Record(record.time_step, plate, head, support, force, record.start)
 
 
 TRIALS_PER_JOB = 10

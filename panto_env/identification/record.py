@@ -62,8 +62,8 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     Raises InputError, naming the line and the column, for anything missing or not a number.
     """
     step, values = read_series(path, COLUMNS, units, SHORTEST, "to identify anything")
-    moved = (values[name] for name in ("y_p1", "y_p2", "y_p3"))
-    record = Record(step, *moved, values.get("force"), float(values["time"][0]))
+    plate, head, support = (values[name] for name in ("y_p1", "y_p2", "y_p3"))
+    record = Record(step, plate, head, support, values.get("force"), float(values["time"][0]))
     for name, each in record.displacements.items():
         if np.ptp(each) == 0:
             raise InputError(f"{path}: column {name} never changes; check the sensor and its wiring.")

@@ -143,7 +143,7 @@ def _more(criterion: Criterion) -> int:
     numbers = {name: getattr(criterion, name) for name in ("value", "lowest", "highest")}
     finite = {name: each for name, each in numbers.items() if each is not None and math.isfinite(each)}
     for more in range(16):
-        rounded = {name: float(_digits(each, more)) for name, each in finite.items()}
+        rounded: dict[str, Any] = {name: float(_digits(each, more)) for name, each in finite.items()}
         if replace(criterion, **rounded).kept == criterion.kept:
             return more
     return 0
@@ -224,8 +224,8 @@ def criteria(
     """
     note = f"this and other limits are those for {system}, the line's power supply ({system_source})"
     known = _formula(system) in LARGEST_MEAN
-    limits = (smallest_mean(speed, system), largest_mean(speed, system)) if known else (None, None)
-    mean = replace(_force("mean", figures.mean, *limits, SOURCE, note), tolerance=TOLERANCE)
+    low, high = (smallest_mean(speed, system), largest_mean(speed, system)) if known else (None, None)
+    mean = replace(_force("mean", figures.mean, low, high, SOURCE, note), tolerance=TOLERANCE)
     if mean.kept is False:
         note += "; the option --mean-force en50367 trims the static force for a mean at the upper limit"
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"

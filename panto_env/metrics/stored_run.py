@@ -137,8 +137,8 @@ def read(path: str | Path) -> Trajectory:
         series = {name: columns[name] for name in (*SERIES, *more)}
         for name, places in OF_PLACES.items():
             count = sum(column.startswith(f"{name}_") for column in columns)
-            own = np.array([columns[f"{name}_{k}"] for k in range(count)])
-            series[name] = own.T if count else np.zeros((table.num_rows, 0))
+            rows = np.array([columns[f"{name}_{k}"] for k in range(count)])
+            series[name] = rows.T if count else np.zeros((table.num_rows, 0))
             if count and count != len(facts[places]):
                 raise ValueError(f"columns of {name} are missing")
         followers = facts.pop("followers")
@@ -158,4 +158,5 @@ def _follower_of(first: Trajectory, columns: Mapping[str, Array], number: int, f
     on_line = ~np.isnan(columns[f"time@{number}"])
     series = {name: columns[f"{name}@{number}"][on_line] for name in first.series}
     shared = {name: getattr(first, name)[on_line] for name in OF_PLACES}
-    return dataclasses.replace(first, **series, **shared, **facts)
+    own: dict[str, Any] = {**series, **shared, **facts}
+    return dataclasses.replace(first, **own)

@@ -240,3 +240,13 @@ def test_commands_with_settings_have_no_option_outside_a_panel(command):
     order = [panel for panel in PANELS if f"╭─ {panel} ─" in done.output]
     assert order == sorted(order, key=lambda panel: done.output.index(f"╭─ {panel} ─"))
     assert "Output" in order
+
+
+def test_commands_are_grouped_by_what_a_person_wants():
+    shown = CliRunner().invoke(make_app(), ["--help"], env={"COLUMNS": "120"}).output
+    places = [shown.index(f"╭─ {panel} ─") for panel in ("Simulate", "Judge", "Identify", "Control", "Learn")]
+    assert places == sorted(places)
+    assert "─ Commands ─" not in shown
+    assert "From other packages" not in shown, "a command of ours is in no panel"
+    assert places[0] < shown.index("│ simulate ") < places[1] < shown.index("│ report ") < places[2]
+    assert places[3] < shown.index("│ benchmark ") < places[4] < shown.index("│ train ")

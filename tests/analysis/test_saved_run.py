@@ -24,13 +24,19 @@ CASES = {
 }
 
 
+KINDS = ("rig", "motor")
+"""Kinds of lines and actuators, which are compiled apart."""
+
+
 def saved(path, **settings):
     run = simulate(**settings)
     run.save(path)
     return run
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in KINDS)) for name in CASES]
+)
 def test_a_run_is_made_anew_from_its_file_bit_for_bit(name, tmp_path):
     path, given, mine = tmp_path / "run.parquet", dict(CASES[name]), tmp_path / "mine.toml"
     if name == "stiffness":  # on a line of one's own, which the run's file has by value

@@ -28,8 +28,10 @@ def readings(task, steps, seed=0):
     return np.array(seen)
 
 
-@pytest.mark.parametrize("estimator", ["usual", "displacements", "usual:suspension_drift=0"])
-@pytest.mark.parametrize("settings", [FLEXIBLE, MASSLESS])
+@pytest.mark.parametrize(
+    ("settings", "estimator"),
+    [(FLEXIBLE, "usual"), (FLEXIBLE, "displacements"), (MASSLESS, "usual:suspension_drift=0")],
+)
 def test_the_kernel_s_filter_is_the_steady_one_of_the_room_of_estimators(settings, estimator):
     chosen = run_settings(
         {
@@ -63,9 +65,8 @@ def run_start(task, row):
     return task.samples.rows[0, 0, 0, row]
 
 
-@pytest.mark.parametrize("settings", [FLEXIBLE, MASSLESS])
-def test_lanes_are_single_environments_and_copies_go_on(settings):
-    settings = settings | {
+def test_lanes_are_single_environments_and_copies_go_on():
+    settings = FLEXIBLE | {
         "observation": "estimated",
         "sensors": "realistic",
         "line_condition": "fair",

@@ -12,7 +12,7 @@ USUAL = (FIRST_SETTLED, LAST_USUAL)
 LINE = Alignment.equal(60.0, 20)
 
 
-@pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("ohl-three-span", "own-two-mass")])
+@pytest.mark.parametrize("line", [("en50318-2002", "en50318-2002"), ("periodic-stiffness", "three-mass")])
 def test_a_pass_goes_on_until_ten_spans_after_its_start_are_covered(line):
     run = simulate(*line, record_droppers=False)
     assert run.spans() == USUAL == (10, 19)
@@ -27,7 +27,8 @@ def test_what_was_asked_for_is_kept():
     assert simulate(distance=2000.0, record_droppers=False).spans() == (10, 33)
 
 
-@pytest.mark.parametrize("speed", [pytest.param(250.0, marks=pytest.mark.slow), 300.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [250.0, 300.0])
 def test_the_default_is_near_what_a_long_run_comes_to(speed):
     """With the start in it σ is much farther off."""
     (all_spans, default) = start.check_start(speed, (1, FIRST_SETTLED))
