@@ -161,7 +161,8 @@ def stored(path: str | Path) -> Stored:
         given, arrays = read_arrays(path)
         table = _Table.model_validate(given)
         _check(table.values, arrays)
-        return Stored(**dict(table), **{name: arrays[name] for name in ARRAYS})
+        found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS}
+        return Stored(**found)
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except ValueError as error:  # pydantic's among them

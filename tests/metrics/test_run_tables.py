@@ -18,7 +18,7 @@ from .test_summary import RUN, replace
 
 @pytest.fixture(scope="module")
 def run():
-    return simulate("re250", "dsa250", 160.0)
+    return simulate("re250", "dsa250", 160.0, accuracy="fast", distance=790.0)
 
 
 @pytest.fixture(scope="module")
