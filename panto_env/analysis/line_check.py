@@ -1,7 +1,11 @@
-"""A line at rest, span by span: gradients, pre-sag, droppers and elasticity, with the limits of EN 50119."""
+"""A line at rest, span by span: gradients, pre-sag, droppers and elasticity, with the limits of EN 50119.
+
+Of a single wire or a rail: how far it sags, and how it yields, in spans of each of its lengths.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -10,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 
 import numpy as np
 
-from ..base.arrays import Array, to_kmh
+from ..base.arrays import Array, one_thread, to_kmh
 from ..base.table import Alarm, Table
 from ..catalog.family import SOURCE, LineFamily, gradient_limits, gradients, highest_speed
 from ..catalog.section import LineSection
@@ -19,7 +23,12 @@ from ..metrics.compliance import Criterion
 from ..plant.catenary.flexible.as_run import elasticity, non_uniformity, per_span
 from ..plant.catenary.flexible.parts import index_at
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
+from ..plant.catenary.flexible.shape import solve_band
 from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest, hang
+from ..plant.catenary.single import SingleData
+from ..plant.catenary.single.model import Single, lower_diagonals
+from ..plant.numerics import Numerics, Runs
+from ..terminal import number
 from .pool import Progress, in_processes
 from .simulation import simulate
 
@@ -111,36 +120,29 @@ def check(line: FlexibleCatenaryData, force: float) -> LineCheck:
 def span_tables(spans: Sequence[SpanCheck], name: Callable[[int], str] = str) -> list[Table]:
     """Two tables to print: where supports stand, and the spans at rest; name: of a span's number."""
     alike = "" if len(spans) > 1 else "; all spans are alike"
-    placed = [
-        (
-            name(each.number),
-            f"{each.begin:g}",
-            f"{each.length:g}",
-            f"{each.contact_height:+.3f}",
-            f"{each.encumbrance:.3f}",
-            f"{_shown(each.gradient):.2f}",
-            f"{_shown(each.change):.2f}",
-        )
-        for each in spans
-    ]
-    at_rest = [
-        (
-            name(each.number),
-            f"{1e3 * each.pre_sag:.0f}",
-            f"{each.smallest_force:.0f} to {each.largest_force:.0f}",
-            "–" if np.isnan(each.non_uniformity) else f"{1e3 * low:.3f} to {1e3 * high:.3f}",
-            "–" if np.isnan(each.non_uniformity) else f"{each.non_uniformity:.1f}",
-        )
-        for each in spans
-        for low, high in [(each.smallest_elasticity, each.largest_elasticity)]
-    ]
-    headings = ("span", "from (m)", "length (m)", "contact height (m)", "encumbrance (m)", "gradient (‰)")
-    at_first = (*headings, "change of gradient (‰)")
-    below = ("span", "pre-sag (mm)", "droppers (N)", "elasticity (mm/N)", "its non-uniformity (%)")
-    return [
-        Table(f"Spans, and heights at the support where each begins{alike}", at_first, placed, 0),
-        Table(f"Spans at rest{alike}", below, at_rest, 0),
-    ]
+
+    def elasticities(each: SpanCheck) -> str:
+        low, high = each.smallest_elasticity, each.largest_elasticity
+        return "–" if np.isnan(low) else f"{1e3 * low:.3f} to {1e3 * high:.3f}"
+
+    number_of = {"span": lambda each: name(each.number)}
+    placed = number_of | {
+        "from (m)": lambda each: f"{each.begin:g}",
+        "length (m)": lambda each: f"{each.length:g}",
+        "contact height (m)": lambda each: f"{each.contact_height:+.3f}",
+        "encumbrance (m)": lambda each: f"{each.encumbrance:.3f}",
+        "gradient (‰)": lambda each: f"{_shown(each.gradient):.2f}",
+        "change of gradient (‰)": lambda each: f"{_shown(each.change):.2f}",
+    }
+    at_rest = number_of | {
+        "pre-sag (mm)": lambda each: f"{1e3 * each.pre_sag:.0f}",
+        "droppers (N)": lambda each: f"{each.smallest_force:.0f} to {each.largest_force:.0f}",
+        "elasticity (mm/N)": elasticities,
+        "its non-uniformity (%)": lambda each: number(each.non_uniformity),
+    }
+    titles = "Spans, and heights at the support where each begins", "Spans at rest"
+    pairs = zip(titles, (placed, at_rest), strict=True)
+    return [Table.of(f"{title}{alike}", spans, columns, 0) for title, columns in pairs]
 
 
 def elasticity_table(checks: Sequence[LineCheck]) -> Table:
@@ -161,6 +163,62 @@ def elasticity_table(checks: Sequence[LineCheck]) -> Table:
 def _shown(value: float) -> float:
     """A gradient (‰) without the rounding of heights and lengths."""
     return round(value, 6) + 0.0
+
+
+SPANS, MIDDLE, ELEMENTS = 15, 7, 128
+"""Spans of the line that stands for one without ends, the one that is looked at, elements of each."""
+
+
+class SpanOfSingle(NamedTuple):
+    """Spans of one length, in a line of nothing but such spans."""
+
+    length: float  # m
+    sag: float  # at mid-span below the supports (m)
+    at_support: float  # uplift per newton there (m/N)
+    at_middle: float  # and at mid-span (m/N)
+    non_uniformity: float  # of the elasticity (%)
+    first_frequency: float  # at which neighbouring spans swing against each other, over firm supports (Hz)
+
+
+def spans_at_rest(line: SingleData) -> list[SpanOfSingle]:
+    """Each length of the line's spans, the shortest first."""
+    return [_at_rest(line, length) for length in sorted({*line.span_lengths} or {line.span_length})]
+
+
+def _at_rest(line: SingleData, length: float) -> SpanOfSingle:
+    alike = line.model_copy(update={"span_length": length, "span_lengths": (), "ramp": None})
+    numerics = Numerics(spacing=length / ELEMENTS, window=0)
+    model = Single(alike, lanes=1, collectors=1, spans=SPANS, numerics=numerics, runs=Runs((1.0, 1.0)))
+    elements, wire = model.line.elements, line.contact_wire
+    band = lower_diagonals(model.line, np.full(SPANS * elements, length / elements))
+    band[0, 2 * elements : -2 : 2 * elements] += line.support.stiffness
+    band[:, 0] = band[:, -2] = 0.0  # both ends are held
+    band[0, [0, -2]], band[1, -3], band[2, -4], band[3, -5] = 1.0, 0.0, 0.0, 0.0
+    nodes = MIDDLE * elements + np.arange(elements + 1)
+    load = np.zeros((band.shape[1], len(nodes)))
+    load[2 * nodes, np.arange(len(nodes))] = 1.0
+    with one_thread():
+        yields = np.diagonal(solve_band(band, load)[2 * nodes])
+    k = math.pi / length
+    frequency = k * math.sqrt((wire.tension + wire.bending_stiffness * k**2) / wire.mass) / (2 * math.pi)
+    sag = -float(model.line.rest[nodes[elements // 2], 0])
+    at_support, at_middle = float(yields[0]), float(yields[elements // 2])
+    return SpanOfSingle(length, sag, at_support, at_middle, non_uniformity(yields), frequency)
+
+
+def table_at_rest(line: SingleData, spans: list[SpanOfSingle]) -> Table:
+    """These spans as a table to print."""
+    wave = line.wave_speed
+    limit = f"waves run at {to_kmh(wave):.0f} km/h" if math.isfinite(wave) else "bending carries its waves"
+    columns = {
+        "span (m)": lambda each: f"{each.length:g}",
+        "sag (mm)": lambda each: f"{1e3 * each.sag:.1f}",
+        "elasticity at support (mm/N)": lambda each: f"{1e3 * each.at_support:.4g}",
+        "at mid-span (mm/N)": lambda each: f"{1e3 * each.at_middle:.4g}",
+        "non-uniformity u (%)": lambda each: f"{each.non_uniformity:.1f}",
+        "first frequency (Hz)": lambda each: f"{each.first_frequency:.2f}",
+    }
+    return Table.of(f"Line {line.name} at rest, away from its ends; {limit}", spans, columns)
 
 
 @dataclass(frozen=True)

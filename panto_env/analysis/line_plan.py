@@ -92,9 +92,10 @@ class LinePlan:
     def criteria(self) -> list[Criterion]:
         """Radial forces, lateral positions and slopes, with their limits."""
         head = (self.line.plan or Plan()).head_width
-        still = [each.still_pull for each in self.supports if not math.isnan(each.still_pull)]
-        pulls = [each.pull for each in self.supports if not math.isnan(each.pull)]
-        slopes = [each.slope for each in self.supports if not math.isnan(each.slope)]
+        still, pulls, slopes = (
+            [value for each in self.supports if not math.isnan(value := getattr(each, name))]
+            for name in ("still_pull", "pull", "slope")
+        )
         out = max(abs(each.windy) for each in self.spans)
         windy = any(self.loads)
         found = [

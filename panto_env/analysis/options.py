@@ -105,9 +105,8 @@ def with_settings(
             settings = {
                 name: 1e-3 * value if name in IN_MILLISECONDS else value
                 for name, value in options.items()
-                if value is not None
+                if value is not None and value != []
             }
-            settings = {name: value for name, value in settings.items() if value != []}
             command(_riding(settings) if trains else settings, **given)
 
         hints = get_type_hints(command, include_extras=True)

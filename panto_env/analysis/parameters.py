@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from typing import Any, TypeVar
 
@@ -80,7 +80,13 @@ def change(entry: S, name: str, value: float) -> S:
     check_name(name, entry)
     path = name.split(".")[1:]
     try:
-        return _checked(entry, _table(entry, path, value), {path[0]})
+        by_rule = path[0] == "droppers" and path[1] in RULES  # by which a line's droppers are placed
+        if by_rule and isinstance(entry, FlexibleCatenaryData):
+            table = entry.model_dump(exclude_none=True)
+            table["droppers"] = droppers_of(table, {path[1]: value}, entry.span_length)
+        else:
+            table = _put(entry.model_dump(), path, value)
+        return _checked(entry, table, {path[0]})
     except ValidationError as error:
         found = complaints(error, type(entry))
         words = (c.words if c.clause or name.endswith(c.key) else f"{c.key} {c.words}" for c in found if c)
@@ -106,15 +112,6 @@ def change_together(entry: S, values: Mapping[str, float]) -> S:
         raise InputError(f"These values do not go together: {error}") from error
 
 
-def _table(entry: Settings, path: list[str], value: float) -> Any:
-    """Values of an entry with another at a path; a line's droppers may be placed by a rule."""
-    by_rule = path[0] == "droppers" and path[1] in RULES
-    if not (by_rule and isinstance(entry, FlexibleCatenaryData)):
-        return _put(entry.model_dump(), path, value)
-    table: Any = entry.model_dump(exclude_none=True)
-    return table | {"droppers": droppers_of(table, {path[1]: value}, entry.span_length)}
-
-
 def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
     """An entry of the same class with the values of a table, in which these keys have changed.
 
@@ -136,14 +133,12 @@ def _checked(entry: S, table: Mapping[str, Any], keys: AbstractSet[str]) -> S:
     return changed
 
 
-def _places(values: tuple[Any, ...], prefix: str) -> list[str]:
-    names = []
+def _places(values: tuple[Any, ...], prefix: str) -> Iterator[str]:
     for k, value in enumerate(values, start=1):
         if isinstance(value, tuple):
-            names += _places(value, f"{prefix}.{k}")
+            yield from _places(value, f"{prefix}.{k}")
         elif _is_number(value):
-            names.append(f"{prefix}.{k}")
-    return names
+            yield f"{prefix}.{k}"
 
 
 def _ordinal(number: int) -> str:
@@ -157,13 +152,13 @@ def _is_number(value: Any) -> bool:
 
 def _put(data: Any, path: list[str], value: float) -> Any:
     """A copy of nested tables and tuples with another value at the end of the path."""
+    if not path:
+        return value
     key, *rest = path
     if isinstance(data, dict):
-        return data | {key: _put(data[key], rest, value) if rest else value}
-    items = list(data)
+        return data | {key: _put(data.get(key), rest, value)}
     place = int(key) - 1
-    items[place] = _put(items[place], rest, value) if rest else value
-    return tuple(items)
+    return (*data[:place], _put(data[place], rest, value), *data[place + 1 :])
 
 
 DISTANCES = "distances"
@@ -186,17 +181,17 @@ def with_distances(settings: Mapping[str, Any], parameters: Mapping[str, Sequenc
     Raises InputError for a distance that the train does not have, or that is both given and swept.
     """
     swept = {name: values for name, values in parameters.items() if is_distance(name)}
-    places = {name: place(name, len(riding(settings)) - 1) for name in swept}
+    followers = len(riding(settings)) - 1
+    places = {name: place(name, followers) for name in swept}
     if len({*places.values()}) < len(places):
         raise InputError(f"{' and '.join(places)} are the same distance; sweep it once.")
-    given = settings.get(DISTANCES)
     if not swept or not all(swept.values()):  # a sweep without values is refused elsewhere
         return dict(settings)
-    if given:
-        if len(swept) == len(riding(settings)) - 1:
+    if settings.get(DISTANCES):
+        if len(swept) == followers:
             raise InputError("The distances are swept already; give none besides.")
         return dict(settings)
-    if len(swept) < len(riding(settings)) - 1:
+    if len(swept) < followers:
         names = " or ".join(places)
         raise InputError(f"Only {names} is swept; give all distances of this train as a setting, too.")
     first = {places[name]: values[0] for name, values in swept.items()}
@@ -228,9 +223,8 @@ def placed(settings: Mapping[str, Any], values: Mapping[str, float]) -> tuple[fl
     """Distances of a train (m) with swept values in their places. InputError where they do not increase."""
     several, given = riding(settings), settings[DISTANCES]
     distances = list(given) if isinstance(given, list | tuple) else [given]
-    for name, value in values.items():
-        if is_distance(name):
-            distances[place(name, len(several) - 1)] = value
+    for name in filter(is_distance, values):
+        distances[place(name, len(several) - 1)] = values[name]
     return run_settings({"pantographs": several, DISTANCES: distances}).distances
 
 

@@ -52,21 +52,16 @@ def save(figure: Figure, path: str | Path, dpi: int = 120) -> None:
     """
     check_output(path, PICTURES)
     _leave_odd_names(figure)
-    picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
-    figure.savefig(picture, dpi=dpi, format=Path(path).suffix[1:].lower())
-    content = picture.getvalue()
-    with write_whole(path) as temporary:
-        temporary.write_bytes(with_palette(content) if suffix_of(path) == PICTURES[0] else content)
-
-
-def with_palette(png: bytes) -> bytes:
-    """A PNG with a palette of 256 colours instead of three bytes a pixel."""
     from PIL import Image
 
-    smaller = BytesIO()
-    with Image.open(BytesIO(png)) as image:
-        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(smaller, "PNG", optimize=True)
-    return smaller.getvalue()
+    picture = BytesIO()  # not the file itself: where the disk is full, Matplotlib hides the reason
+    figure.savefig(picture, dpi=dpi, format=Path(path).suffix[1:].lower())
+    if suffix_of(path) == PICTURES[0]:
+        with Image.open(picture) as image:
+            picture = BytesIO()
+            image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(picture, "PNG", optimize=True)
+    with write_whole(path) as temporary:
+        temporary.write_bytes(picture.getvalue())
 
 
 def _leave_odd_names(figure: Figure) -> None:
@@ -152,9 +147,9 @@ def fit_force_axis(axes: Sequence[Axes], run: Trajectory, others: Sequence[float
     high = max(1.0, *others, *(axis.dataLim.y1 for axis in axes))
     near = limit <= NEAR * high
     top = max(high, limit) if near else high
-    source, where = en50367.maximum_source(run.line.system), "" if near else ", above the axis"
+    where = "" if near else ", above the axis"
+    words = f"{en50367.maximum_source(run.line.system)}: at most {limit:g} N{where}"
     for axis in axes:
-        words = f"{source}: at most {limit:g} N{where}"
         axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
         axis.axhline(0.0, color=LIMIT, linewidth=0.9, label="0 N: no contact")
         axis.set_ylim(low - 0.05 * top, 1.06 * top)
@@ -174,8 +169,7 @@ def say_what_is_hidden(axis: Axes) -> None:
         y = y[(x >= begin) & (x <= end)] if len(x) > 2 else y[:0]  # two points: a mark across the panel
         highest, lowest = max([highest, *y]), min([lowest, *y])
     notes = {f"up to {highest:.0f}": highest > high, f"down to {lowest:.0f}": lowest < low}
-    hidden = [note for note, beyond in notes.items() if beyond]
-    if hidden:
+    if hidden := [note for note, beyond in notes.items() if beyond]:
         text = f"not shown: {', '.join(hidden)}"
         axis.text(0.99, 0.97, text, transform=axis.transAxes, ha="right", va="top", color=VERMILION)
 

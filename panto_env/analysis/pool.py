@@ -25,15 +25,15 @@ def end_with_parent() -> None:
 
     An interrupt from the keyboard, which every process of a command gets, is left to the parent.
     """
+
+    def watch() -> None:
+        parent = parent_process()
+        assert parent is not None  # a worker has one
+        wait([parent.sentinel])
+        os._exit(ORPHANED)  # in the middle of its work, for which nobody waits any more
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_watch, name="panto-parent", daemon=True).start()
-
-
-def _watch() -> None:
-    parent = parent_process()
-    assert parent is not None  # a worker has one
-    wait([parent.sentinel])
-    os._exit(ORPHANED)  # in the middle of its work, for which nobody waits any more
+    Thread(target=watch, name="panto-parent", daemon=True).start()
 
 
 T = TypeVar("T")
@@ -135,13 +135,11 @@ def _one_thread_of_linear_algebra() -> Iterator[None]:
     than they compute. The libraries read their number of threads when they are loaded, so it is set in
     the environment that the processes inherit, and restored at the end.
     """
-    before = {name: os.environ.get(name) for name in LINEAR_ALGEBRA_THREADS}
+    before = {name: os.environ[name] for name in LINEAR_ALGEBRA_THREADS if name in os.environ}
     os.environ.update(dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1"))
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in LINEAR_ALGEBRA_THREADS:
+            del os.environ[name]
+        os.environ.update(before)

@@ -210,9 +210,8 @@ def _as_given(settings: dict[str, Any], run: Trajectory) -> dict[str, Any]:
 
     A policy's own passive runs, which normalise its readings, are at other speeds, with other grids.
     """
-    without = {
-        name: value for name, value in settings.items() if name not in ("time_step", "spacing", "window")
-    }
+    grid = ("time_step", "spacing", "window")
+    without = {name: value for name, value in settings.items() if name not in grid}
     task = Task(run_settings(without), keep_samples=False)
     found = identity(task.settings, task.plant, task.length.own_distance)
     return without if found == run.settings else settings
@@ -228,17 +227,15 @@ def check_made_anew(run: Trajectory, settings: dict[str, Any], path: str | Path)
         repeated = simulate(policy=run.controlled.policy, seed=run.seed, record_droppers=False, **settings)
     except InputError as error:
         raise InputError(f"The run of {path} cannot be repeated: {error}") from error
-    if len(repeated.time) != len(run.time):
-        raise _different(run, path, f"it ends at {repeated.distance:.1f} m instead of {run.distance:.1f} m")
-    pairs = zip(repeated.train, run.train, strict=True)
-    differences = [low_pass(new.contact_force - old.contact_force, run.time_step) for new, old in pairs]
-    rms = max(float(np.sqrt(np.mean(difference**2))) for difference in differences)
-    if not rms <= TOLERANCE:
-        raise _different(run, path, f"its contact force differs by {rms:.2g} N rms")
-
-
-def _different(run: Trajectory, path: str | Path, how: str) -> InputError:
-    return InputError(
+    how = f"it ends at {repeated.distance:.1f} m instead of {run.distance:.1f} m"
+    if len(repeated.time) == len(run.time):
+        pairs = zip(repeated.train, run.train, strict=True)
+        differences = [low_pass(new.contact_force - old.contact_force, run.time_step) for new, old in pairs]
+        rms = max(float(np.sqrt(np.mean(difference**2))) for difference in differences)
+        if rms <= TOLERANCE:
+            return
+        how = f"its contact force differs by {rms:.2g} N rms"
+    raise InputError(
         f"The run of {path} cannot be repeated: with its settings and policy '{run.controlled.policy}' it "
         f"comes out differently now, {how}. The policy or the version has changed, or its mean force was met "
         "over --spans, or its policy saw another observation, which the file does not record; write it again "

@@ -6,11 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from itertools import product, takewhile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.errors import InputError, hint, shown
 from ..base.settings import Settings
@@ -48,8 +47,7 @@ FAMILIES = ("catenary", "pantograph", "actuator", "sensors", "line_condition")
 """Settings whose own values can be swept, for example ``pantograph.masses.1``."""
 
 
-@dataclass(frozen=True)
-class OnePass:
+class OnePass(NamedTuple):
     """One pass to run: the swept values, the policy's name, and the arguments of ``simulate``."""
 
     values: dict[str, float]
@@ -105,10 +103,8 @@ def sweep(
     ]
     _check_memory(passes, workers)
     # Threads, not processes: a pass takes tens of milliseconds, less than a process takes to start.
-    found = in_threads(
-        [partial(_rows, one_pass, spans) for one_pass in passes], workers=workers, progress=progress
-    )
-    return [row for rows in found for row in rows]
+    jobs = [partial(_rows, one_pass, spans) for one_pass in passes]
+    return [row for rows in in_threads(jobs, workers=workers, progress=progress) for row in rows]
 
 
 def save(rows: Sequence[Row], path: str | Path, **settings: Any) -> None:
@@ -132,8 +128,7 @@ def labels(parameters: Sequence[str], **settings: Any) -> dict[str, str]:
     for name in parameters:
         family, _, rest = name.partition(".")
         if is_distance(name):
-            number = int(rest or 1) + 1
-            found[name] = f"distance of pantograph {number} behind the first (m)"
+            found[name] = f"distance of pantograph {int(rest or 1) + 1} behind the first (m)"
         elif name != SPEED:
             found[name] = parameter_label(name, entries[family]) if family in entries else f"policy: {rest}"
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from math import isnan
 from textwrap import fill
@@ -60,10 +61,9 @@ def plot_sweep(
 def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Figure:
     from matplotlib.lines import Line2D
 
-    shown = [key for key in ("std", "contact_loss", "max_uplift") if not all(isnan(row[key]) for row in rows)]
     no_loss = all(row["contact_loss"] == 0 for row in rows)
-    if no_loss:
-        shown.remove("contact_loss")
+    keys = ("std", "max_uplift") if no_loss else ("std", "contact_loss", "max_uplift")
+    shown = [key for key in keys if not all(isnan(row[key]) for row in rows)]
     count = 1 + len(shown)
     figure, (force, *others) = stacked((8, 1 + 2.4 * count), count)
     series = _series(rows)
@@ -76,8 +76,7 @@ def _lines(rows: Sequence[Row], parameter: str, labels: Mapping[str, str]) -> Fi
             axis.plot(values, scaled, color=colour, marker=".")
     notes = _draw_limits(force, others[shown.index("std")], next(iter(series.values())), parameter)
     force.set(ylabel="contact force (N)")
-    if no_loss:
-        notes.append("No contact is lost in any pass.")
+    notes += ["No contact is lost in any pass."] if no_loss else []
     force.set_title(" ".join(notes), loc="left", fontsize="small")
     for axis, key in zip(others, shown, strict=True):
         axis.set(ylabel=f"{LABELS[key].name}\n({LABELS[key].unit})")
@@ -107,16 +106,14 @@ def _draw_limits(force: Axes, std: Axes, rows: Sequence[Row], parameter: str) ->
     values = [row[parameter] for row in rows]
     style: dict[str, Any] = {"color": LIMIT, "linestyle": DASHES, "linewidth": 0.9}
     limits = [en50367.maximum_limit(from_kmh(row["speed_kmh"]), row["system"]) for row in rows]
-    high = force.dataLim.y1
-    if min(limits) > NEAR * high:
-        most = " or ".join(f"{limit:g}" for limit in sorted({*limits}))
-        notes = [f"{en50367.maximum_source(rows[0]['system'])}'s maximum of {most} N is above the axis."]
-    else:
-        notes = []
+    above = min(limits) > NEAR * force.dataLim.y1
+    if not above:
         force.plot(values, limits, drawstyle="steps-pre", **style)
     std.plot(values, [en50367.STD_OF_MEAN * row["mean"] for row in rows], **style)
     force.axhline(0.0, color=LIMIT, linewidth=0.9)
-    return notes
+    most = " or ".join(f"{limit:g}" for limit in sorted({*limits}))
+    source = en50367.maximum_source(rows[0]["system"])
+    return [f"{source}'s maximum of {most} N is above the axis."] if above else []
 
 
 def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, str]) -> Figure:
@@ -142,16 +139,13 @@ def _maps(rows: Sequence[Row], parameters: Sequence[str], labels: Mapping[str, s
 
 
 def _series(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    found: dict[str, list[Row]] = {}
+    found = defaultdict[str, list[Row]](list)
     for row in rows:
-        name = f"{row['policy']}, pantograph {row[NUMBER]}" if NUMBER in row else row["policy"]
-        found.setdefault(name, []).append(row)
+        found[f"{row['policy']}, pantograph {row[NUMBER]}" if NUMBER in row else row["policy"]].append(row)
     return found
 
 
 def pantographs_of(rows: Sequence[Row]) -> str:
     """Names of the pantographs of all passes of a sweep, the first in front."""
-    numbers = dict.fromkeys(row.get(NUMBER, 1) for row in rows)
-    return " and ".join(
-        next(row["pantograph"] for row in rows if row.get(NUMBER, 1) == number) for number in numbers
-    )
+    names = {row.get(NUMBER, 1): row["pantograph"] for row in reversed(rows)}  # the first of each number
+    return " and ".join(names[number] for number in dict.fromkeys(row.get(NUMBER, 1) for row in rows))

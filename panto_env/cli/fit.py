@@ -130,7 +130,7 @@ def fit(
         if pantograph_output is not None:
             later(lambda: write_pantograph(found, pantograph, pantograph_output, every))
         if values is not None:
-            later(write_rows, rows_of(found.found, found.before), values)
+            later(write_rows, rows_of(found.found, found.problem.before), values)
         if keep is not None:
             later(lambda: store(knowledge(found, every), keep))
         if plot is not None:

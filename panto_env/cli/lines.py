@@ -9,11 +9,19 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
-from ..analysis.line_check import check, drawn_lines, elasticity_table, facts, span_tables, table
+from ..analysis.line_check import (
+    check,
+    drawn_lines,
+    elasticity_table,
+    facts,
+    span_tables,
+    spans_at_rest,
+    table,
+    table_at_rest,
+)
 from ..analysis.line_plan import line_plan
 from ..analysis.options import print_criteria
 from ..analysis.plots import plot_line, save
-from ..analysis.single_check import spans_at_rest, table_at_rest
 from ..base.errors import InputError
 from ..base.files import write_text
 from ..base.settings import parse

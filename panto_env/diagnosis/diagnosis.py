@@ -22,9 +22,9 @@ from ..records.record import Record
 from .features import (
     ENOUGH,
     FALSE_ALARMS,
-    Answer,
     Classifier,
     Evidence,
+    Region,
     Sort,
     cautious_threshold,
     regions,
@@ -132,11 +132,7 @@ def judge(
     """As ``diagnose``, of passes that lie side by side with those that ``healthy`` was learned from."""
     limit = cautious_threshold(healthy.scores, passes.per_span, passes.span, false_alarms)
     evidence, levels = healthy.score(passes, limit)
-    network = classifier or trained()
-    found = [
-        _finding(evidence, network.answer(evidence, region), float(evidence.score[region.peak]))
-        for region in regions(evidence)
-    ]
+    found = [_finding(evidence, region, classifier or trained()) for region in regions(evidence)]
     level, changed = _whole_line(levels, healthy.levels)
     return Diagnosis(
         findings=tuple(sorted(found, key=lambda each: each.position)),
@@ -150,8 +146,9 @@ def judge(
     )
 
 
-def _finding(evidence: Evidence, answer: Answer, score: float) -> Finding:
-    position, alignment = answer.place.position, evidence.alignment
+def _finding(evidence: Evidence, region: Region, network: Classifier) -> Finding:
+    answer, alignment = network.answer(evidence, region), evidence.alignment
+    position = answer.place.position
     number = math.floor(alignment.in_spans(position) + 1e-9)
     begin, end = alignment.limits((number + 1, number + 1))
     offset = position - begin
@@ -164,7 +161,7 @@ def _finding(evidence: Evidence, answer: Answer, score: float) -> Finding:
         offset=max(offset, 0.0),
         interval=int((own < offset - 1e-6).sum()) + 1,
         dropper=int(np.argmin(np.abs(own - offset))) + 1 if answer.place.sort is Sort.DROPPER else None,
-        score=score / evidence.threshold,
+        score=float(evidence.score[region.peak]) / evidence.threshold,
     )
 
 
@@ -251,8 +248,8 @@ def verdict(diagnosis: Diagnosis) -> list[str]:
 
 def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     """Force beside healthy passes, and the score with its threshold, findings, supports and droppers."""
-    evidence = diagnosis.evidence
-    shown = (evidence.position >= diagnosis.begin) & (evidence.position <= diagnosis.end)
+    evidence, begin, end = diagnosis.evidence, diagnosis.begin, diagnosis.end
+    shown = (evidence.position >= begin) & (evidence.position <= end)
     x = evidence.position[shown]
     figure, (force, score) = stacked((12, 6), 2)
     force.plot(x, evidence.residual[shown], color=BLUE, linewidth=0.9)
@@ -260,17 +257,17 @@ def plot_diagnosis(diagnosis: Diagnosis, title: str) -> Figure:
     score.semilogy(x, np.maximum(evidence.score[shown], 1e-2), color=BLUE, linewidth=0.9, label="score")
     words = f"threshold: {diagnosis.false_alarms:g} false alarms per km"
     score.axhline(evidence.threshold, color=LIMIT, linestyle="--", linewidth=0.9, label=words)
-    inside = evidence.droppers[(evidence.droppers > diagnosis.begin) & (evidence.droppers < diagnosis.end)]
+    inside = evidence.droppers[(evidence.droppers > begin) & (evidence.droppers < end)]
     score.plot(inside, np.full(len(inside), 1e-2), "|", color="0.5", markersize=5, label="droppers")
     for axis in (force, score):
-        mark_supports(axis, evidence.alignment.supports_within(diagnosis.begin, diagnosis.end))
-        for finding in diagnosis.findings:
-            axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
+        mark_supports(axis, evidence.alignment.supports_within(begin, end))
     for finding in diagnosis.findings:
+        for axis in (force, score):
+            axis.axvline(finding.position, color=ORANGE, linewidth=1.5, zorder=1)
         words = f"{finding.kind}, span {evidence.alignment.span_name(finding.span)}, {place(finding)}"
         above = force.get_xaxis_transform()
         force.text(finding.position, 1.02, words, transform=above, rotation=12, fontsize="small")
-    score.set(ylabel="score (-)", xlabel=POSITION, xlim=(diagnosis.begin, diagnosis.end))
+    score.set(ylabel="score (-)", xlabel=POSITION, xlim=(begin, end))
     legend_above(score, 3)
     figure.suptitle(title)
     return figure

@@ -21,6 +21,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from ..base.arrays import Array
+from ..metrics.figures import stretches
 from ..plant.alignment import Alignment
 
 ECHOES = ((1.3, np.inf), (2.5, 0.5), (4.0, 0.2))
@@ -53,23 +54,22 @@ class Region(NamedTuple):
 
 def regions(evidence: Evidence) -> list[Region]:
     """Regions beyond the threshold, in their order along the line; waves of a greater one are none."""
-    score = evidence.score
-    edges = np.diff(np.concatenate([[False], score > evidence.threshold, [False]]).astype(int))
+    score, spans = evidence.score, evidence.alignment.in_spans(evidence.position)
+
+    def echo(peak: int, greater: int) -> bool:
+        apart = abs(spans[peak] - spans[greater])
+        share = next((share for within, share in ECHOES if apart <= within), 0.0)
+        return bool(score[peak] < share * score[greater])
+
     found = [
         Region(int(first + np.argmax(score[first:end])), int(first), int(end) - 1)
-        for first, end in np.flatnonzero(edges).reshape(-1, 2)
+        for first, end in zip(*stretches(score > evidence.threshold), strict=True)
     ]
     kept: list[Region] = []
     for region in sorted(found, key=lambda each: -score[each.peak]):
-        if not any(_echo(region, greater, evidence) for greater in kept):
+        if not any(echo(region.peak, greater.peak) for greater in kept):
             kept.append(region)
     return sorted(kept)
-
-
-def _echo(region: Region, greater: Region, evidence: Evidence) -> bool:
-    apart = abs(np.diff(evidence.alignment.in_spans(evidence.position[[region.peak, greater.peak]]))[0])
-    share = next((share for within, share in ECHOES if apart <= within), 0.0)
-    return bool(evidence.score[region.peak] < share * evidence.score[greater.peak])
 
 
 AHEAD = 27.0

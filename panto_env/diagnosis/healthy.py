@@ -51,14 +51,13 @@ class Healthy:
     def of(cls, passes: Passes) -> Self:
         """Learn from passes; each is also held against the others alone, to see what healthy ones score."""
         force, window = passes.force, max(1, round(WINDOW / passes.step))
-        one_out = [np.delete(np.arange(len(force)), k) for k in range(len(force))]
-        residual = np.array([_against(force[k], force[others]) for k, others in enumerate(one_out)])
+        count = len(force)
+        residual = np.array([_against(force[k], np.delete(force, k, axis=0)) for k in range(count)])
         levels = np.array([_level(each, window) for each in residual])
-        size = _usual_size(residual / levels[:, None], passes)
-        unit = np.zeros_like(residual)
-        for k, others in enumerate(one_out):
-            own = _usual_size(residual[others] / levels[others, None], passes)
-            unit[k] = residual[k] / own / _level(residual[k] / own, window)
+        levelled = residual / levels[:, None]
+        size = _usual_size(levelled, passes)
+        sizes = [_usual_size(np.delete(levelled, k, axis=0), passes) for k in range(count)]
+        unit = np.array([own / _level(own, window) for own in residual / sizes])
         predictor = _predictor(unit, round(MEMORY / passes.step))
         left = _whiten(unit, predictor)
         return cls(

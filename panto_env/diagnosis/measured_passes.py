@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from ..base.arrays import Array, from_kmh
 from ..base.errors import InputError
 from ..fitting.misfit import OWN, Part
+from ..fitting.passes import Measured
 from ..fitting.problem import problem
 from ..fitting.solve import Fitting
 from ..fitting.stored import Stored, turned
@@ -63,24 +64,23 @@ def measured_passes(
     random = np.random.default_rng(seed)
     mean, covariance = _values(ready, known)
     drawn = random.multivariate_normal(mean, covariance, HEALTHY, method="eigh")
-    healthy, measured = np.zeros((HEALTHY, len(position))), []
-    for number, part in enumerate(parts):
+    healthy, measured = np.zeros(0), []
+    for part in parts:
+        own = part.measured
         static, usual = _usual(ready, part, mean)
-        seen = _finely(part, usual)
-        if number == 0:
+        seen = _finely(own, usual)
+        if not healthy.size:
             gain, zero = (OWN[name] * random.standard_normal(HEALTHY) for name in ("gain", "zero"))
             variants = [ready.values.variant(x, static + z) for x, z in zip(drawn, zero, strict=True)]
-            forces = part.measured.coefficients(ready.sampled(part, variants)) * (1 + gain[:, None])
-            forces += known.noise[part.measured.band] * random.standard_normal(forces.shape)
-            for own, force in zip(healthy, forces, strict=True):
-                own[:] = np.interp(position - before, part.measured.place, part.measured.back(force))
+            forces = own.coefficients(ready.sampled(part, variants)) * (1 + gain[:, None])
+            forces += known.noise[own.band] * random.standard_normal(forces.shape)
+            healthy = np.array([np.interp(position - before, own.place, own.back(each)) for each in forces])
         # What the first record's speed makes is the others', too: only what differs is the line's.
-        away = np.interp(position - before, part.measured.place, part.measured.back(seen - usual))
+        away = np.interp(position - before, own.place, own.back(seen - usual))
         measured.append(healthy.mean(axis=0) + away)
     droppers, speed = plan.layout.positions + before, from_kmh(float(speeds.mean()))
-    facts = (alignment, first, per_span, droppers, line.name, speed)
-    wave_speed = line.contact_wire.wave_speed
-    both = Passes(np.array(measured), *facts, wave_speed), Passes(healthy, *facts, wave_speed)
+    facts = (alignment, first, per_span, droppers, line.name, speed, line.contact_wire.wave_speed)
+    both = Passes(np.array(measured), *facts), Passes(healthy, *facts)
     return *both, (*notes, *ready.of_records)
 
 
@@ -131,10 +131,7 @@ def _values(ready: Fitting, known: Stored) -> tuple[Array, Array]:
     mean, covariance = np.zeros(len(own)), np.diag(ready.values.tolerances**2)
     mean[there] = known.difference[own[there]]
     covariance[np.ix_(there, there)] = known.covariance[np.ix_(own[there], own[there])]
-    if ready.before:
-        turn = turned(values, ready.before)
-        mean, covariance = turn @ mean, turn @ covariance @ turn.T
-    return mean, covariance
+    return turned(values, ready.before, mean, covariance)
 
 
 def _usual(ready: Fitting, part: Part, mean: Array) -> tuple[float, Array]:
@@ -147,11 +144,9 @@ def _usual(ready: Fitting, part: Part, mean: Array) -> tuple[float, Array]:
     return static, part.measured.coefficients(force)
 
 
-def _finely(part: Part, usual: Array) -> Array:
+def _finely(own: Measured, usual: Array) -> Array:
     """Coefficients of a record at the place where it is most like the usual pass."""
     from scipy.optimize import minimize_scalar  # slow to import
-
-    own = part.measured
 
     def away(shift: float) -> float:
         return float(np.sum((own.coefficients(own.force(shift)) - usual) ** 2))

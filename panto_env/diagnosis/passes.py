@@ -175,10 +175,10 @@ def side_by_side(
             f"What healthy passes have in common takes at least {FEWEST} of them, not {len(healthy)}; "
             "give more with --healthy."
         )
-    everything = [*runs, *healthy]
-    names = [f"Run {k + 1}" for k in range(len(runs))]
-    names += [f"Healthy run {k + 1}" for k in range(len(healthy))]
-    for name, run in zip(names, everything, strict=True):
+    named = {f"Run {k}": run for k, run in enumerate(runs, start=1)}
+    named |= {f"Healthy run {k}": run for k, run in enumerate(healthy, start=1)}
+    everything = list(named.values())
+    for name, run in named.items():
         if run.terminated:
             raise InputError(f"{run.ending} A run that ended early cannot be judged.")
         if run.followers:
@@ -204,12 +204,13 @@ def side_by_side(
     per_span = places_per_span(span, speed)
     before = FIRST_SETTLED - 1 - LEAD
     places = places_of(alignment, before, per_span, (last - before) * per_span)
-    force = np.zeros((len(everything), len(places)))
+    forces = list[Array]()
     random = np.random.default_rng(seed)
-    for own, name, run in zip(force, names, everything, strict=True):
+    for name, run in named.items():
         with _named(name):
-            force_of_run = estimated_force(run, int(random.integers(2**63)), pantograph)
-        own[:] = np.interp(places, run.position, force_of_run)
+            own = estimated_force(run, int(random.integers(2**63)), pantograph)
+        forces.append(np.interp(places, run.position, own))
+    force = np.array(forces)
     droppers = next((run.dropper_position for run in everything if len(run.dropper_position)), np.zeros(0))
     if not len(droppers):
         raise InputError(

@@ -34,7 +34,6 @@ from .features import (
     TENSION,
     TRAINED,
     WORN,
-    Candidate,
     Classifier,
     Evidence,
     Region,
@@ -184,32 +183,29 @@ def examples(track: Track) -> tuple[Array, Index]:
     )
     model = Healthy.of(reference)
     level = threshold(model.scores, passes.per_span, passes.span)
-    shown, classes = [], []
+    shown = []
     for k, (defect, _) in enumerate(whole):
         evidence, _ = model.score(passes.only(k), level)
         for region in regions(evidence):
             if defect.kind in KINDS and abs(
                 evidence.position[region.peak] - defect.position
             ) < 0.75 * evidence.alignment.length_at(defect.position):
-                own, which = _learn_from(evidence, region, defect)
-                shown.append(own)
-                classes.append(which)
-    return np.concatenate(shown), np.concatenate(classes)
+                shown.append(_learn_from(evidence, region, defect))
+    features_of, classes = zip(*shown, strict=True)
+    return np.concatenate(features_of), np.concatenate(classes)
 
 
 def _learn_from(evidence: Evidence, region: Region, defect: Defect) -> tuple[Array, Index]:
     """Candidates of a region that are right or wrong for sure, and their classes."""
-    kept: list[Candidate] = []
-    classes: list[int] = []
+    kept = []
     for place in candidates(evidence, region):
         apart = abs(place.position - defect.position)
         possible = defect.kind in OF_SORT[place.sort]
         right = possible and apart < NEAR[place.sort] * (2 if defect.kind == WORN else 1)
-        if not right and (apart < UNLIKE and not possible):
-            continue
-        kept.append(place)
-        classes.append(KINDS.index(defect.kind) + 1 if right else 0)
-    return features(evidence, region, kept), np.array(classes)
+        if possible or apart >= UNLIKE:
+            kept.append((place, KINDS.index(defect.kind) + 1 if right else 0))
+    places, classes = zip(*kept, strict=True)
+    return features(evidence, region, list(places)), np.array(classes)
 
 
 def fit(shown: Array, classes: Index, seed: int = 0) -> Classifier:

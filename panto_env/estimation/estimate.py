@@ -8,7 +8,7 @@ needed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,7 +18,7 @@ import numpy as np
 from ..base.arrays import Array
 from ..base.errors import InputError, suggest
 from ..base.plotting import BLUE, LIMIT, ORANGE, legend_above, stacked
-from ..base.settings import Between, ranges_of
+from ..base.settings import ranges_of
 from ..metrics.low_pass import zero_phase_low_pass
 from ..plant.pantograph.schema import PantographData
 from .innovations import Consistency, Verdict, consistency, judge, log_likelihood, window_bound
@@ -63,7 +63,7 @@ def estimate(
     Raises InputError, with the likely mistake, for a motion that can't be a pantograph's, and for settings
     that need what it does not hold.
     """
-    settings = EstimatorSettings() if settings is None else settings
+    settings = settings or EstimatorSettings()
     check_motion(motion, pantograph)
     model = model_of(motion, pantograph, settings)
     steady = settings.gain == "steady"
@@ -143,22 +143,31 @@ def tune(
         raise InputError("Tuning needs at least one healthy run.")
     for motion in motions:
         check_motion(motion, pantograph)
-    known = _numbers(settings)
+    known = {
+        prefix + key: next(ranges_of(field.rebuild_annotation()), None)
+        for prefix, holder in (("", settings), ("force_model.", settings.force_model))
+        for key, field in type(holder).model_fields.items()
+    }
+    ranges = {name: between for name, between in known.items() if between is not None}
     for name in names:
-        if name not in known:
-            raise InputError(f"Unknown value '{name}' to tune: {suggest(name, list(known))}.")
+        if name not in ranges:
+            raise InputError(f"Unknown value '{name}' to tune: {suggest(name, list(ranges))}.")
     first = {name: attrgetter(name)(settings) for name in names}
     for name, value in first.items():
         if value <= 0:
             raise InputError(f"'{name}' is {value:g}, which can't be tuned; begin with a value above 0.")
-    highs = [known[name].high for name in names]
-    lows = [max(known[name].low, 1e-6 * high) for name, high in zip(names, highs, strict=True)]
-    bounds = [(math.log(low), math.log(high)) for low, high in zip(lows, highs, strict=True)]
+    lows = [max(ranges[name].low, 1e-6 * ranges[name].high) for name in names]
+    bounds = [(math.log(low), math.log(ranges[name].high)) for low, name in zip(lows, names, strict=True)]
     begin = np.array([math.log(value) for value in first.values()])
     samples = sum(len(motion.head) - first_settled(motion) for motion in motions)
 
     def settings_of(logarithms: Array) -> EstimatorSettings:
-        return _changed(settings, dict(zip(names, map(math.exp, logarithms), strict=True)))
+        of_force, outer = dict[str, Any](), dict[str, Any]()
+        for name, value in zip(names, map(math.exp, logarithms), strict=True):
+            (of_force if "." in name else outer)[name.removeprefix("force_model.")] = value
+        return settings.model_copy(
+            update={"force_model": settings.force_model.model_copy(update=of_force)} | outer
+        )
 
     def cost(logarithms: Array) -> float:
         tried, total = settings_of(logarithms), 0.0
@@ -169,13 +178,8 @@ def tune(
         return -total / samples
 
     before = -cost(begin)
-    found = minimize(
-        cost,
-        begin,
-        method="Nelder-Mead",
-        bounds=bounds,
-        options={"xatol": FINE, "fatol": ALIKE, "maxfev": MOST_EVALUATIONS},
-    )
+    options = {"xatol": FINE, "fatol": ALIKE, "maxfev": MOST_EVALUATIONS}
+    found = minimize(cost, begin, method="Nelder-Mead", bounds=bounds, options=options)
     if not found.success:
         raise InputError(
             f"The search for the most likely settings does not end ({found.message}); name fewer."
@@ -189,23 +193,6 @@ def tune(
         before=before,
         at_bounds=tuple(name for name, x, (low, high) in ends if min(x - low, high - x) < FINE),
     )
-
-
-def _numbers(settings: EstimatorSettings) -> dict[str, Between]:
-    """Ranges of all numbers that can be tuned, by name."""
-    found = {}
-    for prefix, holder in (("", settings), ("force_model.", settings.force_model)):
-        for key, field in type(holder).model_fields.items():
-            if ranges := list(ranges_of(field.rebuild_annotation())):
-                (found[prefix + key],) = ranges
-    return found
-
-
-def _changed(settings: EstimatorSettings, values: Mapping[str, float]) -> EstimatorSettings:
-    inner = {name: value for name, value in values.items() if name.startswith("force_model.")}
-    outer: dict[str, Any] = {name: value for name, value in values.items() if name not in inner}
-    update = {name.removeprefix("force_model."): value for name, value in inner.items()}
-    return settings.model_copy(update=outer | {"force_model": settings.force_model.model_copy(update=update)})
 
 
 BANDS = (2.0, 5.0, 20.0)
@@ -238,6 +225,8 @@ def score(true: Array, estimated: Array, time_step: float, band: float) -> Score
 
     Raises InputError where they are too short, or too coarse for the band.
     """
+    from scipy.signal import butter, sosfiltfilt  # slow to import
+
     left_out = round(ENDS / time_step)
     if len(true) < 2 * left_out + round(4 / (band * time_step)) or not band < 0.5 / time_step:
         raise InputError(
@@ -245,10 +234,14 @@ def score(true: Array, estimated: Array, time_step: float, band: float) -> Score
             f"0 to {band:g} Hz; give a longer one, sampled more often."
         )
     inner = slice(left_out, len(true) - left_out)
-    a, b = (_in_band(values, band, time_step) for values in (true, estimated))
+    low_pass = butter(ORDER // 2, band, fs=1 / time_step, output="sos")
+    a, b = (np.asarray(sosfiltfilt(low_pass, values)) for values in (true, estimated))
     delay = _delay(a, b, time_step, left_out)
     a, b = a[inner], b[inner]
     error = b - a
+    found = phases(true[inner], estimated[inner], time_step, delay if np.isfinite(delay) else 0.0)
+    used = (found.frequency <= band) & (found.coherence >= COHERENT)
+    late = np.average(found.delay[used], weights=found.weight[used]) if used.any() else np.nan
     return Score(
         band=band,
         bias=float(error.mean()),
@@ -256,7 +249,7 @@ def score(true: Array, estimated: Array, time_step: float, band: float) -> Score
         correlation=float(np.corrcoef(a, b)[0, 1]),
         delay=delay,
         whole_rms=float((estimated - true)[inner].std()),
-        phase_delay=_phase_delay(true[inner], estimated[inner], time_step, band, delay),
+        phase_delay=float(late),
     )
 
 
@@ -279,8 +272,7 @@ def phases(true: Array, estimated: Array, time_step: float, about: float = 0.0) 
 
     moved = round(about / time_step)
     kept = len(true) - abs(moved)
-    a = true[max(0, -moved) :][:kept]
-    b = estimated[max(0, moved) :][:kept]
+    a, b = true[max(0, -moved) :][:kept], estimated[max(0, moved) :][:kept]
     a, b = (values - values.mean() for values in (a, b))
     piece = {"fs": 1 / time_step, "nperseg": min(round(2 / time_step), len(a) // 2)}
     frequency, cross = csd(a, b, **piece)
@@ -290,33 +282,16 @@ def phases(true: Array, estimated: Array, time_step: float, about: float = 0.0) 
     return Phases(frequency[1:], delay, coherence[1:], np.abs(cross[1:]))
 
 
-def _in_band(values: Array, band: float, time_step: float) -> Array:
-    from scipy.signal import butter, sosfiltfilt  # slow to import
-
-    return np.asarray(sosfiltfilt(butter(ORDER // 2, band, fs=1 / time_step, output="sos"), values))
-
-
 def _delay(true: Array, estimated: Array, time_step: float, left_out: int) -> float:
     most = min(round(MAXIMUM_DELAY / time_step), left_out)
-    inner = slice(left_out, len(true) - left_out)
-    shifts = np.arange(-most, most + 1)
-    like = [
-        np.corrcoef(true[inner], estimated[left_out + shift : len(true) - left_out + shift])[0, 1]
-        for shift in shifts
-    ]
+    begin, end = left_out, len(true) - left_out
+    shifts = range(-most, most + 1)
+    like = [np.corrcoef(true[begin:end], estimated[begin + k : end + k])[0, 1] for k in shifts]
     best = int(np.argmax(like))
     if best in (0, len(like) - 1):
         return float("nan")
     before, at, after = like[best - 1 : best + 2]
     return float((shifts[best] + (before - after) / (2 * (before - 2 * at + after))) * time_step)
-
-
-def _phase_delay(true: Array, estimated: Array, time_step: float, band: float, about: float) -> float:
-    found = phases(true, estimated, time_step, about if np.isfinite(about) else 0.0)
-    used = (found.frequency <= band) & (found.coherence >= COHERENT)
-    if not used.any():
-        return float("nan")
-    return float(np.average(found.delay[used], weights=found.weight[used]))
 
 
 SHOWN = 10.0
@@ -333,12 +308,10 @@ def plot_estimate(estimate: Estimate, title: str, measured: Array | None = None)
     end = min(begin + SHOWN, estimate.time[-1])
     shown = (estimate.time >= begin) & (estimate.time <= end)
     step = float(estimate.time[1] - estimate.time[0])
-    time = estimate.time[shown]
-    if measured is not None:
-        drawn = zero_phase_low_pass(measured, step)[shown]
-        force.plot(time, drawn, color=ORANGE, linewidth=3, label="recorded")
-    drawn = zero_phase_low_pass(estimate.force, step)[shown]
-    force.plot(time, drawn, color="black", linewidth=1, label="estimated")
+    recorded = [] if measured is None else [(measured, ORANGE, 3, "recorded")]
+    for values, colour, width, words in (*recorded, (estimate.force, "black", 1, "estimated")):
+        drawn = zero_phase_low_pass(values, step)[shown]
+        force.plot(estimate.time[shown], drawn, color=colour, linewidth=width, label=words)
     force.set(ylabel="contact force, 0 to 20 Hz (N)", xlim=(begin, end))
     legend_above(force, 2)
     tested = estimate.consistency

@@ -56,9 +56,8 @@ class Shaped(Settings):
 
     def process(self, speed: float | None, span: float | None) -> ForceProcess:
         """Three states: slow part, coloured part, and its rate over its angular frequency."""
-        frequency = (
-            2 * np.pi * _known(speed, "The shaped force model needs the speed of the train") / self.wavelength
-        )
+        moving = _known(speed, "The shaped force model needs the speed of the train")
+        frequency = 2 * np.pi * moving / self.wavelength
         drift = frequency * np.array([[0.0, 1.0], [-1.0, -2 * self.damping]])
         noise = np.diag([0.0, 4 * self.damping * frequency * self.deviation**2])
         covariance = self.deviation**2 * np.eye(2)
@@ -89,20 +88,17 @@ class Periodic(Settings):
                 "raise 'highest', or take the random-walk force model."
             )
         decay = moving / self.memory
-        covariance = self.deviation**2 * np.eye(2)
-        parts = [_walk(self.intensity)]
-        for harmonic in range(1, count + 1):
-            turn = 2 * np.pi * passing * harmonic * np.array([[0.0, -1.0], [1.0, 0.0]])
-            drift = turn - decay * np.eye(2)
-            parts.append(ForceProcess(drift, 2 * decay * covariance, np.array([1.0, 0.0]), covariance))
-        return _sum(*parts)
+        covariance, turn = self.deviation**2 * np.eye(2), np.array([[0.0, -1.0], [1.0, 0.0]])
+        drifts = (
+            2 * np.pi * passing * harmonic * turn - decay * np.eye(2) for harmonic in range(1, count + 1)
+        )
+        facts = 2 * decay * covariance, np.array([1.0, 0.0]), covariance
+        return _sum(_walk(self.intensity), *(ForceProcess(drift, *facts) for drift in drifts))
 
 
 ForceModel = RandomWalk | Shaped | Periodic
 FORCE_MODELS: dict[str, type[ForceModel]] = {
-    "random-walk": RandomWalk,
-    "shaped": Shaped,
-    "periodic": Periodic,
+    kind.model_fields["kind"].default: kind for kind in (RandomWalk, Shaped, Periodic)
 }
 
 

@@ -64,8 +64,7 @@ def nis(filtered: Filtered) -> Array:
 
 def log_likelihood(filtered: Filtered, first: int = 0) -> float:
     """Logarithm of the density of the samples from number ``first`` on, given those before."""
-    innovations = filtered.innovations[first:]
-    covariance = filtered.gains.of(np.arange(first, first + len(innovations))).innovation
+    covariance = filtered.gains.of(np.arange(first, len(filtered.innovations))).innovation
     _, logarithm = np.linalg.slogdet(2 * np.pi * covariance)
     return float(-0.5 * (nis(filtered)[first:].sum() + logarithm.sum()))
 

@@ -81,8 +81,7 @@ def steady_gain(transition: Array, observed: Array, process_noise: Array, measur
 
 def steady_gains(model: Model) -> Gains:
     """The steady filter's gain for every sample. Raises InputError where there is none."""
-    covariance = steady_covariance(*model.linear)
-    return Gains(*(each[None] for each in _gains(model, covariance)))
+    return Gains(*(each[None] for each in _gains(model, steady_covariance(*model.linear))))
 
 
 def time_varying_gains(model: Model, samples: int) -> Gains:
@@ -103,11 +102,9 @@ def time_varying_gains(model: Model, samples: int) -> Gains:
 
 def run_filter(model: Model, gains: Gains, measured: Array, inputs: Array, start: Array) -> Filtered:
     """Filter n samples. measured: (n, m); inputs: (n, 2), from each to the next (N); start: (N,)."""
-    n = len(measured)
-    predicted = np.empty((n, len(start)))
-    forced = inputs @ model.inputs.T
-    transition, observed, last = model.transition, model.observed, len(gains.gain) - 1
-    z = start
+    n, last = len(measured), len(gains.gain) - 1
+    predicted, z = np.empty((n, len(start))), start
+    transition, observed, forced = model.transition, model.observed, inputs @ model.inputs.T
     for k in range(min(n, last)):
         predicted[k] = z
         z = transition @ (z + gains.gain[k] @ (measured[k] - observed @ z)) + forced[k]
@@ -151,9 +148,8 @@ def correction(covariance: Array, observed: Array, measurement_noise: Array) -> 
     innovation = seen @ observed.T + measurement_noise
     # Solved in units of the noise: those of displacements and velocities are far apart.
     unit = np.sqrt(np.diag(innovation))
-    scaled = innovation / np.outer(unit, unit)
-    gain = (np.linalg.solve(scaled, seen / unit[:, None]) / unit[:, None]).T
-    return gain, innovation
+    solved = np.linalg.solve(innovation / np.outer(unit, unit), seen / unit[:, None])
+    return (solved / unit[:, None]).T, innovation
 
 
 def corrected(covariance: Array, gain: Array, observed: Array, measurement_noise: Array) -> Array:
@@ -179,9 +175,8 @@ def smooth_force(model: Model, filtered: Filtered, lag: int) -> Array:
         adjoint = np.zeros((len(block), len(model.force)))
         for later in range(lag, -1, -1):
             samples = block + later
-            innovation = np.where(
-                (samples < n)[:, None], filtered.innovations[np.minimum(samples, n - 1)], 0.0
-            )
+            own = filtered.innovations[np.minimum(samples, n - 1)]
+            innovation = np.where((samples < n)[:, None], own, 0.0)
             gains = filtered.gains.of(samples)
             back = adjoint @ model.transition
             news = np.linalg.solve(gains.innovation, innovation[:, :, None])[:, :, 0]

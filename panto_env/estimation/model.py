@@ -117,16 +117,14 @@ def build_model(
     if suspension:
         drift[:size, -1] = forces[:, 2]
     on_frame = settings.frame_intensity * forces[:, 1]
-    noise = block_diag(
-        np.outer(on_frame, on_frame), force.noise, settings.suspension_drift**2 * np.eye(suspension)
-    )
+    on_suspension = settings.suspension_drift**2 * np.eye(suspension)
+    noise = block_diag(np.outer(on_frame, on_frame), force.noise, on_suspension)
     known = np.zeros((total, 2))
     known[:size] = forces[:, 1:]
     transition, inputs, process_noise = _discretise(drift, known, noise, time_step)
     masses = size // 2
-    rows = [0, masses - 1, masses, size - 1]  # of the first and the last mass
-    if settings.observation == "displacements":
-        rows = rows[:2]
+    seen = 2 if settings.observation == "displacements" else 4
+    rows = [0, masses - 1, masses, size - 1][:seen]  # of the first and the last mass
     rms = [settings.displacement_noise] * 2 + [settings.velocity_noise] * 2
     start = block_diag(
         START_HEIGHT**2 * np.eye(masses),
@@ -140,7 +138,7 @@ def build_model(
         inputs=inputs,
         process_noise=process_noise,
         observed=np.eye(total)[rows],
-        measurement_noise=np.diag(np.square(rms[: len(rows)])),
+        measurement_noise=np.diag(np.square(rms[:seen])),
         force=np.concatenate([np.zeros(size), force.output, np.zeros(suspension)]),
         start_covariance=start,
     )

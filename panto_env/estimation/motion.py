@@ -65,7 +65,7 @@ def on_frame(run: Trajectory) -> Array:
 def warn_of_wind(run: Trajectory) -> None:
     """Warn where a run was in wind or in tunnels, whose lift an estimator does not know."""
     wind, known = run.identity.wind, run.designed.known_pantograph
-    if run.designed.tunnels and known is not None and known.lifted_by_air:
+    if run.designed.of_line("tunnels") and known is not None and known.lifted_by_air:
         warnings.warn(
             "A run is on a line with tunnels, of which no sensor knows: what they change of the lift is "
             "missing in the force that is estimated from the motion there.",
@@ -170,12 +170,10 @@ def read_motion(
 
 def write_motion(motion: Motion, path: str | Path) -> None:
     """Write a CSV file that ``read_motion`` reads, whole or not at all, without lift, speed and span."""
-    series = {name: motion.time if name == "time" else getattr(motion, name) for name in COLUMNS}
     columns = {}
-    for name, values in series.items():
-        if values is not None:
-            unit = COLUMNS[name].example
-            columns[f"{name} ({unit})"] = values / COLUMNS[name].units[unit]
+    for name, column in COLUMNS.items():
+        if (values := getattr(motion, name)) is not None:
+            columns[f"{name} ({column.example})"] = values / column.units[column.example]
     write_series(path, columns)
 
 
@@ -202,20 +200,22 @@ def check_motion(motion: Motion, pantograph: PantographData) -> None:
             "frame."
         )
     _check_time(motion)
-    named = {"head": motion.head, "frame": motion.frame}
-    velocities = {"head_velocity": motion.head_velocity, "frame_velocity": motion.frame_velocity}
-    measured = {name: each for name, each in velocities.items() if each is not None}
+
+    def named(quantity: str) -> dict[str, Array]:
+        every = {f"{part}{quantity}": getattr(motion, f"{part}{quantity}") for part in ("head", "frame")}
+        return {name: values for name, values in every.items() if values is not None}
+
+    heights, measured = named(""), named("_velocity")
     if len(measured) == 1:
         raise InputError(f"Only {next(iter(measured))} is measured; give both velocities, or neither.")
-    forces = {"frame_force": motion.frame_force, "head_force": motion.head_force}
-    for name, values in (named | measured | forces).items():
+    for name, values in (heights | measured | named("_force")).items():
         if not np.isfinite(values).all():
             first = int(np.argmin(np.isfinite(values)))
             raise InputError(
                 f"Column {name} holds no number at {motion.time[first]:.6g} s; give a part of the record "
                 "without gaps."
             )
-    for name, values in named.items():
+    for name, values in heights.items():
         if np.ptp(values) > 0:  # else the sensor is dead
             check_displacement(name, values, MOTION)
             quickest = int(np.abs(np.diff(values)).argmax())
@@ -225,10 +225,10 @@ def check_motion(motion: Motion, pantograph: PantographData) -> None:
                     f"Column {name} jumps by {1e3 * jump:.3g} mm at {motion.time[quickest + 1]:.6g} s, "
                     "faster than any pantograph moves; give a part of the record without such jumps."
                 )
-    for name, values in (named | measured).items():
+    for name, values in (heights | measured).items():
         _check_alive(name, values, motion)
     for name, values in measured.items():
-        _check_velocity(name, values, named[name.removesuffix("_velocity")], motion.time_step)
+        _check_velocity(name, values, heights[name.removesuffix("_velocity")], motion.time_step)
     offset = suspension_offset(motion, pantograph)
     if abs(offset) > MOST_OFFSET:
         raise InputError(
@@ -243,8 +243,7 @@ def suspension_offset(motion: Motion, pantograph: PantographData) -> float:
     """How much more (N) the springs between frame and head seem to carry in the mean than the lift leaves."""
     carried = motion.lift + float(motion.frame_force.mean())
     carried -= pantograph.stiffnesses[-1] * float(motion.frame.mean())
-    stiffness = _suspension(pantograph)
-    return stiffness * float((motion.frame - motion.head).mean()) - carried
+    return _suspension(pantograph) * float((motion.frame - motion.head).mean()) - carried
 
 
 def rezeroed(motion: Motion, pantograph: PantographData) -> Motion:
@@ -316,10 +315,10 @@ def _check_alive(name: str, values: Array, motion: Motion) -> None:
     changes = np.flatnonzero(np.diff(values) != 0)
     edges = np.concatenate([[-1], changes, [len(values) - 1]])
     longest = int(np.diff(edges).argmax())
-    if np.diff(edges)[longest] * motion.time_step <= HELD:
+    first, last = int(edges[longest]) + 1, int(edges[longest + 1])
+    if (last - first + 1) * motion.time_step <= HELD:
         return
-    first = int(edges[longest]) + 1
-    begin, end = motion.time[first], motion.time[int(edges[longest + 1])]
+    begin, end = motion.time[[first, last]]
     saturated = values[first] in (values.max(), values.min()) and np.ptp(values) > 0
     advice = " or leave out the columns of velocity" if name.endswith("velocity") else ""
     raise InputError(

@@ -73,9 +73,8 @@ def estimate_parameters(
     """
     from scipy.linalg import block_diag  # slow to import
 
-    settings = EstimatorSettings() if settings is None else settings
     # A suspension whose error wanders takes up what the lift determines: all parameters then drift together.
-    settings = settings.model_copy(update=PAPER2)
+    settings = (settings or EstimatorSettings()).model_copy(update=PAPER2)
     check_motion(motion, pantograph)
     names = frame_parameters(pantograph) if names is None else tuple(names)
     if not names:
@@ -141,17 +140,13 @@ def information(
     check_motion(motion, pantograph)
     _check([name for name in names if name not in (HEAD_MASS, LIFT)], pantograph)
     first = first_settled(motion)
-
-    model = model_of(motion, pantograph, settings)
-    gains = steady_gains(model)
+    gains = steady_gains(model_of(motion, pantograph, settings))
     unit = np.linalg.cholesky(gains.innovation[0])
 
     def innovations(name: str, factor: float) -> Array:
-        moved, other = motion, pantograph
-        if name == LIFT:
-            moved = replace(motion, lift=factor * motion.lift)
-        else:
-            other = changed(pantograph, {name: factor * _get(pantograph, name)})
+        moved = replace(motion, lift=factor * motion.lift) if name == LIFT else motion
+        values = {} if name == LIFT else {name: factor * _get(pantograph, name)}
+        other = changed(pantograph, values)
         model = model_of(moved, other, settings)
         filtered = filter_motion(model, gains, moved)
         return np.linalg.solve(unit, filtered.innovations[first:].T).ravel()
@@ -173,17 +168,17 @@ def changed(pantograph: PantographData, values: dict[str, float]) -> PantographD
 
 
 def _check(names: Sequence[str], pantograph: PantographData) -> None:
-    known = parameter_names(pantograph)
     if HEAD_MASS in names:
         raise InputError(
             f"The head's mass, '{HEAD_MASS}', can't be estimated with an unknown contact force, which takes "
             "up whatever it is wrong by; weigh the head, and leave it out."
         )
+    known = parameter_names(pantograph)
     for name in names:
         if name not in known:
             raise InputError(
                 f"'{name}' is no parameter of '{pantograph.name}' that can be estimated: "
-                f"{suggest(name, list(known))}."
+                f"{suggest(name, known)}."
             )
 
 

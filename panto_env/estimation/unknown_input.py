@@ -73,10 +73,9 @@ def unknown_input(
 
     settings: whose force model is not used. Raises InputError as ``estimate`` does.
     """
-    settings = EstimatorSettings() if settings is None else settings
     check_motion(motion, pantograph)
-    settings = settings.model_copy(update={"force_model": _HELD})
-    system, contact = _system(model_of(motion, pantograph, settings))
+    held = (settings or EstimatorSettings()).model_copy(update={"force_model": _HELD})
+    system, contact = _system(model_of(motion, pantograph, held))
     measured, known = motion.measured(len(system.observed)), motion.inputs @ system.inputs.T
     state, covariance = system.observed.T @ measured[0], system.start_covariance
     converged = False

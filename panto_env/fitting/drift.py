@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..base.errors import InputError
-from .fit import Found, slack_droppers
+from .fit import Found, slack_droppers, within
 from .stored import Stored
 
 SMALLER = 0.5
@@ -62,23 +62,25 @@ def drift(earlier: Stored, later: Stored, tolerances: Mapping[str, float] | None
     covariance = np.linalg.inv(precision)
     change = (covariance @ np.concatenate([first_side + second_side, second_side]))[count:]
     deviation = np.sqrt(np.diag(covariance)[count:])
-    begin, end = _common(earlier, later)
     both = {value.name for value in earlier.values} & {value.name for value in later.values}
-    found = [
-        Found(replace(value, tolerance=float(tolerance)), float(by), float(error))
-        for value, tolerance, by, error in zip(values.values(), usual, change, deviation, strict=True)
-        if value.name in both and (value.place is None or begin <= value.place <= end)
-    ]
-    return Drift(earlier, later, tuple(found), _named(found))
+    found = within(
+        (
+            Found(replace(value, tolerance=float(tolerance)), float(by), float(error))
+            for value, tolerance, by, error in zip(values.values(), usual, change, deviation, strict=True)
+            if value.name in both
+        ),
+        _common(earlier, later),
+    )
+    return Drift(earlier, later, found, _named(found))
 
 
 def _likelihood(known: Stored, names: Sequence[str]) -> tuple[Array, Array]:
     """Information matrix, (n, n), and right side, (n,), of a fit's records alone, of values by name."""
-    where = np.array([names.index(value.name) for value in known.values])
+    where = [names.index(value.name) for value in known.values]
     inverse = np.linalg.inv(known.covariance)
     information, side = np.zeros((len(names), len(names))), np.zeros(len(names))
-    own = 0.5 * (inverse + inverse.T) - np.diag([value.tolerance**-2 for value in known.values])
-    information[np.ix_(where, where)] = own
+    prior = np.diag([value.tolerance**-2 for value in known.values])
+    information[np.ix_(where, where)] = 0.5 * (inverse + inverse.T) - prior
     side[where] = inverse @ known.difference
     return information, side
 

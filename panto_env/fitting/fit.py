@@ -1,8 +1,13 @@
-"""What a fit found: each value with its interval, whether it is identifiable, and the residual."""
+"""What a fit found: each value with its interval, whether it is identifiable, and the residual.
+
+Where more is left in a span than noise, the model lacks something, which moves values. It is in the same
+place of all records and no chance, but the only draw of it that there is: so values are as uncertain as it
+moves them, as in a covariance by clusters (Bell and McCaffrey, 2002, Survey Methodology 28:169, recalled).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,10 +18,9 @@ from ..estimation.innovations import Whiteness, whiteness
 from ..plant.catenary.schema import CatenaryData
 from ..plant.pantograph.schema import PantographData
 from ..records.record import Record
-from .misfit import Part, State
+from .misfit import OWN, Part, Problem, State
 from .problem import problem
-from .solve import Fitting, Solution
-from .spans import moved, wider
+from .solve import FREEDOM, Fitting, Solution
 from .values import USUAL, Value
 
 SLACK = 0.015
@@ -32,6 +36,9 @@ FASTER = 2e-4
 much as of a tension."""
 WHITE = 0.01
 """Probability below which a residual is called unlike noise."""
+TOO_MUCH = 3.0
+"""Standard deviations of noise's power by which a span has too much left. Own choice: one span of some 300
+has so much by chance."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +75,50 @@ def slack_droppers(found: Sequence[Found]) -> list[str]:
     ]
 
 
+def within(found: Iterable[Found], stretch: tuple[float, float]) -> tuple[Found, ...]:
+    """Values that act everywhere, or have their place in a stretch (m)."""
+    return tuple(
+        each for each in found if each.value.place is None or stretch[0] <= each.value.place <= stretch[1]
+    )
+
+
+def moved(problem: Problem, solution: Solution) -> dict[int, Array]:
+    """By how much what is left in each span that has too much moves all values, (n,).
+
+    By numbers of the simulated spans, from 1.
+    """
+    deviation = solution.state.noise.ravel()[problem.band]
+    both = np.column_stack([solution.jacobian, solution.residual]) / deviation[:, None]
+    measured = [part.measured for part in problem.parts]
+    pairs = zip(measured, problem.by_part(both), strict=True)
+    rows = np.concatenate([own.back(coefficients.T).T for own, coefficients in pairs])
+    shares = [np.full(len(own.place), len(own.compared) / len(own.place)) for own in measured]
+    free = np.concatenate(shares)  # coefficients for each place
+    design = problem.values.design
+    spans = design.catenary.alignment(design.spans).span_of(np.concatenate([own.place for own in measured]))
+    found = {}
+    for span in np.unique(spans).tolist():
+        inside = spans == span
+        jacobian, left = rows[inside, :-1], rows[inside, -1]
+        # Values follow noise too, most where few places tell them: what is left is made as large as it was.
+        used, axes = np.linalg.eigh(jacobian @ solution.covariance @ jacobian.T)
+        whole = axes @ ((axes.T @ left) / np.sqrt(np.maximum(1 - used, FREEDOM)))
+        freedom = float(free[inside].sum())
+        if whole @ whole > freedom + TOO_MUCH * np.sqrt(2 * freedom):
+            found[span] = solution.covariance @ (jacobian.T @ whole)
+    return found
+
+
+def wider(covariance: Array, moves: Iterable[Array], prior: Array) -> Array:
+    """Covariance, (n, n), with moves of all values added, (n,) each; no wider than the prior's, (n,)."""
+    added = [np.outer(move, move) for move in moves]
+    if not added:
+        return covariance
+    scale = np.outer(prior, prior)
+    sizes, axes = np.linalg.eigh((covariance + np.sum(added, axis=0)) / scale)
+    return np.asarray((axes * np.minimum(sizes, 1.0)) @ axes.T * scale)
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """The end of a fit."""
@@ -93,12 +144,9 @@ class Fit:
     @cached_property
     def found(self) -> tuple[Found, ...]:
         """All values, of droppers and supports only those along what was compared."""
-        values = self.problem.values.all
-        deviations = np.sqrt(np.diag(self.covariance))
-        triples = zip(values, self.solution.state.x.tolist(), deviations.tolist(), strict=False)
-        every = (Found(*each) for each in triples)
-        begin, end = self.problem.stretch
-        return tuple(each for each in every if each.value.place is None or begin <= each.value.place <= end)
+        x, deviations = self.solution.state.x, np.sqrt(np.diag(self.covariance))
+        triples = zip(self.problem.values.all, x.tolist(), deviations.tolist(), strict=False)
+        return within((Found(*each) for each in triples), self.problem.stretch)
 
     def of_kind(self, kind: str) -> list[Found]:
         """Values of one kind."""
@@ -112,14 +160,13 @@ class Fit:
     @cached_property
     def correlated(self) -> list[tuple[Value, Value, float]]:
         """Pairs of identifiable values that the records hardly tell apart, strongest first."""
-        values = self.problem.values.all
-        names = {each.value.name for each in self.found if each.identifiable}
-        which = [k for k, value in enumerate(values) if value.name in names]
+        values = [each.value for each in self.found if each.identifiable]
+        which = [self.problem.values.all.index(value) for value in values]
         covariance = self.covariance[np.ix_(which, which)]
         scale = np.sqrt(np.diag(covariance))
         matrix = np.triu(covariance / np.outer(scale, scale), 1)
         pairs = np.argwhere(np.abs(matrix) > CORRELATED)
-        found = [(values[which[i]], values[which[j]], float(matrix[i, j])) for i, j in pairs]
+        found = [(values[i], values[j], float(matrix[i, j])) for i, j in pairs]
         return sorted(found, key=lambda pair: -abs(pair[2]))
 
     @cached_property
@@ -135,19 +182,9 @@ class Fit:
         return [whiteness(own[:, None]) for own in parts]
 
     @property
-    def shifts(self) -> Array:
-        """By how much positions of each part were short, beside its rough shift, (parts,) (m)."""
-        return np.asarray(self.problem.sensors(self.solution.state.x)[0])
-
-    @property
-    def gains(self) -> Array:
-        """By how much the gain of each part's sensors differs from 1, (parts,)."""
-        return np.asarray(self.problem.sensors(self.solution.state.x)[1])
-
-    @property
-    def scales(self) -> Array:
-        """By which share distances of each part were short, as of a worn wheel, (parts,)."""
-        return np.asarray(self.problem.sensors(self.solution.state.x)[3])
+    def sensors(self) -> dict[str, Array]:
+        """What was found of each of ``OWN``, (parts,); shifts are beside the rough ones."""
+        return dict(zip(OWN, self.problem.sensors(self.solution.state.x), strict=True))
 
     def measured(self, k: int) -> Array:
         """Coefficients of a part's measured force (N), with its place, scale and gain corrected."""
@@ -156,13 +193,10 @@ class Fit:
     @cached_property
     def std(self) -> list[tuple[float, float]]:
         """Standard deviation (N) of what is compared of each part, and of its residual."""
-        std = [part.measured.std for part in self.parts]
-        return [(std[k](self.measured(k)), std[k](residual)) for k, residual in enumerate(self.residual)]
-
-    @property
-    def before(self) -> float:
-        """Distance along the line before the simulated spans (m)."""
-        return self.problem.before
+        return [
+            (part.measured.std(self.measured(k)), part.measured.std(residual))
+            for k, (part, residual) in enumerate(zip(self.parts, self.residual, strict=True))
+        ]
 
 
 def fit(

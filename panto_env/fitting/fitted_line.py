@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -72,16 +73,12 @@ def _read(text: str) -> dict[str, Any]:
         return {}
 
 
-def _flat(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
+def _flat(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
     for key, item in table.items():
-        if isinstance(item, dict) and "value" in item:
-            found.append((prefix + key, item["value"]))
-        elif isinstance(item, dict):
-            found += _flat(item, f"{prefix}{key}.")
+        if isinstance(item, dict) and "value" not in item:
+            yield from _flat(item, f"{prefix}{key}.")
         else:
-            found.append((prefix + key, item))
-    return found
+            yield prefix + key, item["value"] if isinstance(item, dict) else item
 
 
 SUFFIXES = (".toml",)
@@ -133,54 +130,43 @@ def write_pantograph(fit: Fit, base: str | Path, path: str | Path, records: str)
     design = fit.problem.values.design.pantograph
     every = [each for each in fit.of_kind("pantograph") if each.identifiable]
     for name in CHAIN:
-        found, values = [each for each in every if each.value.index[0] == name], list(getattr(design, name))
-        if not found:
-            continue
-        for each in found:
-            values[each.value.index[1]] *= 1 + each.difference
-        numbers = ", ".join(str(each.value.index[1] + 1) for each in found)
-        text = with_value(text, name, values, f"number {numbers} {source(found, records)}", str(base))
+        if found := {each.value.index[1]: each for each in every if each.value.index[0] == name}:
+            values = list(getattr(design, name))
+            for k, each in found.items():
+                values[k] *= 1 + each.difference
+            numbers = ", ".join(str(k + 1) for k in found)
+            words = f"number {numbers} {source(list(found.values()), records)}"
+            text = with_value(text, name, values, words, str(base))
     _write(path, text, "pantograph", parse_pantograph)
 
 
 def as_found(fit: Fit, records: str) -> tuple[dict[str, Any], dict[str, str]]:
     """A line condition of the most likely values, and the source of each of its keys."""
     design = fit.problem.values.design
-    before = design.first_span
     line = design.catenary
     known = {} if line.as_found is None else line.as_found.model_dump(mode="json", exclude_defaults=True)
     sources = {key: line.sources.get(f"as_found.{key}", "not given") for key in known}
-    cut = {(span, number): wrong for span, number, wrong in known.get("miscut_droppers", ())}
-    raised = dict(known.get("raised_supports", ()))
+    keys = ("miscut_droppers", "raised_supports")
+    rows = ({tuple(place): wrong for *place, wrong in known.get(key, ())} for key in keys)
+    cut, raised = (defaultdict[tuple[int, ...], float](float, own) for own in rows)
     # All of them, also those that the records hardly determine: droppers were found together with these.
     found = {kind: fit.of_kind(kind) for kind in ("droppers", "supports", "tensions")}
     for each in found["droppers"]:
-        place = design.place(each.value.index[0])
-        cut[place] = cut.get(place, 0.0) + each.difference
+        cut[design.place(each.value.index[0])] += each.difference
     for each in found["supports"]:
-        number = each.value.index[0] + 1 + before
-        raised[number] = raised.get(number, 0.0) + each.difference
-    # What stands before the line's first support has no place in its file.
-    cut = {place: wrong for place, wrong in cut.items() if place[0] >= 1}
-    raised = {number: wrong for number, wrong in raised.items() if number >= 1}
+        raised[(each.value.index[0] + 1 + design.first_span,)] += each.difference
     values: dict[str, Any] = dict(known)
-    if found["droppers"]:
-        values["miscut_droppers"] = [[*place, wrong] for place, wrong in _rounded(cut)]
-        sources["miscut_droppers"] = source(found["droppers"], records)
-    if found["supports"]:
-        values["raised_supports"] = [list(each) for each in _rounded(raised)]
-        sources["raised_supports"] = source(found["supports"], records)
+    for key, kind, places in zip(keys, ("droppers", "supports"), (cut, raised), strict=True):
+        if found[kind]:
+            # To a micrometre. What stands before the line's first support has no place in its file.
+            rounded = ([*place, round(wrong, 6)] for place, wrong in sorted(places.items()) if place[0] >= 1)
+            values[key] = [row for row in rounded if row[-1]]
+            sources[key] = source(found[kind], records)
     for each in found["tensions"]:
         key = f"lost_{('contact', 'messenger')[each.value.index[0]]}_tension"
         values[key] = round(1 - (1 - known.get(key, 0.0)) * (1 + each.difference), 6)
         sources[key] = source([each], records)
     return values, sources
-
-
-def _rounded(differences: dict[Any, float]) -> list[tuple[Any, float]]:
-    """Differences (m) by place, in their order, to a micrometre; without those that are none."""
-    rounded = ((place, round(wrong, 6)) for place, wrong in sorted(differences.items()))
-    return [(place, wrong) for place, wrong in rounded if wrong]
 
 
 def source(found: list[Found], records: str) -> str:

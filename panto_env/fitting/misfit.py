@@ -171,16 +171,11 @@ class Problem:
 
     def at_speeds(self, x: Array) -> Self:
         """The same with trains as fast as these values' scales say; records tell time exactly."""
-        parts = [
-            replace(
-                part,
-                **{
-                    grid: getattr(part, grid).at(part.measured.piece.speed * (1 + float(scale)))
-                    for grid in ("fine", "fair", "coarse")
-                },
-            )
-            for part, scale in zip(self.parts, self.sensors(x)[3], strict=True)
-        ]
+        parts = []
+        for part, scale in zip(self.parts, self.sensors(x)[3].tolist(), strict=True):
+            speed = part.measured.piece.speed * (1 + scale)
+            passes = {grid: getattr(part, grid).at(speed) for grid in ("fine", "fair", "coarse")}
+            parts.append(replace(part, **passes))
         return replace(self, parts=parts)
 
     def measured(self, k: int, x: Array, further: float = 0.0) -> Array:
@@ -193,7 +188,7 @@ class Problem:
         """(parts,): static forces (N) for other values x; means of forces follow the measured ones."""
         parts = range(len(self.parts))
         more = [self.measured(k, x).mean() - self.measured(k, state.x).mean() for k in parts]
-        return np.asarray(state.static_forces + np.array(more))
+        return np.asarray(state.static_forces + more)
 
     def sampled(
         self, part: Part, variants: Sequence[Variant], begins: Array | None = None, grid: Grid = "fine"
@@ -202,8 +197,7 @@ class Problem:
 
         begins: as ``Passes.forces`` takes them. grid: of the passes.
         """
-        passes: Passes = getattr(part, grid)
-        return forces_at(passes, variants, part.measured.place, part.low_passed, begins)
+        return forces_at(getattr(part, grid), variants, part.measured.place, part.low_passed, begins)
 
 
 def forces_at(

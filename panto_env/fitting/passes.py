@@ -13,6 +13,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -113,8 +115,8 @@ def measured(piece: Piece, offset: float, stretch: tuple[float, float], span: fl
             f"It has only {max(end - begin, 0.0):.0f} m behind the spans in which a pass "
             f"settles; a fit takes at least three spans ({3 * span:.0f} m) there: give a longer record."
         )
-    inside = (position >= begin) & (position <= end)
-    speed = local_speed(piece)[inside]  # of samples one by one it would be that of the odometer's steps
+    speed = local_speed(piece)  # of samples one by one it would be that of the odometer's steps
+    speed = speed[(position >= begin) & (position <= end)]
     away = float(np.abs(speed / piece.speed - 1).max())
     if away > CHANGES:
         raise InputError(
@@ -172,15 +174,21 @@ class Passes:
     ) -> None:
         """speed: m/s; distance: of a pass (m); spans: of the line."""
         self._facts = (catenary, pantograph, condition), (distance, spans, numerics)
-        self._runs = Runs(speeds=(speed, speed), conditions=(condition,))
-        self._spans, self._numerics, self._pantograph = spans, numerics, pantograph
+        self._fixed: dict[str, Any] = {
+            "train": Train.of(pantograph),
+            "spans": spans,
+            "lanes": LANES,
+            "numerics": numerics,
+            "runs": Runs(speeds=(speed, speed), conditions=(condition,)),
+            "varied": True,
+        }
         self._idle: defaultdict[FlexibleCatenaryData, list[Plant]] = defaultdict(list)
         with self._lent(catenary) as first:
             self.speed, self.time_step = speed, first.time_step
         # Another damping must not have another grid and time step.
         same = {"time_step": first.time_step, "spacing": first.model.grid["spacing"]}
+        self._fixed["numerics"] = numerics.model_copy(update=same)
         self.window = int(first.model.grid["window"])  # spans; 0: the whole line
-        self._numerics = numerics.model_copy(update=same)
         self.steps = int(distance / (speed * self.time_step))
         self.layout, self.alignment = catenary.layout(spans), first.alignment
         self.position = speed * self.time_step * (np.arange(self.steps) + 0.5)
@@ -195,19 +203,7 @@ class Passes:
     def _lent(self, catenary: FlexibleCatenaryData) -> Iterator[Plant]:
         """A plant of a line, for one thread at a time; one that was given back where there is one."""
         idle = self._idle[catenary]
-        plant = (
-            idle.pop()
-            if idle
-            else Plant(
-                catenary,
-                Train.of(self._pantograph),
-                spans=self._spans,
-                lanes=LANES,
-                numerics=self._numerics,
-                runs=self._runs,
-                varied=True,
-            )
-        )
+        plant = idle.pop() if idle else Plant(catenary, **self._fixed)
         yield plant
         idle.append(plant)
 
@@ -221,12 +217,11 @@ class Passes:
         if begins is not None:
             steps = np.clip((begins / (self.speed * self.time_step)).astype(int), 0, self.steps)
         found, first = np.zeros((len(variants), self.steps)), variants[0].catenary
-        shares: list[tuple[list[int], Kept | None]] = []
         late = [k for k in np.flatnonzero(steps).tolist() if variants[k].catenary == first]
-        whole = sorted(set(range(len(variants))) - set(late))
-        for catenary in dict.fromkeys(variants[k].catenary for k in whole):
-            own = [k for k in whole if variants[k].catenary == catenary]
-            shares += [(share, None) for share in _shares(own)]
+        whole = defaultdict[FlexibleCatenaryData, list[int]](list)
+        for k in sorted(set(range(len(variants))) - set(late)):
+            whole[variants[k].catenary].append(k)
+        shares = [(share, None) for own in whole.values() for share in _shares(own)]
         self._side_by_side(shares, variants, found)
         if late:
             of_late = _shares(sorted(late, key=lambda k: steps[k]))
@@ -241,7 +236,7 @@ class Passes:
         self, shares: Sequence[tuple[list[int], Kept | None]], variants: Sequence[Variant], found: Array
     ) -> None:
         def run(share: tuple[list[int], Kept | None]) -> Array:
-            (own, kept) = share
+            own, kept = share
             with self._lent(variants[own[0]].catenary) as plant:
                 return self._run(plant, [variants[k] for k in own], kept)
 
@@ -250,14 +245,13 @@ class Passes:
                 found[own, self.steps - force.shape[1] :] = force
 
     def _kept(self, variant: Variant, steps: Sequence[int]) -> list[Kept]:
-        kept, done = [], 0
+        kept = []
         with self._lent(variant.catenary) as plant:
             self._start(plant, [variant])
             table = self._samples(plant)
-            for end in steps:
+            for done, end in pairwise([0, *steps]):
                 plant.advance_passively(end - done, table, 1)
                 kept.append(keep(plant, 0))
-                done = end
         return kept
 
     def _start(self, plant: Plant, variants: Sequence[Variant]) -> None:

@@ -8,9 +8,8 @@ its pass has settled where the record begins. A record of a simulated pass has t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -63,12 +62,11 @@ def condition_of(
 
 def _within(condition: LineCondition, first_span: int, spans: int) -> LineCondition:
     """A condition of a line, of which so many spans behind some first ones are simulated."""
-    moved: dict[str, Any] = {}
-    for name in LineCondition.model_fields:
-        rows = getattr(condition, name)
+    moved = {}
+    for name, rows in condition:
         if isinstance(rows, tuple):  # all begin with the number of a span, or of the support at its end
             most = spans - 1 if name == "raised_supports" else spans
-            numbers = [(row[0] - first_span, *row[1:]) for row in rows]
+            numbers = ((row[0] - first_span, *row[1:]) for row in rows)
             moved[name] = tuple(row for row in numbers if 1 <= row[0] <= most)
     return condition.model_copy(update=moved)
 
@@ -81,31 +79,30 @@ GRID = 0.25
 """Distance of the places (m) that are tried for a record."""
 
 
-def spans_before(
-    pieces: Sequence[Piece],
-    line: FlexibleCatenaryData,
-    force_of: Callable[[Piece, Measured], Array],
-) -> int:
+def spans_before(pieces: Sequence[Piece], line: FlexibleCatenaryData, pantograph: PantographData) -> int:
     """Spans of the line before the simulated ones; below 0 where these begin before its first support.
 
-    line: one that goes on as it is, before and behind its spans.
-    force_of: of a train that begins at rest at the first support of the simulated line, as designed, at the
-    places of a piece (N). A train may have begun so in the span in which the first of the pieces begin: these
-    are asked which of both they are more like. All others have settled.
+    line: one that goes on as it is, before and behind its spans. A train may have begun at rest in the span
+    in which the first of the pieces begin: these are asked whether they are more like a train that begins so
+    at the first support of the simulated line, as designed, or like one that has settled. All others have.
     """
     span = line.span_length
     begun = math.floor(min(float(piece.position[0]) for piece in pieces) / span)
     first, settled = max(begun, 0), begun - LEAD
-    near = [piece for piece in pieces if piece.position[0] < (first + 1) * span]
     alike = {first: 0.0, settled: 0.0}
-    for piece in near:
+    for piece in (each for each in pieces if each.position[0] < (first + 1) * span):
         for before in alike:
             begin = max(float(piece.position[0]) - before * span, 0.0)
             try:
                 own = measured(piece, before * span, (begin, begin + TELLING * span), span)
             except InputError:
                 continue  # such a piece cannot be compared, and whoever asks says why
-            alike[before] += rough_shift(own, force_of(piece, own), 0.5 * span)[1]
+            distance = float(own.place[-1]) + END
+            facts = piece.speed, distance, _spans_of(line, distance), Numerics(accuracy="fast")
+            passes = Passes(line, pantograph, DESIGNED, *facts)
+            variant = Variant(line, DrawnLine(DESIGNED), pantograph, pantograph.static_force)
+            (force,) = forces_at(passes, [variant], own.place, is_low_passed(piece))
+            alike[before] += rough_shift(own, force, 0.5 * span)[1]
     return first if alike[first] > alike[settled] else settled
 
 
@@ -114,14 +111,12 @@ def rough_shift(own: Measured, force: Array, reach: float) -> tuple[float, float
 
     force: simulated (N), at the places of ``own``; reach: how far to look (m).
     """
-    trials = GRID * np.arange(-math.floor(reach / GRID), math.floor(reach / GRID) + 1)
+    trials = (GRID * np.arange(-math.floor(reach / GRID), math.floor(reach / GRID) + 1)).tolist()
     expected = own.coefficients(force)
-    scores = []
-    for trial in trials:
-        seen = own.coefficients(own.force(float(trial)))
-        scores.append(float(seen @ expected / np.linalg.norm(seen)))
+    every = (own.coefficients(own.force(trial)) for trial in trials)
+    scores = [float(seen @ expected / np.linalg.norm(seen)) for seen in every]
     best = int(np.argmax(scores))
-    return float(trials[best]), scores[best] / float(np.linalg.norm(expected))
+    return trials[best], scores[best] / float(np.linalg.norm(expected))
 
 
 LARGEST_SCALE = 3e-3
@@ -138,13 +133,13 @@ def rough_scale(own: Measured, force: Array, shift: float) -> float:
     half = len(own.place) // 2
     apart = float(own.place[half + half // 2] - own.place[half // 2])
     reach = 0.5 * LARGEST_SCALE * apart
-    trials = shift + np.arange(-reach, reach + FINE_GRID, FINE_GRID)
-    seen = [own.force(float(trial)) for trial in trials]
-    shifts = []
-    for part in (slice(0, half), slice(half, None)):
-        alike = [float(np.corrcoef(each[part], force[part])[0, 1]) for each in seen]
-        shifts.append(float(trials[int(np.argmax(alike))]))
-    return (shifts[1] - shifts[0]) / apart
+    trials = (shift + np.arange(-reach, reach + FINE_GRID, FINE_GRID)).tolist()
+    seen = [own.force(trial) for trial in trials]
+
+    def shift_of(part: slice) -> float:
+        return float(trials[np.argmax([np.corrcoef(each[part], force[part])[0, 1] for each in seen])])
+
+    return (shift_of(slice(half, None)) - shift_of(slice(0, half))) / apart
 
 
 END = 20.0
@@ -192,25 +187,26 @@ def problem(
     pieces = [piece for record in records for piece in record.pieces]
     first_span, spans, distance = _spans(pieces, line, pantograph)
     alignment = line.alignment(spans)
+    span = alignment.mean_length
     offset = first_span * line.span_length if first_span else 0.0
     stretch = (float(alignment.support(FIRST_SETTLED - 1)), distance)
     condition = condition_of(line, free, tolerances, first_span, spans)
-    parts, notes, shifts = [], [], []
+    parts, notes = [], []
     of_records = [f"{record.name}: {note}" for record in records for note in record.notes]
     for record in records:
         for k, piece in enumerate(record.pieces):
             name = f"{record.name}, piece {k + 1}" if len(record.pieces) > 1 else record.name
             own_stretch = _inner(piece, offset, stretch)
             try:
-                own = measured(piece, offset, own_stretch, alignment.mean_length)
+                own = measured(piece, offset, own_stretch, span)
             except InputError as error:
                 of_run = f" (run '{piece.run}')" if piece.run else ""
                 of_records.append(f"{name}{of_run} is left out: {error}")
                 continue
             facts = line, pantograph, condition, piece.speed, min(own_stretch[1] + END, distance), spans
             fine = Passes(*facts, NUMERICS)
-            fair = Passes(*facts, Numerics(accuracy="fast", window=fine.window))
-            coarse = Passes(*facts, Numerics(accuracy="fast"))
+            grids = Numerics(accuracy="fast", window=fine.window), Numerics(accuracy="fast")
+            fair, coarse = (Passes(*facts, each) for each in grids)
             parts.append(Part(own, fine, fair, coarse, name, is_low_passed(piece)))
             if parts[-1].low_passed:
                 of_records.append(f"{name} {FILTERED}")
@@ -219,7 +215,6 @@ def problem(
     begin = min(float(part.measured.place[0]) for part in parts)
     end = max(float(part.measured.place[-1]) for part in parts)
     design = Design(line, pantograph, condition, spans, first_span)
-    span = alignment.mean_length
     freed = begin - (FIRST_SETTLED - 1) * span - 1.0, end + BEYOND * span
     values = Values(design, free, freed, dict(tolerances or {}))
     count = sum(len(part.measured.compared) for part in parts)
@@ -234,14 +229,14 @@ def problem(
             f"The records cover {crossed} tension lengths, and one tension of each wire is fitted for all; "
             "where theirs differ, cut the records at the overlaps and fit each part."
         )
-    shifted, scales = [], []
-    for part, force in zip(parts, Fitting(parts, values).as_designed(), strict=True):
-        shift, _ = rough_shift(part.measured, force, SEARCH * span)
-        shifts.append(shift)
-        scales.append(rough_scale(part.measured, force, shift))
-        shifted.append(replace(part, measured=_moved(part.measured, shift, stretch, span)))
-    rough = tuple(shifts), tuple(scales)
-    return Fitting(shifted, values, (begin, end), *rough, tuple(of_records), tuple(notes))
+    designed = list(zip((part.measured for part in parts), Fitting(parts, values).as_designed(), strict=True))
+    shifts = tuple(rough_shift(*each, SEARCH * span)[0] for each in designed)
+    scales = tuple(rough_scale(*each, shift) for each, shift in zip(designed, shifts, strict=True))
+    moved = [
+        replace(part, measured=_moved(part.measured, shift, stretch, span))
+        for part, shift in zip(parts, shifts, strict=True)
+    ]
+    return Fitting(moved, values, (begin, end), shifts, scales, tuple(of_records), tuple(notes))
 
 
 def _inner(piece: Piece, offset: float, stretch: tuple[float, float]) -> tuple[float, float]:
@@ -275,15 +270,7 @@ def _spans(
     if line.ends:
         return 0, line.spans, min(high, whole.length)
 
-    def as_designed(piece: Piece, own: Measured) -> Array:
-        distance = float(own.place[-1]) + END
-        spans = _spans_of(line, distance)
-        passes = Passes(line, pantograph, DESIGNED, piece.speed, distance, spans, Numerics(accuracy="fast"))
-        variant = Variant(line, DrawnLine(DESIGNED), pantograph, pantograph.static_force)
-        force: Array = forces_at(passes, [variant], own.place, is_low_passed(piece))[0]
-        return force
-
-    before = spans_before(pieces, line, as_designed)
+    before = spans_before(pieces, line, pantograph)
     if before and (line.points or line.tunnels):
         raise InputError(
             f"Line '{line.name}' has points or tunnels, and its equal spans would be computed from span "

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -122,36 +121,33 @@ class Fitting(Problem):
         going slack: even where the residual is like noise, for some of it goes into the noise that is found.
         The last derivatives are fine.
         """
-        converge = partial(self._converge, report=report, working=working)
-        best = converge(state)
+        best = self._converge(state, None, report, working)
         for _ in range(ROUNDS):
             jumped = self._jumped(best, working)
             if best.converged and jumped is None:
                 break
-            found = converge(jumped or best.state, best.covariance)
+            found = self._converge(jumped or best.state, best.covariance, report, working)
             noise = best.state.noise  # for both: of the residual of each, they would not compare
             after, before = (self.objective(each.residual, noise, each.state.x) for each in (found, best))
             if jumped and not after < before - BETTER:
                 break
             best = found
-        return converge(best.state, best.covariance, fine=True)
+        return self._converge(best.state, best.covariance, report, working, fine=True)
 
     def _converge(
         self,
         state: State,
-        covariance: Array | None = None,
-        fine: bool = False,
-        *,
+        covariance: Array | None,
         report: Callable[[State, float], None],
         working: Callable[[str], None],
+        fine: bool = False,
     ) -> Solution:
         """Iterate until a further step would change little, or steps lead nowhere.
 
         covariance: of the values, where it is known how uncertain they are. fine: whether derivatives are.
         """
         begin, sets, done = state.steps, 0, DONE * len(self.prior)
-        known = covariance is not None
-        coarse = not known
+        coarse, known = covariance is None, covariance is not None
         differences = (
             np.diag(FIRST * self.values.tolerances) if covariance is None else self._uncertain(covariance)
         )

@@ -35,20 +35,14 @@ STRANGE = 0.3
 def doubts(fit: Fit) -> list[str]:
     """Sentences on what makes the values of a fit, or their intervals, wrong or less reliable."""
     found = [*fit.problem.of_records, *fit.problem.notes]
-    strange = [
-        part.name
-        for part, (before, after) in zip(fit.parts, fit.std, strict=True)
-        if after > STRANGE * before
-    ]
-    if strange:
+    pairs = zip(fit.parts, fit.std, strict=True)
+    if strange := [part.name for part, (before, after) in pairs if after > STRANGE * before]:
         found.append(
             f"The fit explains little of {', '.join(strange)}: it may be of another line or pantograph, or "
             "its positions may be wrong by half a span or more; the values mean nothing then."
         )
-    unlike = [
-        part.name for part, white in zip(fit.parts, fit.whiteness, strict=True) if white.probability < WHITE
-    ]
-    if unlike:
+    tests = zip(fit.parts, fit.whiteness, strict=True)
+    if unlike := [part.name for part, white in tests if white.probability < WHITE]:
         found.append(
             f"What is left of {', '.join(unlike)} is not like noise: the model lacks something there, and "
             "intervals may be too narrow."
@@ -74,11 +68,9 @@ SUFFIX = ".fit"
 def identity_of(records: Sequence[Record], settings: dict[str, Any]) -> dict[str, Any]:
     """What a fit is of: checksum of the records' samples and of settings, which are plain data."""
     pieces = [piece for record in records for piece in record.pieces]
-    arrays = {f"{name} {k}": getattr(each, name) for k, each in enumerate(pieces) for name in SERIES}
+    names = ("position", "force")
+    arrays = {f"{name} {k}": getattr(each, name) for k, each in enumerate(pieces) for name in names}
     return {"checksum": checksum(settings | {"own": list(OWN)}, arrays)}
-
-
-SERIES = ("position", "force")
 
 
 def keep(path: Path, state: State, identity: dict[str, Any]) -> None:
@@ -133,17 +125,15 @@ class Stored:
 
 def knowledge(fit: Fit, records: str) -> Stored:
     """What a fit knows. records: their names."""
-    fitting, before = fit.problem, fit.before
+    fitting, before = fit.problem, fit.problem.before
     design, count = fitting.values.design, len(fitting.values)
     values = tuple(
         value if value.place is None else replace(value, place=value.place + before)
         for value in fitting.values.all
     )
-    difference, covariance = fit.solution.state.x[:count], fit.covariance[:count, :count]
-    if before:
-        turn = turned(values, -before)
-        difference, covariance = turn @ difference, turn @ covariance @ turn.T
-    begin, end = fit.problem.stretch
+    known = fit.solution.state.x[:count], fit.covariance[:count, :count]
+    difference, covariance = turned(values, -before, *known)
+    begin, end = fitting.stretch
     return Stored(
         name=records,
         line=design.catenary.model_dump_json(),
@@ -171,6 +161,8 @@ def stored(path: str | Path) -> Stored:
         given, arrays = read_arrays(path)
         table = _Table.model_validate(given)
         _check(table.values, arrays)
+        found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS}
+        return Stored(**found)
     except OSError as error:
         raise InputError(f"{path} could not be read: {error.strerror or error}.") from error
     except ValueError as error:  # pydantic's among them
@@ -181,8 +173,6 @@ def stored(path: str | Path) -> Stored:
         raise InputError(
             f"{path} does not hold a whole fit: {reason}; give a file that `panto fit --keep` wrote."
         ) from error
-    found: dict[str, Any] = dict(table) | {name: arrays[name] for name in ARRAYS}
-    return Stored(**found)
 
 
 def _check(values: Sequence[Value], arrays: dict[str, NDArray[Any]]) -> None:
@@ -201,15 +191,17 @@ def _check(values: Sequence[Value], arrays: dict[str, NDArray[Any]]) -> None:
         raise ValueError("its covariance is not symmetric and positive, or wider than its tolerances")
 
 
-def turned(values: Sequence[Value], further: float) -> Array:
-    """Matrix, (values, values), that gives waves the phase of a place that lies further along (m).
+def turned(values: Sequence[Value], further: float, x: Array, covariance: Array) -> tuple[Array, Array]:
+    """Values, (values,), and covariance, with waves that have the phase of a place further along (m).
 
     Waves have their phase where the simulated spans begin, in a file where the line does.
     """
+    if not further:
+        return x, covariance
     turn = np.eye(len(values))
     for k, value in enumerate(values):
         if value.kind == "unevenness" and value.index[1] == 0:  # the cosine, which its sine follows
             angle = 2 * np.pi * further / WAVES[value.index[0]][0]
             cosine, sine = np.cos(angle), np.sin(angle)
             turn[k : k + 2, k : k + 2] = [[cosine, sine], [-sine, cosine]]
-    return turn
+    return turn @ x, turn @ covariance @ turn.T

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,18 +43,16 @@ def summary_table(found: Sequence[Found], differing: Sequence[Found], unlike: st
         own = [each for each in found if each.value.kind == kind]
         if not own:
             continue
-        unit, scale = own[0].value.unit, own[0].value.scale
-        size = [INTERVAL * scale * each.deviation for each in own]
-        rows.append(
-            (
-                f"{NAMES[kind]} ({unit})",
-                f"{len(own)}",
-                f"{sum(each.identifiable for each in own)}",
-                f"{sum(each.value.kind == kind for each in differing)}",
-                number(float(np.sqrt(np.mean([(scale * each.difference) ** 2 for each in own]))), 2),
-                number(float(np.median(size)), 2),
-            )
+        value = own[0].value
+        counts = (
+            len(own),
+            sum(each.identifiable for each in own),
+            sum(each.value.kind == kind for each in differing),
         )
+        rms = np.sqrt(np.mean([(value.scale * each.difference) ** 2 for each in own]))
+        size = np.median([INTERVAL * value.scale * each.deviation for each in own])
+        sizes = (number(float(each), 2) for each in (rms, size))
+        rows.append((f"{NAMES[kind]} ({value.unit})", *map(str, counts), *sizes))
     headings = ("values", "number", "told", f"unlike {unlike}", "rms difference", "95 % interval ±, median")
     return Table("What the records tell", headings, rows)
 
@@ -63,33 +61,33 @@ def values_table(differing: Sequence[Found], unlike: str) -> Table:
     """The values that most surely differ, waves of the running surface left out."""
     named = [each for each in differing if each.value.kind != "unevenness"]
     found = sorted(named, key=lambda each: -abs(each.difference) / each.deviation)[:NAMED]
-    rows = []
-    for each in found:
-        numbers = (f"{each.value.scale * value:+.2f}" for value in (each.difference, *each.interval))
-        rows.append((each.value.name, each.value.unit, *numbers))
-    headings = ("value", "unit", "difference", "from", "to")
-    title = f"Most surely unlike {unlike}, {len(rows)} of {len(named)}"
-    return Table(title, headings, rows, text_columns=2)
+    columns: dict[str, Callable[[Found], str]] = {
+        "value": lambda each: each.value.name,
+        "unit": lambda each: each.value.unit,
+        "difference": lambda each: f"{each.value.scale * each.difference:+.2f}",
+        "from": lambda each: f"{each.value.scale * each.interval[0]:+.2f}",
+        "to": lambda each: f"{each.value.scale * each.interval[1]:+.2f}",
+    }
+    title = f"Most surely unlike {unlike}, {len(found)} of {len(named)}"
+    return Table.of(title, found, columns, text_columns=2)
 
 
 def parts_table(fit: Fit) -> Table:
     """A row for each piece of a record: what the fit explains of it, and whether the residual is noise."""
-    shifts, gains, std = fit.shifts + np.array(fit.problem.shifts), fit.gains, fit.std
-
-    def as_noise(k: int) -> str:
-        probability = fit.whiteness[k].probability
-        return Alarm(f"{probability:.2g}") if probability < WHITE else f"{probability:.2g}"
+    found, std = fit.sensors, fit.std
+    shifts = found["shift"] + np.array(fit.problem.shifts)
+    as_noise = [white.probability for white in fit.whiteness]
 
     columns = {
         "record": lambda k: fit.parts[k].name,
         "speed (km/h)": lambda k: f"{fit.parts[k].measured.piece.speed_kmh:.1f}",
         "shift (m)": lambda k: f"{shifts[k] + 0.0:+.2f}",
-        "wheel (%)": lambda k: f"{100 * fit.scales[k] + 0.0:+.3f}",
-        "gain (%)": lambda k: f"{100 * gains[k] + 0.0:+.2f}",
+        "wheel (%)": lambda k: f"{100 * found['scale'][k] + 0.0:+.3f}",
+        "gain (%)": lambda k: f"{100 * found['gain'][k] + 0.0:+.2f}",
         "σ compared (N)": lambda k: number(std[k][0], 2),
         "σ left (N)": lambda k: number(std[k][1], 2),
         "explained (%)": lambda k: f"{100 * (1 - (std[k][1] / std[k][0]) ** 2):.1f}",
-        "as noise, p": as_noise,
+        "as noise, p": lambda k: (Alarm if as_noise[k] < WHITE else str)(f"{as_noise[k]:.2g}"),
     }
     return Table.of("What is left of each record", range(len(fit.parts)), columns)
 
@@ -117,9 +115,9 @@ def remarks(fit: Fit) -> list[str]:
     found = []
     for kind in FREE:
         own = fit.of_kind(kind)
-        silent = [each for each in own if not each.identifiable]
-        if silent:
-            what, known = f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}", len(own) - len(silent)
+        known = sum(each.identifiable for each in own)
+        if known < len(own):
+            what = f"{NAMES[kind][0].upper()}{NAMES[kind][1:]}"
             found.append(f"{what}: the records tell {known or 'none'} of {len(own)}.")
     for one, other, r in fit.correlated[:3]:
         found.append(f"The records hardly tell {one.name} from {other.name} (correlation {r:.3f}).")
@@ -137,7 +135,7 @@ def plain(fit: Fit) -> dict[str, Any]:
             {"name": part.name, "compared": before, "left": after, "as_noise": white.probability}
             for part, (before, after), white in triples
         ],
-        "values": rows_of(fit.found, fit.before),
+        "values": rows_of(fit.found, fit.problem.before),
         "notes": remarks(fit),
     }
 
@@ -149,40 +147,36 @@ def plot_fit(fit: Fit, title: str) -> Figure:
     figure.suptitle(title)
     _draw_force(force, fit)
     for axes, kind in zip(others, kinds, strict=True):
-        _draw_values(axes, fit.of_kind(kind), fit.before)
-    supports = fit.before + np.array(fit.problem.values.design.layout.supports[1:-1])
+        _draw_values(axes, fit.of_kind(kind), fit.problem.before)
+    supports = [fit.problem.before + x for x in fit.problem.values.design.layout.supports[1:-1]]
     for axes in (force, *others[:1]):  # supports' own intervals stand where the lines would
         low, high = axes.get_xlim()
-        mark_supports(axes, supports[(supports >= low) & (supports <= high)].tolist())
-    (others[-1] if others else force).set_xlabel(POSITION)
+        mark_supports(axes, (x for x in supports if low <= x <= high))
+    figure.axes[-1].set_xlabel(POSITION)
     return figure
 
 
 def _draw_force(axes: Axes, fit: Fit) -> None:
     worst = int(np.argmax([after / before for before, after in fit.std]))
-    part = fit.parts[worst]
-    own = part.measured
-    seen = fit.measured(worst)
-    place = own.place + fit.before
+    part, seen = fit.parts[worst], fit.measured(worst)
+    own, place = part.measured, part.measured.place + fit.problem.before
     axes.plot(place, own.back(seen), color="0.6", linewidth=1.6, label=f"{part.name}, measured")
     fitted = own.back(seen - fit.residual[worst])
     axes.plot(place, fitted, color=series_colour(0), linewidth=0.9, label="fitted")
-    axes.set_ylabel("contact force without\nits slow part, to 18 Hz (N)")
-    axes.set_xlim(place[0], place[-1])
+    axes.set(ylabel="contact force without\nits slow part, to 18 Hz (N)", xlim=(place[0], place[-1]))
     legend_above(axes, 2)
 
 
 def plot_drift(drift: Drift, title: str) -> Figure:
     """Changes of droppers and supports along the line."""
-    kinds = [kind for kind in ("droppers", "supports") if drift.of_kind(kind)]
-    count = max(len(kinds), 1)
+    kinds = {"droppers": "dropper longer", "supports": "support higher"}
+    drawn = [(words, found) for kind, words in kinds.items() if (found := drift.of_kind(kind))]
+    count = max(len(drawn), 1)
     figure, every = stacked((11, 1.2 + 2.6 * count), count)
     figure.suptitle(title)
-    for axes, kind in zip(every, kinds, strict=False):
-        found = drift.of_kind(kind)
+    for axes, (words, found) in zip(every, drawn, strict=False):
         _draw_values(axes, found, 0.0, drift.changed)
-        what = "dropper longer" if kind == "droppers" else "support higher"
-        axes.set_ylabel(f"{what} than before ({found[0].value.unit})")
+        axes.set_ylabel(f"{words} than before ({found[0].value.unit})")
     every[-1].set_xlabel("position (m)")
     return figure
 

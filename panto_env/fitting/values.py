@@ -102,10 +102,9 @@ class Values:
         tolerances: instead of those of ``TOLERANCES``. Raises InputError for a name that cannot be freed, and
         where the line has nothing of what is freed.
         """
-        unknown = [name for name in free if name not in FREE]
-        if unknown or not free:
-            name = unknown[0] if unknown else ""
-            raise InputError(f"'{name}' cannot be freed: {suggest(name, FREE)}.")
+        for name in free or ("",):
+            if name not in FREE:
+                raise InputError(f"'{name}' cannot be freed: {suggest(name, FREE)}.")
         self.design = design
         every = _every(design, stretch, TOLERANCES | dict(tolerances or {}))
         self.all: tuple[Value, ...] = tuple(value for value in every if value.kind in free)
@@ -143,8 +142,7 @@ class Values:
         design = self.design
         scatter, heights = np.zeros(len(design.layout.droppers)), np.zeros(design.spans - 1)
         tensions, waves = [1.0, 1.0], np.zeros((len(WAVES), 2))
-        damping: dict[str, float] = {}
-        chain: dict[str, float] = {}
+        damping, chain = dict[str, float](), dict[str, float]()
         for value, difference in zip(self.all, differences.tolist(), strict=True):
             (*which, last) = value.index
             match value.kind:
@@ -164,8 +162,10 @@ class Values:
         catenary = design.catenary
         if any(value != getattr(catenary.damping, name) for name, value in damping.items()):
             catenary = catenary.model_copy(update={"damping": catenary.damping.model_copy(update=damping)})
+        phase = np.arctan2(-waves[:, 1], waves[:, 0]) / (2 * np.pi)
+        rows = np.stack([np.hypot(*waves.T), [1 / length for length, _ in WAVES], phase], axis=1)
         contact, messenger = tensions
-        line = DrawnLine(design.condition, _rows(waves), scatter, heights, (contact, messenger))
+        line = DrawnLine(design.condition, rows, scatter, heights, (contact, messenger))
         return Variant(catenary, line, changed(design.pantograph, chain), static_force)
 
 
@@ -207,10 +207,3 @@ def _every(design: Design, stretch: tuple[float, float], tolerances: Mapping[str
 def damping_of(line: FlexibleCatenaryData, name: str, difference: float) -> float:
     """One of a line's two values of damping that differs by a share from the design's; none drives waves."""
     return float(getattr(line.damping, name) * max(1 + difference, 0.0))
-
-
-def _rows(waves: Array) -> Array:
-    """Cosine and sine parts of waves, (waves, 2), as rows of ``DrawnLine.waves``."""
-    amplitude = np.hypot(waves[:, 0], waves[:, 1])
-    phase = np.arctan2(-waves[:, 1], waves[:, 0]) / (2 * np.pi)
-    return np.stack([amplitude, [1 / length for length, _ in WAVES], phase], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -134,11 +135,8 @@ def run_trials(
     parts = in_processes(jobs, progress=progress)
     results = []
     for first in range(0, len(parts), len(chunks)):
-        of_experiment = parts[first : first + len(chunks)]
-        rows = {
-            method: np.array([row for part in of_experiment for row in part[method]])
-            for method in of_experiment[0]
-        }
+        own = parts[first : first + len(chunks)]
+        rows = {method: np.concatenate([part[method] for part in own]) for method in own[0]}
         results.append({method: Trials(*np.moveaxis(stack, 1, 0)) for method, stack in rows.items()})
     return results
 
@@ -150,15 +148,14 @@ def _run_seeds(
     clean = clean_record(excitation, truth)
     known = {name: truth[name] for name in MEASURED}
     true = np.array([truth[name] for name in IDENTIFIED])
-    rows: dict[str, list[Array]] = {}
+    nothing = np.array([np.full(5, np.nan), np.full(5, np.nan), np.zeros(5)])
+    rows = defaultdict[str, list[Array]](list)
     for seed in seeds:
         noisy = add_noise(clean, np.random.default_rng(seed))
         identified = identify(noisy, known, free_offset=free_offset)
         for method, fit in identified.fits.items():
             low, high = fit.interval.T
-            inside = ((low <= true) & (true <= high)).astype(float)
-            rows.setdefault(method, []).append(np.array([fit.values, fit.std, inside]))
+            rows[method].append(np.array([fit.values, fit.std, (low <= true) & (true <= high)]))
         for method in identified.failures:
-            nothing = np.array([np.full(5, np.nan), np.full(5, np.nan), np.zeros(5)])
-            rows.setdefault(method, []).append(nothing)
+            rows[method].append(nothing)
     return rows

@@ -8,7 +8,6 @@ R. E. Maine and K. W. Iliff, NASA RP-1168, 1986, recalled), with the start of th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +32,7 @@ def three_points(values: Array, time_step: float) -> Array:
 
 def equations(record: Record, known: Parameters) -> tuple[Array, Array]:
     """A, (2, n - 4, 5), and Y, (2, n - 4), of Eqs 4 and 6: first the pan head's rows, then the frame's."""
-    inner = slice(2, -2)
-    plate, head, support = (y[inner] for y in record.displacements.values())
+    plate, head, support = (y[2:-2] for y in record.displacements.values())
     first = [three_points(y, record.time_step) for y in record.displacements.values()]
     v1, v2, v3 = (v[1:-1] for v in first)
     a2, a3 = (three_points(v, record.time_step) for v in first[1:])
@@ -66,11 +64,9 @@ def fit_equation_error(
 
     Raises InputError where the record does not determine the parameters at all.
     """
-    known = check_known(known)
-    if band is None:
-        return solve(record, known, 1, free_offset, PRINTED)
-    limited, stride = band_limited(record, band)
-    return solve(limited, known, stride, free_offset, FILTERED)
+    limited, stride = (record, 1) if band is None else band_limited(record, band)
+    method = PRINTED if band is None else FILTERED
+    return solve(limited, check_known(known), stride, free_offset, method)
 
 
 def solve(record: Record, known: Parameters, stride: int, free_offset: bool, method: str) -> Fit:
@@ -79,8 +75,7 @@ def solve(record: Record, known: Parameters, stride: int, free_offset: bool, met
     Raises InputError where the columns of A depend on each other, or the equations are too few.
     """
     names = free_names(known)
-    a, y = equations(record, known)
-    a, y = a[:, ::stride], y[:, ::stride]
+    a, y = (each[:, ::stride] for each in equations(record, known))
     for name in set(IDENTIFIED) - set(names):
         y = y - known[name] * a[:, :, IDENTIFIED.index(name)]
     a = a[:, :, [IDENTIFIED.index(name) for name in names]]
@@ -151,16 +146,10 @@ def fit_output_error(record: Record, known: Parameters, *, band: float, free_off
     solution = misfit.start(guess)
     # No spring, damper or mass is below 0; a model that grows by itself would fit noise.
     lowest = np.where(np.arange(len(solution)) < len(start.names), 0.0, -np.inf)
+    options = {"bounds": (lowest, np.inf), "x_scale": "jac", "max_nfev": MOST_EVALUATIONS}
     for _ in range(PASSES):
         try:
-            fitted = least_squares(
-                misfit.residuals,
-                solution,
-                misfit.jacobian,
-                bounds=(lowest, np.inf),
-                x_scale="jac",
-                max_nfev=MOST_EVALUATIONS,
-            )
+            fitted = least_squares(misfit.residuals, solution, misfit.jacobian, **options)
             solution = fitted.x
             misfit.reweight(solution)
         except (ValueError, np.linalg.LinAlgError) as error:  # the model's motion is beyond all numbers
@@ -240,15 +229,11 @@ class Misfit:
         p = len(self.names)
         here = self.residuals(solution)
         columns = []
-        for k in range(len(solution)):
-            up, down = solution.copy(), solution.copy()
+        for k, row in enumerate(np.eye(len(solution))):
             step = 1e-3 * max(1.0, abs(solution[k]))
-            up[k] += step
-            down[k] -= step
-            if k < p:
-                columns.append((self.residuals(up) - self.residuals(down)) / (2 * step))
-            else:
-                columns.append((self.residuals(up) - here) / step)
+            up = self.residuals(solution + step * row)
+            down, apart = (self.residuals(solution - step * row), 2 * step) if k < p else (here, step)
+            columns.append((up - down) / apart)
         return np.column_stack(columns)
 
     def reweight(self, solution: Array) -> None:
@@ -289,16 +274,13 @@ def identify(
     if band is not None and not (math.isfinite(band) and band > 0):
         raise InputError(f"The band must be a frequency above 0 Hz, not {band:g}.")
     band = excited_band(record) if band is None else band
-    runs: dict[str, Callable[[], Fit]] = {
-        PRINTED: lambda: fit_equation_error(record, known, free_offset=free_offset),
-        FILTERED: lambda: fit_equation_error(record, known, band=band, free_offset=free_offset),
-        OUTPUT_ERROR: lambda: fit_output_error(record, known, band=band, free_offset=free_offset),
-    }
     fits: dict[str, Fit] = {}
     failures: dict[str, str] = {}
-    for method, run in runs.items():
+    for method in METHODS:
+        fit = fit_output_error if method == OUTPUT_ERROR else fit_equation_error
+        given = {} if method == PRINTED else {"band": band}
         try:
-            fits[method] = run()
+            fits[method] = fit(record, known, **given, free_offset=free_offset)
         except InputError as error:
             failures[method] = str(error)
     try:

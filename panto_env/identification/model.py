@@ -22,19 +22,9 @@ MEASURED = ("k1T", "m2", "k2")
 IDENTIFIED = ("c1T", "c2", "m3", "c3", "k3")
 """What the records give, in the order of X (Eq. 5)."""
 
-UNITS = {
-    "k1T": "N/m",
-    "m2": "kg",
-    "k2": "N/m",
-    "c1T": "N s/m",
-    "c2": "N s/m",
-    "m3": "kg",
-    "c3": "N s/m",
-    "k3": "N/m",
-}
+UNITS = {name: {"k": "N/m", "m": "kg", "c": "N s/m"}[name[0]] for name in (*MEASURED, *IDENTIFIED)}
 
-
-HEAD, SUPPORT, HEAD_SPEED, SUPPORT_SPEED, PLATE = range(5)
+HEAD, SUPPORT, HEAD_SPEED, _, PLATE = range(5)
 """Places in the state: y_p2, y_p3, y_p2', y_p3', and y_p1 where the contact force drives the plate."""
 
 
@@ -91,16 +81,9 @@ def parameters_of(pantograph: PantographData) -> dict[str, float]:
     """The eight parameters of a catalogue entry. Raises InputError unless it has two masses on a spring."""
     if len(pantograph.masses) != 2 or pantograph.contact_stiffness == "rigid":
         raise InputError(f"Pantograph '{pantograph.name}' must have two masses and a contact spring.")
-    return {
-        "k1T": pantograph.contact_stiffness,
-        "m2": pantograph.masses[0],
-        "k2": pantograph.stiffnesses[0],
-        "c1T": pantograph.contact_damping,
-        "c2": pantograph.dampings[0],
-        "m3": pantograph.masses[1],
-        "c3": pantograph.dampings[1],
-        "k3": pantograph.stiffnesses[1],
-    }
+    (m2, m3), (k2, k3), (c2, c3) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
+    k1, c1 = pantograph.contact_stiffness, pantograph.contact_damping
+    return dict(zip(UNITS, (k1, m2, k2, c1, c2, m3, c3, k3), strict=True))
 
 
 def matrices(parameters: Parameters) -> tuple[Array, Array]:
@@ -162,11 +145,10 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
+        rows = zip(self.names, self.values, self.rsd, self.interval, strict=True)
         parameters = {
             name: {"value": value, "rsd": rsd, "low": low, "high": high, "unit": UNITS[name]}
-            for name, value, rsd, (low, high) in zip(
-                self.names, self.values, self.rsd, self.interval, strict=True
-            )
+            for name, value, rsd, (low, high) in rows
         }
         return {
             "method": self.method,

@@ -24,6 +24,7 @@ from .record import Record
 from .response import contact_force, fitted_response, force_matrices
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -100,16 +101,17 @@ def parameters_table(fits: Mapping[str, Fit], band: float) -> Table:
 
     Values that no pantograph can have are marked.
     """
+
+    def cell(fit: Fit, k: int, name: str) -> str:
+        low, high = fit.interval[k]
+        found = f"{fit.values[k]:.5g} ± {(high - low) / 2:.2g}\nRSD {fit.rsd[k]:.3g} %"
+        return Alarm(f"impossible: {found}") if name in fit.impossible else found
+
     names = next(iter(fits.values())).names
-    rows = []
-    for k, name in enumerate(names):
-        cells = []
-        for fit in fits.values():
-            low, high = fit.interval[k]
-            half = (high - low) / 2
-            found = f"{fit.values[k]:.5g} ± {half:.2g}\nRSD {fit.rsd[k]:.3g} %"
-            cells.append(Alarm(f"impossible: {found}") if name in fit.impossible else found)
-        rows.append((f"{name} ({UNITS[name]})", *cells))
+    rows = [
+        (f"{name} ({UNITS[name]})", *(cell(fit, k, name) for fit in fits.values()))
+        for k, name in enumerate(names)
+    ]
     rows.append(("condition number", *(f"{fit.condition:.5g}" for fit in fits.values())))
     title = f"Identified, ± 95 %, relative standard deviation; excitation up to {band:.4g} Hz"
     return Table(title, ("", *fits), rows)
@@ -119,8 +121,8 @@ def matches_table(matches: Sequence[Match], method: str) -> Table:
     """The model that a method identified, beside the record."""
 
     def error(match: Match) -> str:
-        force = match.channel == "force"
-        return f"{match.mean_error:.3g} N" if force else f"{1e3 * match.mean_error:.3g} mm"
+        _, unit, scale = _axis_of(match.channel)
+        return f"{scale * match.mean_error:.3g} {unit}"
 
     columns = {
         "series": lambda match: match.channel,
@@ -212,47 +214,46 @@ SHOWN = 2000
 
 def plot_record(record: Record, title: str, seconds: float) -> Figure:
     """Contact force and displacements over the first ``seconds``, as paper 1's Figs 6 to 8."""
-    inside = record.time <= record.start + seconds
-    step = max(1, int(inside.sum()) // SHOWN)
-    time = record.time[inside][::step]
-    series = record.displacements
-    if record.force is not None:
-        series = {"force": record.force} | series
+    series = record.displacements if record.force is None else {"force": record.force} | record.displacements
     figure, axes = stacked((7, 6.2), len(series))
     for axis, (name, values) in zip(axes, series.items(), strict=True):
-        symbol, unit, scale = _axis_of(name)
-        axis.plot(time, scale * values[inside][::step], color=BLUE, linewidth=1)
-        axis.set(ylabel=f"${symbol}$ ({unit})")
-        axis.grid(color="0.9")
-    axes[-1].set(xlabel="time (s)", xlim=(record.start, record.start + seconds))
+        lines = [(values, BLUE, 1.0)]
+        _draw(axis, record.time, lines, name, record.start, record.start + seconds)
+    axes[-1].set(xlabel="time (s)")
     figure.suptitle(title)
     return figure
 
 
 def plot_matches(time: Array, matches: Sequence[Match], title: str, first: float, last: float) -> Figure:
     """Recorded and modelled series over ``first`` to ``last`` (s), as paper 1's Figs 9 to 11."""
-    inside = (time >= first) & (time <= last)
-    step = max(1, int(inside.sum()) // SHOWN)
     figure, axes = stacked((6.5, 0.8 + 1.5 * len(matches)), len(matches))
     for axis, match in zip(axes, matches, strict=True):
-        symbol, unit, scale = _axis_of(match.channel)
-        recorded, modelled = (scale * values[inside][::step] for values in (match.recorded, match.modelled))
-        axis.plot(time[inside][::step], recorded, color=ORANGE, linewidth=3)
-        axis.plot(time[inside][::step], modelled, color="black", linewidth=0.8)
-        axis.set(ylabel=f"${symbol}$ ({unit})")
+        lines = [(match.recorded, ORANGE, 3.0), (match.modelled, "black", 0.8)]
+        _draw(axis, time, lines, match.channel, first, last)
+        _, unit, scale = _axis_of(match.channel)
         axis.set_title(
             f"driven by the {match.driven_by}: fitting performance {match.performance:.1f} %, "
             f"mean error {scale * match.mean_error:.3g} {unit}",
             loc="right",
             fontsize="small",
         )
-        axis.grid(color="0.9")
-    axes[0].plot([], [], color=ORANGE, linewidth=3, label="record")
-    axes[0].plot([], [], color="black", linewidth=0.8, label="model")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
-    axes[-1].set(xlabel="time (s)", xlim=(first, last))
+    figure.legend(axes[0].lines, ("record", "model"), loc="outside lower center", ncols=2, fontsize="small")
+    axes[-1].set(xlabel="time (s)")
     figure.suptitle(title, fontsize="medium")
     return figure
+
+
+def _draw(
+    axis: Axes, time: Array, lines: list[tuple[Array, str, float]], channel: str, first: float, last: float
+) -> None:
+    """Draw series of a channel, (n,) in SI units, with colours and widths, over ``first`` to ``last`` (s)."""
+    inside = (time >= first) & (time <= last)
+    step = max(1, int(inside.sum()) // SHOWN)
+    symbol, unit, scale = _axis_of(channel)
+    for values, colour, width in lines:
+        axis.plot(time[inside][::step], scale * values[inside][::step], color=colour, linewidth=width)
+    axis.set(ylabel=f"${symbol}$ ({unit})", xlim=(first, last))
+    axis.grid(color="0.9")
 
 
 def _axis_of(channel: str) -> tuple[str, str, float]:

@@ -62,7 +62,7 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
     Raises InputError, naming the line and the column, for anything missing or not a number.
     """
     step, values = read_series(path, COLUMNS, units, SHORTEST, "to identify anything")
-    plate, head, support = values["y_p1"], values["y_p2"], values["y_p3"]
+    plate, head, support = (values[name] for name in ("y_p1", "y_p2", "y_p3"))
     record = Record(step, plate, head, support, values.get("force"), float(values["time"][0]))
     for name, each in record.displacements.items():
         if np.ptp(each) == 0:
@@ -72,9 +72,7 @@ def read_record(path: str | Path, units: Mapping[str, str] | None = None) -> Rec
 
 def write_record(record: Record, path: str | Path) -> None:
     """Write a CSV file that ``read_record`` reads, in s, N and mm, whole or not at all."""
-    columns = {"time (s)": record.time}
-    if record.force is not None:
-        columns["force (N)"] = record.force
+    columns = {"time (s)": record.time} | ({} if record.force is None else {"force (N)": record.force})
     columns |= {f"{name} (mm)": 1e3 * values for name, values in record.displacements.items()}
     write_series(path, columns)
 

@@ -44,21 +44,18 @@ def band_limited(record: Record, band: float) -> tuple[Record, int]:
             "and below a quarter of the sampling rate (is the record mostly noise?)."
         )
     duration = len(record.plate) * record.time_step
+    too_short = (
+        f"The record of {duration:.4g} s is too short for motion up to {band:.4g} Hz; record {{:.3g}} s or "
+        "longer."
+    )
     if band * duration < 1:
-        raise InputError(
-            f"The record of {duration:.4g} s is too short for motion up to {band:.4g} Hz; record "
-            f"{1 / band:.3g} s or longer."
-        )
+        raise InputError(too_short.format(1 / band))
     taps, shape = kaiserord(ATTENUATION, band / (rate / 2))
     taps |= 1  # odd: the delay is whole samples
     stride = max(1, int(rate / (3 * band)))  # noise is left to 1.5 of the band
-    left = len(record.plate) - taps + 1
-    if left < ROWS * stride:
+    if len(record.plate) - taps + 1 < ROWS * stride:
         needed = (taps + ROWS * stride) * record.time_step
-        raise InputError(
-            f"The record of {len(record.plate) * record.time_step:.4g} s is too short for motion up to "
-            f"{band:.4g} Hz; record {needed:.3g} s or longer."
-        )
+        raise InputError(too_short.format(needed))
     window = firwin(taps, 1.5 * band, window=("kaiser", shape), fs=rate)
 
     def smooth(values: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Array, to_kmh
+from ..plant.alignment import Spans
 from .figures import SpanChoice, contact_loss, statistics
 from .low_pass import low_pass
 
@@ -54,12 +55,17 @@ def _of_force(filtered: Array, raw: Array) -> dict[str, float]:
     return statistics(filtered) | {"contact_loss": contact_loss(raw)}
 
 
+def _whole_spans(run: Trajectory, spans: SpanChoice) -> Spans:
+    """First and last evaluated span; of a whole run, of those that it covers completely."""
+    return run.spans(spans) or (1, run.alignment.last_whole_span(float(run.position[-1]), 1e-9))
+
+
 def by_span(run: Trajectory, spans: SpanChoice = None) -> list[SpanFigures]:
     """Figures of each evaluated span; of a whole run, of the spans that it covers completely.
 
     Raises InputError as ``Trajectory.summary`` does.
     """
-    first, last = run.spans(spans) or (1, run.alignment.last_whole_span(float(run.position[-1]), 1e-9))
+    first, last = _whole_spans(run, spans)
     filtered, found = low_pass(run.contact_force, run.time_step), []
     for span in range(first, last + 1):
         inside = run.alignment.within(run.position, (span, span))
@@ -133,12 +139,10 @@ def by_stretch(run: Trajectory, spans: SpanChoice = None) -> list[StretchFigures
 
     Empty where the evaluated spans have no overlap. Raises InputError as ``Trajectory.summary`` does.
     """
-    first, last = run.spans(spans) or (1, run.alignment.last_whole_span(float(run.position[-1]), 1e-9))
-    evaluated = run.alignment.within(run.position, (first, last))
-    inside, behind = np.zeros(len(run.position), dtype=bool), np.zeros(len(run.position), dtype=bool)
+    evaluated = run.alignment.within(run.position, _whole_spans(run, spans))
+    inside, behind = np.zeros_like(evaluated), np.zeros_like(evaluated)
     for overlap in run.designed.overlaps:
-        begin = run.alignment.support(overlap.first_span - 1)
-        end = run.alignment.support(overlap.first_span - 1 + overlap.spans)
+        begin, end = run.alignment.limits((overlap.first_span, overlap.first_span + overlap.spans - 1))
         inside |= (run.position >= begin) & (run.position < end)
         behind |= (run.position >= end) & (run.position < end + BEHIND)
     if not (inside & evaluated).any():
@@ -149,11 +153,10 @@ def by_stretch(run: Trajectory, spans: SpanChoice = None) -> list[StretchFigures
         f"up to {BEHIND:g} m behind an overlap": behind & ~inside,
         "elsewhere": ~inside & ~behind,
     }
-    places = {name: there & evaluated for name, there in kinds.items()}
     return [
         StretchFigures(name, float(run.stride * at.sum()), **_of_force(force[at], run.contact_force[at]))
-        for name, at in places.items()
-        if at.any()
+        for name, there in kinds.items()
+        if (at := there & evaluated).any()
     ]
 
 
@@ -199,7 +202,6 @@ def moving_droppers(run: Trajectory, spans: SpanChoice = None) -> list[MovingDro
         forces, passing = force[:, at], near[:, at]
         if passing.any():
             slack = 100 * float((forces[passing] <= 0).mean())
-            highest, lowest = float(forces.max()), float(forces.min())
-            last = int(own[at][-1])
-            found.append(MovingDropper(float(place), highest, lowest, slack, int(span) or None, last))
+            figures = float(forces.max()), float(forces.min()), slack
+            found.append(MovingDropper(float(place), *figures, int(span) or None, int(own[at][-1])))
     return found

@@ -80,13 +80,8 @@ def of_train(each: Sequence[Sequence[Criterion]]) -> list[Requirement]:
     found: dict[str, Requirement] = {}
     for number, own in enumerate(each, start=1):
         for criterion in filter(lambda one: one.limited, own):
-            known = found.get(criterion.key)
-            # One that cannot be judged (nan) hides none that can.
-            if (
-                known is None
-                or math.isnan(known.criterion.margin)
-                or criterion.margin < known.criterion.margin
-            ):
+            known = found[criterion.key].criterion.margin if criterion.key in found else math.nan
+            if math.isnan(known) or criterion.margin < known:  # one that cannot be judged hides none that can
                 found[criterion.key] = Requirement(number, criterion)
     return list(found.values())
 
@@ -145,14 +140,11 @@ def margin_in_words(criterion: Criterion) -> str:
 
 def _more(criterion: Criterion) -> int:
     """How many more digits than usual it takes until value and limits as text say whether they are kept."""
-
-    def rounded(number: float | None, more: int) -> float | None:
-        return number if number is None or not math.isfinite(number) else float(_digits(number, more))
-
+    numbers = {name: getattr(criterion, name) for name in ("value", "lowest", "highest")}
+    finite = {name: each for name, each in numbers.items() if each is not None and math.isfinite(each)}
     for more in range(16):
-        value = rounded(criterion.value, more) or 0.0
-        lowest, highest = rounded(criterion.lowest, more), rounded(criterion.highest, more)
-        if replace(criterion, value=value, lowest=lowest, highest=highest).kept == criterion.kept:
+        rounded: dict[str, Any] = {name: float(_digits(each, more)) for name, each in finite.items()}
+        if replace(criterion, **rounded).kept == criterion.kept:
             return more
     return 0
 
@@ -231,11 +223,9 @@ def criteria(
     system_source: where the line's power supply comes from.
     """
     note = f"this and other limits are those for {system}, the line's power supply ({system_source})"
-    lowest_mean = highest_mean = None
-    if _formula(system) in LARGEST_MEAN:
-        lowest_mean, highest_mean = smallest_mean(speed, system), largest_mean(speed, system)
-    mean = _force("mean", figures.mean, lowest_mean, highest_mean, SOURCE, note)
-    mean = replace(mean, tolerance=TOLERANCE)
+    known = _formula(system) in LARGEST_MEAN
+    low, high = (smallest_mean(speed, system), largest_mean(speed, system)) if known else (None, None)
+    mean = replace(_force("mean", figures.mean, low, high, SOURCE, note), tolerance=TOLERANCE)
     if mean.kept is False:
         note += "; the option --mean-force en50367 trims the static force for a mean at the upper limit"
     length = f"share of time in losses of contact over {1e3 * ARC:g} ms; contact loss CL counts all of them"
@@ -351,17 +341,14 @@ def _waves(line: LineFacts, speed: float) -> list[Criterion]:
         return []
     ratio = speed / line.wave_speed
     seen = "5.2.4 of EN 50119:2009, seen as quoted by Bane NOR's TRV:00599"
+    support = "wave reflection at a support, at one wave per span"
     values = [
         Criterion("speed", "v/c, train over wave", "", ratio, None, WAVE_SHARE, "EN 50119, seen", seen),
         Criterion("doppler", "Doppler factor (c − v)/(c + v)", "", (1 - ratio) / (1 + ratio)),
+        Criterion("dropper reflection", "wave reflection at a dropper", "", line.dropper_reflection),
+        Criterion("support reflection", support, "", line.support_reflection),
     ]
-    if not math.isnan(line.dropper_reflection):
-        support = "wave reflection at a support, at one wave per span"
-        values += [
-            Criterion("dropper reflection", "wave reflection at a dropper", "", line.dropper_reflection),
-            Criterion("support reflection", support, "", line.support_reflection),
-        ]
-    return values
+    return values[:2] if math.isnan(line.dropper_reflection) else values
 
 
 def _droppers(tension: Array, tension_near: Array) -> list[Criterion]:

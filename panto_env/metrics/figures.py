@@ -190,10 +190,15 @@ def contact_loss(force: Array) -> float:
     return float(100 * np.mean(force <= 0))
 
 
-def losses_of_contact(force: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The first sample of each loss of contact and the first one after it, (losses,) each; force: (n,), N."""
-    edges = np.diff(np.concatenate([[0], (force <= 0).astype(int), [0]]))
+def stretches(where: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The first sample of each stretch of true ones, (n,), and the first one after it, (stretches,) each."""
+    edges = np.diff(np.concatenate([[False], where, [False]]).astype(int))
     return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+
+
+def losses_of_contact(force: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """``stretches`` without contact of a force, (n,), N."""
+    return stretches(force <= 0)
 
 
 def arcing(force: Array, time_step: float) -> float:

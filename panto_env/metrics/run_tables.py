@@ -21,7 +21,8 @@ from .by_span import by_span, by_speed, by_stretch, moving_droppers
 from .compliance import Criterion
 from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
-from .trajectory import Trajectory, follower_columns
+from .stored_run import follower_columns
+from .trajectory import Trajectory
 
 FILTERED = "contact_force_filtered"
 RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")
@@ -34,25 +35,15 @@ def samples(run: Trajectory, with_droppers: bool = True) -> Sheet:
     Series of pantographs behind the first have its number in the heading, and are empty until it comes onto
     the line. Uplift and dropper forces are those at supports and droppers that the train reached.
     """
-    columns: dict[str, Any] = {}
+    columns: dict[str, Any] = {name: getattr(run, name) for name in run.series}
     headings: dict[str, str] = {}
     for number, own in enumerate(run.train, start=1):
-        behind = number > 1
-        series = (
-            follower_columns(own, number, len(run.time))
-            if behind
-            else {n: getattr(run, n) for n in run.series}
-        )
-        whose = f" of pantograph {number}" if behind else ""
+        mark, whose = (f"@{number}", f" of pantograph {number}") if number > 1 else ("", "")
         force = low_pass(own.contact_force, own.time_step)
-        filtered = np.concatenate([np.full(len(run.time) - len(force), np.nan), force])
-        last = f"{FILTERED}@{number}" if behind else FILTERED
-        columns |= series | {last: filtered}
-        headings |= {
-            key: f"{name}{whose} ({unit})"
-            for key, (name, unit) in zip(series, own.series.items(), strict=True)
-        }
-        headings[last] = f"{FILTERED}{whose} to 20 Hz (N)"
+        columns |= follower_columns(own, number, len(run.time)) if number > 1 else {}
+        columns[f"{FILTERED}{mark}"] = np.concatenate([np.full(len(run.time) - len(force), np.nan), force])
+        headings |= {f"{name}{mark}": f"{name}{whose} ({unit})" for name, unit in own.series.items()}
+        headings[f"{FILTERED}{mark}"] = f"{FILTERED}{whose} to 20 Hz (N)"
     measured = [("uplift", run.support_position, "m")]
     measured += [("dropper_force", run.dropper_position, "N")] if with_droppers else []
     for name, places, unit in measured:
@@ -99,12 +90,9 @@ def droppers(runs: Sequence[Trajectory], spans: SpanChoice = None) -> Sheet:
             # The droppers at rest are those of the line, or of the one span that is repeated.
             unknown = dict.fromkeys(("number", *AT_REST))
             known = resting[moving.last % len(resting)] if resting else unknown
-            own = moving._asdict()
-            del own["last"]
-            masts = _masts(run, moving.span or 0)
-            if moving.span is None:
-                del own["span"]
-            rows.append(of_run | masts | known | own)
+            without = ("last",) if moving.span else ("last", "span")
+            own = {name: value for name, value in moving._asdict().items() if name not in without}
+            rows.append(of_run | _masts(run, moving.span or 0) | known | own)
     if not rows:
         raise InputError("No forces in droppers are recorded, so there is no table of them.")
     return Sheet.of_rows("droppers", rows, {"speed_kmh": HEADINGS["speed_kmh"], **AT_REST, **MOVING})
@@ -189,14 +177,17 @@ def save_figures(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice
 
     Raises InputError where no run has figures.
     """
-    whole = [run for run in runs if not run.terminated or spans is not None]
-    write_table(figures(whole or runs, spans), path)
+    write_table(figures(_whole(runs, spans), spans), path)
 
 
 def save_droppers(runs: Sequence[Trajectory], path: str | Path, spans: SpanChoice = None) -> None:
     """Write ``droppers`` of runs as CSV, Excel or Parquet, as ``save_figures`` does."""
-    whole = [run for run in runs if not run.terminated or spans is not None]
-    write_table(droppers(whole or runs, spans), path)
+    write_table(droppers(_whole(runs, spans), spans), path)
+
+
+def _whole(runs: Sequence[Trajectory], spans: SpanChoice) -> Sequence[Trajectory]:
+    """Runs that have figures over some spans; where none has, all."""
+    return [run for run in runs if not run.terminated or spans is not None] or runs
 
 
 def _each(

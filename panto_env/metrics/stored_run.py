@@ -24,7 +24,7 @@ from ..base.settings import Between, Settings, explain
 from ..plant.alignment import Alignment
 from ..plant.catenary.schema import PowerSystem
 from .compliance import LineFacts
-from .trajectory import OF_TWO_WIRES, OUTPUTS, SERIES, Trajectory, follower_columns
+from .trajectory import OF_TWO_WIRES, OUTPUTS, SERIES, Trajectory
 
 FORMAT = 3
 OF_FOLLOWERS = ("pantograph", "nominal_force", "target_mean", "policy", "design", "reached")
@@ -109,6 +109,15 @@ def write(run: Trajectory, path: str | Path) -> None:
         write_table(table, temporary, write_page_checksum=True)
 
 
+def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
+    """Series of a collector behind the first, by name, (rows,); nan before it came onto the line.
+
+    number: of the collector, counted from 1.
+    """
+    before = np.full(rows - len(follower.time), np.nan)
+    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in follower.series}
+
+
 def read(path: str | Path) -> Trajectory:
     """The run of a file of ``write``; see ``Trajectory.load``."""
     if not os.path.isfile(path):
@@ -137,8 +146,8 @@ def read(path: str | Path) -> Trajectory:
         series = {name: columns[name] for name in (*SERIES, *more)}
         for name, places in OF_PLACES.items():
             count = sum(column.startswith(f"{name}_") for column in columns)
-            own = [columns[f"{name}_{k}"] for k in range(count)]
-            series[name] = np.array(own).T if own else np.zeros((table.num_rows, 0))
+            rows = np.array([columns[f"{name}_{k}"] for k in range(count)])
+            series[name] = rows.T if count else np.zeros((table.num_rows, 0))
             if count and count != len(facts[places]):
                 raise ValueError(f"columns of {name} are missing")
         followers = facts.pop("followers")

@@ -1,4 +1,9 @@
-"""The record of one run along a line, and its figures."""
+"""The record of one run along a line, and its figures.
+
+A run holds its settings, and its line and pantographs, as plain data, as its file does; ``Identity`` and
+``Design`` read them. Lines and pantographs are checked only when they are needed, since those of another
+version need not be valid in this one.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +20,13 @@ from ..base.arrays import Array, to_kmh
 from ..base.errors import InputError
 from ..base.files import check_output
 from ..plant.alignment import Alignment, Spans
+from ..plant.catenary import CATENARIES, CatenaryData
+from ..plant.catenary.flexible.parts import Overlap
+from ..plant.line_condition import NEW, LineCondition
+from ..plant.pantograph.schema import PantographData
 from .by_span import evaluated, near_train
 from .compliance import SLOW, Criterion, LineFacts, Requirement, compliance, of_train
 from .figures import Figures, SpanChoice, arcing, chosen_spans, contact_loss, cost_function, statistics
-from .identity import Design, Identity
 from .low_pass import low_pass
 
 FEWEST = 3
@@ -42,6 +50,90 @@ SERIES = {
 """Units of the series of a run, in the order of a file's columns."""
 OF_TWO_WIRES = {"second_force": "N"}
 """The same of what only runs on two contact wires have."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Version, settings and resulting grid of a run, as far as they are read again."""
+
+    version: str
+    controlled: tuple[int, ...]  # numbers of the controlled pantographs, 1 for the first
+    drifts: bool  # whether the train's speed drifts, or follows a profile
+    has_profile: bool  # whether it follows a profile
+    conditions: tuple[Mapping[str, Any], ...]  # of the line, of which one was drawn; plain data
+    spacing: float | None  # of the grid (m); None for lines without one
+    window: int | None  # travelling spans, 0 for the whole line; None for lines without a grid
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Identity from a run's settings as plain data."""
+        return cls(
+            version=settings.get("version", "unknown"),
+            controlled=tuple(settings.get("controlled", (1,))),
+            drifts=bool(settings.get("speed_drift") or settings.get("speed_profile")),
+            has_profile=bool(settings.get("speed_profile")),
+            conditions=tuple(settings.get("line_condition") or ()),
+            spacing=settings.get("spacing"),
+            window=settings.get("window"),
+        )
+
+    @property
+    def wind(self) -> float:
+        """Mean wind along the track in which the run may have been made, the strongest (m/s); 0: none."""
+        return max((each.get("wind", 0.0) for each in self.conditions), key=abs, default=0.0)
+
+    @property
+    def line_condition(self) -> LineCondition:
+        """Condition of the line, the first of several. Raises ValueError where it is not valid."""
+        return LineCondition.model_validate(self.conditions[0]) if self.conditions else NEW
+
+
+@dataclass(frozen=True)
+class Design:
+    """Line and pantographs of a run by value, as designed.
+
+    A line or a pantograph that is missing or not valid raises KeyError or ValueError.
+    """
+
+    tables: Mapping[str, Any]  # plain data by "catenary", "pantograph" and, for a train, "pantographs"
+
+    @property
+    def line(self) -> CatenaryData:
+        """The line."""
+        table = self.tables["catenary"]
+        return CATENARIES[table["kind"]].schema.model_validate(table)
+
+    @property
+    def pantograph(self) -> PantographData:
+        """The pantograph whose record this is."""
+        return PantographData.model_validate(self.tables["pantograph"])
+
+    @property
+    def pantographs(self) -> tuple[PantographData, ...]:
+        """Pantographs of a train, the first in front; none where there is one alone."""
+        return tuple(map(PantographData.model_validate, self.tables.get("pantographs", ())))
+
+    @property
+    def known_pantograph(self) -> PantographData | None:
+        """The pantograph whose record this is; None where it is missing or not valid."""
+        try:
+            return self.pantograph
+        except (KeyError, ValueError):
+            return None
+
+    def of_line(self, key: str) -> Any:
+        """An entry of the line's table; None where it is missing."""
+        return self.tables.get("catenary", {}).get(key)
+
+    @property
+    def line_ends(self) -> bool:
+        """Whether the line ends with its own spans, as a sequence does; else wires go on behind them."""
+        return bool(self.of_line("sequence"))
+
+    @property
+    def overlaps(self) -> list[Overlap]:
+        """Overlaps of the line."""
+        return [Overlap(**each) for each in self.of_line("overlaps") or ()]
 
 
 @dataclass(frozen=True)
@@ -150,8 +242,7 @@ class Trajectory:
         Raises InputError where the run does not cover the spans, is too short for its start to die out, or
         ended early and no earlier spans are given.
         """
-        covered = self.spans(spans)
-        inside = self.inside(spans)
+        covered, inside = self.spans(spans), self.inside(spans)
         begin, end = (0.0, float(self.position[-1])) if covered is None else self.alignment.limits(covered)
         force = self.contact_force[inside]
         found = statistics(low_pass(self.contact_force, self.time_step)[inside])
@@ -159,9 +250,8 @@ class Trajectory:
         until = np.flatnonzero(inside)[-1] + 1
         uplifts = [self.uplift[:until, k].max() for k in np.flatnonzero(near[: self.uplift.shape[1]])]
         frame, head = self.frame_force[inside], self.head_force[inside]
-        frame_change, head_change = np.diff(frame), np.diff(head)
         ways = np.diff(self.position[inside]) if self.identity.drifts else self.stride
-        changes = frame_change @ frame_change + head_change @ head_change
+        changes = sum(change @ change for change in map(np.diff, (frame, head)))
         return Figures(
             **found,
             statistical_max=found["mean"] + 3 * found["std"],
@@ -170,7 +260,7 @@ class Trajectory:
             contact_loss=contact_loss(force),
             cost_function=cost_function(force, self.lift[inside], ways),
             effort=math.sqrt((frame @ frame + head @ head) / len(force)),
-            effort_rate=math.sqrt(changes / len(frame_change)) / self.time_step if len(force) > 1 else 0.0,
+            effort_rate=math.sqrt(changes / (len(force) - 1)) / self.time_step if len(force) > 1 else 0.0,
             distance=float(inside.sum() * np.mean(ways)),
         )
 
@@ -301,8 +391,9 @@ class Trajectory:
     def inside(self, spans: SpanChoice = None) -> NDArray[np.bool_]:
         """Which samples lie inside the spans, (n,). Raises InputError as ``spans`` does."""
         covered = self.spans(spans)
-        everywhere = np.ones(len(self.time), dtype=bool)
-        return everywhere if covered is None else self.alignment.within(self.position, covered)
+        if covered is None:
+            return np.ones(len(self.time), dtype=bool)
+        return self.alignment.within(self.position, covered)
 
     def save(self, path: str | Path, spans: SpanChoice = None) -> None:
         """Write a Parquet, CSV or Excel file, whole or not at all, by its suffix.
@@ -313,15 +404,14 @@ class Trajectory:
         sheets of figures, requirements included, and of droppers, both over ``spans`` as in ``summary``.
         Raises InputError for a name with another suffix, and for a run that is too long for Excel.
         """
+        from .run_tables import save_tables
+        from .stored_run import write
+
         check_output(path, OUTPUTS)
-        if Path(path).suffix.lower() not in SUFFIXES:
-            from .run_tables import save_tables
-
-            save_tables(self, path, spans)
-        else:
-            from .stored_run import write
-
+        if Path(path).suffix.lower() in SUFFIXES:
             write(self, path)
+        else:
+            save_tables(self, path, spans)
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
@@ -329,12 +419,3 @@ class Trajectory:
         from .stored_run import read
 
         return read(path)
-
-
-def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
-    """Series of a collector behind the first, by name, (rows,); nan before it came onto the line.
-
-    number: of the collector, counted from 1.
-    """
-    before = np.full(rows - len(follower.time), math.nan)
-    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in follower.series}

@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Index
+from ..base.arrays import Array
 from ..base.errors import InputError
 from ..base.record_columns import equal_step
+from ..metrics.figures import stretches
 from .record import Piece
 
 BACK = 1.0
@@ -25,8 +26,7 @@ STANDING = 1.0
 
 def standing(time: Array, position: Array, gap: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Samples at which the train stands, (n,), by time (s) and position (m), (n,); gap as in ``Axes``."""
-    still = np.concatenate([[False], (np.diff(position) == 0) & ~gap, [False]])
-    begins, ends = np.flatnonzero(still[1:] & ~still[:-1]), np.flatnonzero(~still[1:] & still[:-1])
+    begins, ends = stretches((np.diff(position) == 0) & ~gap)
     found = np.zeros(len(time), dtype=bool)
     for begin, end in zip(begins, ends, strict=True):
         if time[end] - time[begin] > STANDING:
@@ -184,8 +184,7 @@ def _over_place(run: str, position: Array, speed: Array) -> Axes:
     step = _usual(steps)
     time = np.concatenate([[0.0], np.cumsum(steps)])
     note = f"Times are the integral of the way over the speed, brought to equal steps of {1e3 * step:.3g} ms"
-    repeated = int(np.sum((distances == 0) & ~still[1:]))
-    if repeated:
+    if repeated := int(np.sum((distances == 0) & ~still[1:])):
         note += f"; positions that repeat the one before ({repeated:,}) are taken to rise evenly"
     return Axes(time, even, step, gap, over_place=True, note=f"{note}.")
 
@@ -239,25 +238,28 @@ def cut(
     empty = np.isnan(force) & ~down
     reset = resets(axes.time, axes.position, axes.step, axes.gap)
     back = runs_back(axes.position, axes.gap | reset)
-    breaks = [
-        _break("samples are missing", axes, np.flatnonzero(axes.gap)),
-        _break("the position jumps, as an odometer that is reset", axes, np.flatnonzero(reset & ~axes.gap)),
-        _break("the force is missing", axes, _begins(empty)),
-        _break("the pantograph is down", axes, _begins(down)),
-        _break("the train stands", axes, _begins(still)),
-        _break(RUNS_BACK, axes, _begins(back)),
-    ]
+    reasons = {
+        "samples are missing": np.flatnonzero(axes.gap),
+        "the position jumps, as an odometer that is reset": np.flatnonzero(reset & ~axes.gap),
+        "the force is missing": stretches(empty)[0],
+        "the pantograph is down": stretches(down)[0],
+        "the train stands": stretches(still)[0],
+        RUNS_BACK: stretches(back)[0],
+    }
     good = ~(still | back | down | empty)
     apart = axes.gap | reset | (good[1:] != good[:-1])
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(force)]
     parts = [slice(begin, end) for begin, end in pairwise(edges) if good[begin]]
-    long = [
-        each for each in parts if axes.time[each.stop - 1] - axes.time[each.start] >= SHORTEST - axes.step
+    enough = SHORTEST - axes.step
+    long = [each for each in parts if axes.time[each.stop - 1] - axes.time[each.start] >= enough]
+    short = [each.start for each in parts if each not in long]
+    reasons[f"a piece is shorter than {SHORTEST:g} s"] = np.array(short, dtype=int)
+    breaks = [
+        Break(reason, len(places), float(axes.position[places[0]]), float(axes.time[places[0]]))
+        for reason, places in reasons.items()
+        if places.size
     ]
-    short = np.array([each.start for each in parts if each not in long], dtype=int)
-    breaks.append(_break(f"a piece is shorter than {SHORTEST:g} s", axes, short))
-    pieces = [_piece(run, axes, force, series, each) for each in long]
-    return pieces, [each for each in breaks if each.count]
+    return [_piece(run, axes, force, series, each) for each in long], breaks
 
 
 def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part: slice) -> Piece:
@@ -273,14 +275,3 @@ def _piece(run: str, axes: Axes, force: Array, series: Mapping[str, Array], part
         position = np.interp(equal, time, position)
         own = {name: np.interp(equal, time, values) for name, values in own.items()}
     return Piece(run, step, float(time[0]), position, forces, own.get("height"), own.get("uplift"))
-
-
-def _break(reason: str, axes: Axes, places: Index) -> Break:
-    """places: numbers of the samples at which the run is cut, or before which."""
-    first = int(places[0]) if places.size else 0
-    return Break(reason, len(places), float(axes.position[first]), float(axes.time[first]))
-
-
-def _begins(where: NDArray[np.bool_]) -> Index:
-    """Numbers of the samples at which stretches, (n,), begin."""
-    return np.flatnonzero(where & ~np.concatenate([[False], where[:-1]]))

@@ -21,7 +21,7 @@ from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
 from ..terminal import number
 from .likeness import SUM, UNLIKE, check_period, check_reading, doubts
-from .record import Record, Samples, Shift, find_shift
+from .record import Piece, Record, Samples, Shift, find_shift
 
 SAME_SPEED = 0.03
 """Relative difference of speeds, mean and local, up to which a record is compared with a run. Own choice."""
@@ -101,15 +101,14 @@ def compare(record: Record, run: Trajectory, *, shift: float | None = None) -> C
     range_of_height = "range of the contact point's height"
     values = {"uplift at a support": uplift, range_of_height: height}
     missing = tuple(name for name, value in values.items() if math.isnan(value))
-    alike = Criterion(
-        "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
-    )
     heights_note = "mean over the spans of the range within each, low-passed at 20 Hz"
     criteria = (
         Criterion("std", "σ of the contact force", "%", deviation(figures["std"]), -STD, STD, SOURCE),
         Criterion("uplift", "maximum uplift at the support", "mm", uplift, -UPLIFT, UPLIFT, SOURCE, where),
         Criterion("height", range_of_height, "mm", height, -HEIGHT, HEIGHT, SOURCE, heights_note),
-        alike,
+        Criterion(
+            "correlation", "correlation of the forces", "", found.correlation, UNLIKE, None, "own choice"
+        ),
         Criterion("ratio", "mean force, record over run", "", ratio, 1 / SUM, SUM, "own choice"),
         *(
             Criterion(key, LABELS[key].name, "N", simulated - measured)
@@ -128,22 +127,16 @@ def _pairs(one: Array, other: Array) -> dict[str, tuple[float, float]]:
 def _at_speed(record: Record, run: Trajectory) -> tuple[Record, list[str]]:
     same = [piece for piece in record.pieces if abs(piece.speed / run.speed - 1) <= SAME_SPEED]
     if not same:
-        ratio = run.speed / record.longest.speed
-        if abs(ratio / METRES_PER_SECOND - 1) <= SAME_SPEED:
+        own, speed = record.longest, f"{record.longest.speed_kmh:.1f}"
+        said = f"The record's speed is {speed} km/h and the run's {run.speed_kmh:.1f} km/h"
+        if abs(run.speed / own.speed / METRES_PER_SECOND - 1) <= SAME_SPEED:
             raise InputError(
-                f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's "
-                f"{run.speed_kmh:.1f} km/h, 3.6 times as much: if the speed was recorded in m/s, tell: "
-                "--unit speed=m/s."
+                f"{said}, 3.6 times as much: if the speed was recorded in m/s, tell: --unit speed=m/s."
             )
-        raise InputError(
-            f"The record's speed is {record.longest.speed_kmh:.1f} km/h and the run's {run.speed_kmh:.1f} "
-            f"km/h; simulate the run at the record's speed: --speed {record.longest.speed_kmh:.1f}."
-        )
+        raise InputError(f"{said}; simulate the run at the record's speed: --speed {speed}.")
     left = len(record.pieces) - len(same)
-    notes = list(record.notes)
-    if left:
-        notes.append(f"{left} pieces at other speeds are left out.")
-    return replace(record, pieces=tuple(same)), notes
+    more = [f"{left} pieces at other speeds are left out."] if left else []
+    return replace(record, pieces=tuple(same)), [*record.notes, *more]
 
 
 def _spans(
@@ -164,39 +157,36 @@ def _spans(
         if samples.distance(here) < COVERED * (last - first):
             continue
         compared |= here
-        a, b = samples.filtered[here], filtered[there]
-        own.append(a)
-        other.append(b)
+        own.append(samples.filtered[here])
+        other.append(filtered[there])
         ranges = _range(measured, here), _range(heights, there)
-        found.append(SpanPair(span, first, last, **_pairs(a, b), height_range=ranges))
+        found.append(SpanPair(span, first, last, **_pairs(own[-1], other[-1]), height_range=ranges))
     if not found:
         raise InputError(
             "The record covers none of the run's evaluated spans without a gap; simulate a run along all "
             "that was recorded, or give a record without so many gaps."
         )
-    _check_speed(samples.speed[compared], run, found[0].begin, found[-1].end)
-    return found, np.concatenate(own), np.concatenate(other)
-
-
-def _check_speed(speed: Array, run: Trajectory, begin: float, end: float) -> None:
+    speed = samples.speed[compared]
     away = float(np.abs(speed / run.speed - 1).max())
     if away > SAME_SPEED:
         low, high = to_kmh(float(speed.min())), to_kmh(float(speed.max()))
         raise InputError(
-            f"The record's speed lies between {low:.1f} and {high:.1f} km/h from {begin:,.0f} to {end:,.0f} "
-            f"m, up to {100 * away:.1f} % from the run's {run.speed_kmh:.1f} km/h, and {100 * SAME_SPEED:g} "
-            "% are allowed; give a part of the record at one speed, and a run at that."
+            f"The record's speed lies between {low:.1f} and {high:.1f} km/h from {found[0].begin:,.0f} to "
+            f"{found[-1].end:,.0f} m, up to {100 * away:.1f} % from the run's {run.speed_kmh:.1f} km/h, and "
+            f"{100 * SAME_SPEED:g} % are allowed; give a part of the record at one speed, and a run at that."
         )
+    return found, np.concatenate(own), np.concatenate(other)
 
 
 def _heights(samples: Samples) -> Array:
     """Height of the contact point, low-passed without delay, (n,), m; nan where it was not measured."""
-    found = []
-    for piece in samples.record.pieces:
-        height = np.full(len(piece.force), np.nan) if piece.height is None else piece.height
-        known = bool(np.isfinite(height).all())
-        found.append(zero_phase_low_pass(height, piece.time_step) if known else np.full(len(height), np.nan))
-    return np.concatenate(found)
+
+    def of_piece(piece: Piece) -> Array:
+        if piece.height is None or not np.isfinite(piece.height).all():
+            return np.full(len(piece.force), np.nan)
+        return zero_phase_low_pass(piece.height, piece.time_step)
+
+    return samples.joined(of_piece)
 
 
 def _range(heights: Array, inside: NDArray[np.bool_]) -> float:
@@ -208,19 +198,18 @@ def _uplift(samples: Samples, run: Trajectory, begin: float, end: float) -> tupl
 
     It is nan where none was measured, or the mast stands outside the evaluated spans, begin to end (m).
     """
-    pieces = [piece for piece in samples.record.pieces if piece.uplift is not None]
-    if not pieces or not run.uplift.size:
+    pairs = [(piece.position, piece.uplift) for piece in samples.record.pieces if piece.uplift is not None]
+    if not pairs or not run.uplift.size:
         return math.nan, ""
-    best = max(pieces, key=lambda piece: float(np.nanmax(np.asarray(piece.uplift))))
-    rise = np.asarray(best.uplift)
-    at = int(np.nanargmax(rise))
-    nearest = int(np.argmin(np.abs(run.support_position - best.position[at])))
+    position, uplift = max(pairs, key=lambda pair: float(np.nanmax(pair[1])))
+    at = int(np.nanargmax(uplift))
+    nearest = int(np.argmin(np.abs(run.support_position - position[at])))
     place = float(run.support_position[nearest])
     if not begin - 1e-6 <= place <= end + 1e-6:
         return math.nan, f"it was measured at {place:.6g} m, outside the run's evaluated spans"
-    measured, simulated = float(rise[at]), float(run.uplift_at(place).max())
+    measured, simulated = float(uplift[at]), float(run.uplift_at(place).max())
     words = (
-        f"{1e3 * measured:.1f} mm were measured when the train was at {best.position[at]:.1f} m, "
+        f"{1e3 * measured:.1f} mm were measured when the train was at {position[at]:.1f} m, "
         f"and {1e3 * simulated:.1f} mm simulated at the support at {place:.6g} m"
     )
     return 1e3 * (simulated - measured), words
@@ -271,15 +260,14 @@ def deviation(pair: tuple[float, float]) -> float:
 
 
 def _signed(value: float) -> str:
-    """A difference with its sign, and never "-0.0"."""
-    return f"{value:+z.1f}"
+    return f"{value:+z.1f}"  # never "-0.0"
 
 
 def shift_sentence(found: Comparison) -> str:
     """The shift that was found, how sure it is, and what else came near."""
     shift = found.shift
-    value = round(shift.value, 2) + 0.0
-    text = f"The record is shifted by {value:+.2f} m, where the forces correlate with {shift.correlation:.3f}"
+    text = f"The record is shifted by {shift.value:+z.2f} m, where the forces correlate with "
+    text += f"{shift.correlation:.3f}"
     if shift.other_correlation > 0:
         text += f"; the next best shift is {shift.other:+.0f} m with {shift.other_correlation:.3f}"
     return f"{text} (searched from {shift.search[0]:+.0f} to {shift.search[1]:+.0f} m)."
@@ -295,9 +283,7 @@ def plain(found: Comparison) -> dict[str, Any]:
     return {
         "record": found.samples.record.name,
         "shift": vars(found.shift),
-        "accepted": found.accepted,
-        "verdict": found.verdict,
-        "figures": found.figures,
+        **{name: getattr(found, name) for name in ("accepted", "verdict", "figures")},
         "criteria": [each.as_dict() for each in found.criteria],
         "missing": list(found.missing),
         "spans": [each._asdict() for each in found.spans],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -92,29 +93,26 @@ def judge(
     if alignment is not None:
         check_period(samples, alignment.mean_length)
     reach = (0.0, alignment.length if alignment is not None and line is not None and line.ends else math.inf)
-    parts = [_part(samples, "whole", "whole record", np.ones(len(samples.raw), dtype=bool))]
-    runs = list(dict.fromkeys(piece.run for piece in record.pieces))
-    if len(runs) > 1:
-        parts += [_part(samples, "run", f"run {name}", samples.run == k) for k, name in enumerate(runs)]
+    whole = _part(samples, "whole", "whole record", np.ones(len(samples.raw), dtype=bool))
+    names = list(dict.fromkeys(piece.run for piece in record.pieces))
+    runs = [_part(samples, "run", f"run {name}", samples.run == k) for k, name in enumerate(names)]
     low = FIRST_KMH + CLASS_KMH * np.floor((to_kmh(samples.speed).round(1) - FIRST_KMH) / CLASS_KMH)
     classes = [
         _part(samples, "speed", f"{max(k, 0):g}-{k + CLASS_KMH:g} km/h", low == k) for k in np.unique(low)
     ]
-    parts += classes
     edges = _section_edges(samples.position, line, section)
     at = np.searchsorted(edges, samples.position, side="right") - 1
-    parts += [
+    sections = [
         _part(samples, "section", f"{edges[k]:,.0f} to {edges[k + 1]:,.0f} m", at == k) for k in np.unique(at)
     ]
-    parts += _spans(samples, alignment, reach) if alignment is not None else []
-    uplift = max(
-        (float(np.nanmax(p.uplift)) for p in record.pieces if p.uplift is not None), default=math.nan
-    )
-    judged = [part for part in classes if part.samples * samples.step >= LONG_ENOUGH] or parts[:1]
-    uplift, blind = uplift if len(judged) == 1 else math.nan, _blind(samples)
+    spans = _spans(samples, alignment, reach) if alignment is not None else []
+    parts = (whole, *(runs if len(runs) > 1 else ()), *classes, *sections, *spans)
+    judged = [part for part in classes if part.samples * samples.step >= LONG_ENOUGH] or [whole]
+    uplifts = [float(np.nanmax(p.uplift)) for p in record.pieces if p.uplift is not None]
+    uplift, blind = max(uplifts, default=math.nan) if len(judged) == 1 else math.nan, _blind(samples)
     requirements = tuple((part, _criteria(part, line, uplift, blind)) for part in judged)
-    notes = _notes(samples, line, span) + (_beyond(samples, reach) if alignment is not None else [])
-    return Judgement(samples, tuple(parts), requirements, alignment, reach, tuple(notes))
+    notes = _notes(samples, span) + (_beyond(samples, reach) if alignment is not None else [])
+    return Judgement(samples, parts, requirements, alignment, reach, tuple(notes))
 
 
 def force_spectrum(record: Record) -> tuple[Array, Array]:
@@ -135,19 +133,17 @@ def force_spectrum(record: Record) -> tuple[Array, Array]:
 
 def _part(samples: Samples, kind: str, where: str, inside: NDArray[np.bool_]) -> Part:
     force, raw = samples.filtered[inside & samples.settled], samples.raw[inside]
-    speed = float(samples.speed[inside].mean())
-    whole = samples.shows_losses
-    found = statistics(force)
+    speed, found = float(samples.speed[inside].mean()), statistics(force)
     figures = replace(
         Figures.none(),
         **found,
         statistical_max=found["mean"] + 3 * found["std"],
         statistical_min=found["mean"] - 3 * found["std"],
-        contact_loss=contact_loss(raw) if whole else math.nan,
+        contact_loss=contact_loss(raw) if samples.shows_losses else math.nan,
         distance=speed * samples.step * len(raw),
     )
-    resolved = whole and samples.step <= ARC * (1 + 1e-6)
-    return Part(kind, where, figures, arcing(raw, samples.step) if resolved else math.nan, speed, len(raw))
+    nq = math.nan if _blind(samples) else arcing(raw, samples.step)
+    return Part(kind, where, figures, nq, speed, len(raw))
 
 
 def _spans(samples: Samples, alignment: Alignment, reach: tuple[float, float]) -> list[Part]:
@@ -207,13 +203,13 @@ def _criteria(part: Part, line: CatenaryData | None, uplift: float, blind: str) 
     return [replace(each, note=notes.get(each.key, each.note)) for each in found]
 
 
-def _notes(samples: Samples, line: CatenaryData | None, span: float | None) -> list[str]:
+def _notes(samples: Samples, span: float | None) -> list[str]:
     notes = list(samples.record.notes)
     if blind := _blind(samples):
         as_is = ", and figures are of the force as it is" if samples.low_passed else ""
         what = "NQ" if samples.shows_losses else "CL and NQ"
         notes.append(f"{what} cannot be judged, as {blind}{as_is}.")
-    if line is None and span is not None:
+    if span is not None:
         notes.append(f"Supports are taken to stand every {span:g} m from 0 m on.")
     return notes
 
@@ -240,15 +236,8 @@ def _beyond(samples: Samples, reach: tuple[float, float]) -> list[str]:
     ]
 
 
-SHOWN = {
-    "mean": 1,
-    "std": 1,
-    "statistical_max": 1,
-    "statistical_min": 1,
-    "max": 1,
-    "min": 1,
-    "contact_loss": 2,
-}
+SHOWN = dict.fromkeys(("mean", "std", "statistical_max", "statistical_min", "max", "min"), 1)
+SHOWN |= {"contact_loss": 2}
 """Figures in the columns of tables, and their decimals."""
 ARCING = "arcing NQ (%)"
 TITLES = {
@@ -308,13 +297,11 @@ def requirements_table(found: Judgement) -> Table:
     if len(found.requirements) == 1:
         part, criteria = found.requirements[0]
         return criteria_table(criteria, f"Requirements at {to_kmh(part.speed):.1f} km/h")
-    rows: list[tuple[str | float, ...]] = []
-    ends, headings = [], criteria_table([], "").headings
-    for part, criteria in found.requirements:
-        rows += [(part.where, *row) for row in criteria_table(criteria, "").rows]
-        ends.append(len(rows) - 1)
+    tables = [(part.where, criteria_table(criteria, "")) for part, criteria in found.requirements]
+    rows = [(where, *row) for where, table in tables for row in table.rows]
+    ends = tuple(end - 1 for end in accumulate(len(table.rows) for _, table in tables))
     title = "Requirements by speed, at the mean of each class"
-    return Table(title, ("speed", *headings), rows, text_columns=2, section_ends=tuple(ends))
+    return Table(title, ("speed", *tables[0][1].headings), rows, text_columns=2, section_ends=ends)
 
 
 def requirement_remarks(found: Judgement) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import METRES_PER_SECOND, Array
 from ..base.errors import InputError
 from ..metrics.trajectory import Trajectory
-from .record import Piece, Samples, Shift, find_shift
+from .record import Samples, Shift, find_shift
 
 UNLIKE = 0.5
 """Correlation below which a run and a record are of different lines, so that figures agree by chance."""
@@ -49,7 +49,10 @@ def _readings(samples: Samples, run: Trajectory) -> Iterator[tuple[str, Samples,
     """Other ways to read a record: what to say of each, the samples, and the run to hold them against."""
     pieces = samples.record.pieces
     ends = min(each.position[0] for each in pieces) + max(each.position[-1] for each in pieces)
-    backwards = tuple(_backwards(each, ends) for each in reversed(pieces))
+    backwards = tuple(
+        replace(each, position=ends - each.position[::-1], force=each.force[::-1])
+        for each in reversed(pieces)
+    )
     yield (
         "Read backwards the record correlates with {} with the run: the train may have run the other way, or "
         "the positions against it; turn the record's positions, or the line.",
@@ -63,12 +66,6 @@ def _readings(samples: Samples, run: Trajectory) -> Iterator[tuple[str, Samples,
             samples,
             other,
         )
-
-
-def _backwards(piece: Piece, ends: float) -> Piece:
-    height, uplift = (None if each is None else each[::-1] for each in (piece.height, piece.uplift))
-    position, force = ends - piece.position[::-1], piece.force[::-1]
-    return replace(piece, position=position, force=force, height=height, uplift=uplift)
 
 
 def check_period(samples: Samples, length: float) -> None:

@@ -55,12 +55,10 @@ def _pair(
     draw_lower: Callable[[Axes, Any], None],
     grid: Literal["both", "y"],
 ) -> Figure:
-    figure, (upper, lower) = panels((10, 7), 2, height_ratios=(3, 2))
-    draw_upper(upper, found)
-    draw_lower(lower, found)
-    upper.grid(color="0.92", axis="y")
-    lower.grid(color="0.92", axis=grid)
-    for axis in (upper, lower):
+    figure, axes = panels((10, 7), 2, height_ratios=(3, 2))
+    for axis, draw, lines in zip(axes, (draw_upper, draw_lower), ("y", grid), strict=True):
+        draw(axis, found)
+        axis.grid(color="0.92", axis=lines)
         axis.set_axisbelow(True)
     figure.suptitle(title, fontsize="medium", x=0.01, ha="left")
     return figure
@@ -98,8 +96,7 @@ def draw_spectrum(axes: Axes, found: Judgement) -> None:
     if found.alignment is not None:
         at = found.whole.speed / found.alignment.mean_length
         axes.axvline(at, color="0.4", linestyle=":", linewidth=1.2, label=f"per span: {at:.2f} Hz")
-    axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N)", xlim=(0, HIGHEST))
-    axes.set_ylim(bottom=0)
+    axes.set(xlabel="frequency (Hz)", ylabel="amplitude (N)", xlim=(0, HIGHEST), ylim=(0, None))
     legend_above(axes, 4)
 
 
@@ -125,8 +122,7 @@ def draw_overlay(axes: Axes, found: Comparison) -> None:
     force = zero_phase_low_pass(run.contact_force, run.time_step)
     axes.plot(run.position, force, color=BLUE, linewidth=1.0, label="run")
     mark_supports(axes, run.alignment.supports_within(begin, end))
-    axes.set(xlabel=POSITION, xlim=(begin, end))
-    axes.set_ylabel("contact force,\nlow-passed at 20 Hz (N)")
+    axes.set(xlabel=POSITION, xlim=(begin, end), ylabel="contact force,\nlow-passed at 20 Hz (N)")
     legend_above(axes, 2)
 
 
@@ -135,8 +131,7 @@ def draw_spans(axes: Axes, found: Comparison) -> None:
     at = np.array([each.span for each in found.spans])
     for k, (label, colour) in enumerate((("record", ORANGE), ("run", BLUE))):
         axes.bar(at + 0.4 * (k - 0.5), [each.std[k] for each in found.spans], 0.4, color=colour, label=label)
-    axes.set(xlabel="span", ylabel="standard deviation σ (N)")
-    axes.set_xticks(at[:: -(-len(at) // 20)])
+    axes.set(xlabel="span", ylabel="standard deviation σ (N)", xticks=at[:: -(-len(at) // 20)])
     legend_above(axes, 2)
 
 
@@ -154,11 +149,9 @@ def save_record_page(found: Judgement, title: str, path: str | Path) -> None:
 
 def save_comparison_page(found: Comparison, title: str, path: str | Path) -> None:
     """Write the page of a record beside a run, as ``save_record_page`` does."""
+    above = "Both forces by place, low-passed at 20 Hz, not delayed"
     charts = [
-        (
-            "Both forces by place, low-passed at 20 Hz, not delayed",
-            as_svg(along_line=True)(draw_overlay)(found),
-        ),
+        (above, as_svg(along_line=True)(draw_overlay)(found)),
         ("Standard deviation by span", as_svg()(draw_spans)(found)),
     ]
     shown = [acceptance_table(found), figures_table(found), spans_table(found)]
@@ -181,13 +174,5 @@ def save_page(
     """
     check_output(path, PAGES)
     template = page_template("panto_env.records", alarm=lambda cell: isinstance(cell, Alarm))
-    text = template.render(
-        version=__version__,
-        title=title,
-        introduction=introduction,
-        notes=notes,
-        charts=charts,
-        tables=shown,
-        remarks=sentences,
-    )
-    write_text(path, text)
+    facts = {"title": title, "introduction": introduction, "notes": notes, "charts": charts}
+    write_text(path, template.render(facts, version=__version__, tables=shown, remarks=sentences))

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +39,7 @@ class Piece:
     @property
     def speed(self) -> float:
         """Mean speed of the train (m/s)."""
-        return float((self.position[-1] - self.position[0]) / (self.time_step * (len(self.force) - 1)))
+        return self.length / (self.time_step * (len(self.force) - 1))
 
     @property
     def speed_kmh(self) -> float:
@@ -111,9 +113,8 @@ class Samples:
     @cached_property
     def slices(self) -> list[slice]:
         """Samples of each piece."""
-        ends = np.cumsum([len(piece.force) for piece in self.record.pieces])
-        pairs = zip(ends.tolist(), self.record.pieces, strict=True)
-        return [slice(end - len(piece.force), end) for end, piece in pairs]
+        ends = accumulate((len(piece.force) for piece in self.record.pieces), initial=0)
+        return [slice(*each) for each in pairwise(ends)]
 
     @cached_property
     def low_passed(self) -> bool:
@@ -125,38 +126,39 @@ class Samples:
         """Whether losses of contact can be seen: behind a low-pass the force does not fall to 0."""
         return not self.low_passed and self.record.longest.filtered is None
 
-    def _joined(self, of_piece: Callable[[Piece], Array]) -> Array:
+    def joined(self, of_piece: Callable[[Piece], NDArray[Any]]) -> NDArray[Any]:
+        """(n,): an array of each piece, one behind the other."""
         return np.concatenate([of_piece(piece) for piece in self.record.pieces])
 
     @cached_property
     def raw(self) -> Array:
         """(n,): contact force as recorded (N)."""
-        return self._joined(lambda piece: piece.force)
+        return self.joined(lambda piece: piece.force)
 
     @cached_property
     def filtered(self) -> Array:
         """(n,): contact force behind EN 50317's low-pass (N), or as recorded where it was low-passed."""
         if self.low_passed:
             return self.raw
-        return self._joined(lambda piece: low_pass(piece.force, piece.time_step))
+        return self.joined(lambda piece: low_pass(piece.force, piece.time_step))
 
     @cached_property
     def in_place(self) -> Array:
         """(n,): as ``filtered``, but without delay (N), for pictures and for comparisons by place."""
         if self.low_passed:
             return self.raw
-        return self._joined(lambda piece: zero_phase_low_pass(piece.force, piece.time_step))
+        return self.joined(lambda piece: zero_phase_low_pass(piece.force, piece.time_step))
 
     @cached_property
     def settled(self) -> NDArray[np.bool_]:
         """(n,): samples whose filtered force counts."""
-        time = self._joined(lambda piece: np.arange(len(piece.force)) * piece.time_step)
+        time = self.joined(lambda piece: np.arange(len(piece.force)) * piece.time_step)
         return (time >= SETTLING) | self.low_passed
 
     @cached_property
     def position(self) -> Array:
         """(n,): along the line (m)."""
-        return self._joined(lambda piece: piece.position)
+        return self.joined(lambda piece: piece.position)
 
     @cached_property
     def until(self) -> Array:
@@ -166,7 +168,7 @@ class Samples:
             last = piece.position[-1] + piece.time_step * local_speed(piece)[-1]
             return np.append(piece.position[1:], last)
 
-        return self._joined(following)
+        return self.joined(following)
 
     def distance(self, inside: NDArray[np.bool_]) -> float:
         """Distance (m) that samples inside, (n,), cover; what several pieces cover counts once."""
@@ -179,14 +181,13 @@ class Samples:
     @cached_property
     def speed(self) -> Array:
         """(n,): local speed (m/s)."""
-        return self._joined(local_speed)
+        return self.joined(local_speed)
 
     @cached_property
     def run(self) -> NDArray[np.intp]:
         """(n,): number of the run of each sample, by its first appearance from 0."""
         names = list(dict.fromkeys(piece.run for piece in self.record.pieces))
-        counts = [len(piece.force) for piece in self.record.pieces]
-        return np.repeat([names.index(piece.run) for piece in self.record.pieces], counts)
+        return self.joined(lambda piece: np.full(len(piece.force), names.index(piece.run)))
 
     @property
     def step(self) -> float:
@@ -234,7 +235,7 @@ def find_shift(samples: Samples, run: Trajectory, begin: float, end: float, near
     ]
     # Lag k reads the record at places - lags[k], which begins at index len(lags) - 1 - k.
     found = np.array([_correlation(own, pieces, len(lags) - 1 - k) for k in range(len(lags))])
-    distances, correlations = GRID * found[:, 1], found[:, 0]
+    correlations, distances = found[:, 0], GRID * found[:, 1]
     if not distances.max() >= span:
         first, last = samples.position.min(), samples.position.max()
         raise InputError(

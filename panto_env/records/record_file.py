@@ -85,18 +85,16 @@ def read_table(
 
 
 def _refuse_sensor(path: str | Path, heading: str) -> None:
-    match = _SENSOR.fullmatch(heading)
-    if match is None:
-        return
-    what, whole = (
-        ("force", "their sum as one column force (N)")
-        if heading.startswith("f")
-        else ("acceleration", "their mean as one column acceleration_1 (m/s2)")
-    )
-    raise InputError(
-        f"Column {what}_{match[1]} of {path} is of no sensor that is read; number sensors from 1 to "
-        f"{STRIPS}, give more than {STRIPS} as {whole}, or rename the column if it is something else."
-    )
+    if match := _SENSOR.fullmatch(heading):
+        what, whole = (
+            ("force", "their sum as one column force (N)")
+            if heading.startswith("f")
+            else ("acceleration", "their mean as one column acceleration_1 (m/s2)")
+        )
+        raise InputError(
+            f"Column {what}_{match[1]} of {path} is of no sensor that is read; number sensors from 1 to "
+            f"{STRIPS}, give more than {STRIPS} as {whole}, or rename the column if it is something else."
+        )
 
 
 def _parquet(
@@ -237,18 +235,16 @@ def write_record(record: Record, path: str | Path) -> None:
     if any(piece.run for piece in record.pieces):
         found["run"] = [piece.run for piece in record.pieces for _ in piece.force]
     for name in headings:
-        series = [getattr(piece, name) for piece in record.pieces]
-        if any(each is not None for each in series):
-            missing = [np.full(len(piece.force), np.nan) for piece in record.pieces]
-            pairs = zip(series, missing, strict=True)
-            found[name] = np.concatenate([empty if own is None else own for own, empty in pairs])
+        series = [(getattr(piece, name), len(piece.force)) for piece in record.pieces]
+        if any(own is not None for own, _ in series):
+            found[name] = np.concatenate([np.full(n, np.nan) if own is None else own for own, n in series])
     write_table(Sheet("record", found, headings), path)
 
 
 def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
     force, notes = contact_force(values, mass)
-    seen = (key for key in ("height", "uplift") if key in values)
-    check_motion({key: values[key] for key in seen if not np.isnan(values[key]).all()})
+    motion = {key: values[key] for key in ("height", "uplift") if key in values}
+    check_motion({key: each for key, each in motion.items() if not np.isnan(each).all()})
     raised = values.get("raised")
     known = np.isfinite(force) & (True if raised is None else raised > 0.5)
     if known.sum() < 2:
@@ -270,8 +266,7 @@ def _record(name: str, values: dict[str, Any], mass: float | None) -> Record:
                 "second can be judged, so export it at a higher one."
             )
         notes += [axes.note] if axes.note and axes.note not in notes else []
-        series: dict[str, Array] = {key: own[key] for key in ("height", "uplift") if key in own}
-        found, why = cut(run, axes, force[part], series, own.get("raised"))
+        found, why = cut(run, axes, force[part], {key: own[key] for key in motion}, own.get("raised"))
         if found:
             both = {"position", "speed"} <= own.keys()
             longest = max(found, key=lambda piece: len(piece.force))

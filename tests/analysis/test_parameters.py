@@ -1,6 +1,5 @@
 """Names, labels and changes of parameters, and options of commands: units, defaults, spans, panels."""
 
-import json
 import re
 
 import numpy as np
@@ -59,26 +58,17 @@ def test_labels_have_the_unit_at_their_end_or_none():
 def test_an_unknown_name_is_refused_with_what_is_known(name):
     with pytest.raises(InputError) as told:
         check_name(name.replace("x.", "pantograph."), load_pantograph("three-mass"))
-    assert str(told.value).startswith("Unknown parameter '")
-    assert "' of three-mass: " in str(told.value)
-    assert str(told.value).endswith("frame_friction (lists count from 1).")
-    assert "masses.1," in str(told.value).partition("known are ")[2]
-    assert "masses.2" not in str(told.value).partition("known are ")[2]
-    with pytest.raises(InputError) as told:
-        check_name("catenary.nothing", load_catenary("en50318-2002"))
-    known = str(told.value).partition("known are ")[2]
-    assert "catenary.droppers.spacing," in known
-    assert "positions.2" not in known
-    with pytest.raises(InputError) as told:
+    before, _, known = str(told.value).partition("known are ")
+    assert before.startswith("Unknown parameter '")
+    assert "' of three-mass: " in before
+    assert known.endswith("frame_friction (lists count from 1).")
+    assert "masses.1," in known
+    assert "masses.2" not in known
+    with pytest.raises(InputError, match=r"Unknown parameter 'sensors\.nothing': (?!.*lists count)"):
         check_name("sensors.nothing", run_settings({}).sensors)
-    assert str(told.value).startswith("Unknown parameter 'sensors.nothing': ")
-    assert "lists count" not in str(told.value)
 
 
-@pytest.mark.parametrize(
-    "name",
-    sorted({*fields(), "speedy", "speed_kmh.1", "zzz", "a", "policy", ""} - {"speed_kmh", "distances"}),
-)
+@pytest.mark.parametrize("name", ["seed", "catenary", "mean_force", "speedy", "speed_kmh.1", "policy", ""])
 def test_only_the_speed_and_the_families_values_are_swept(name):
     """Each setting by its bare name would change nothing without a word."""
     begin = "" if name in FAMILIES else ".*it must be speed_kmh, distances or begin with one of 'catenary.', "
@@ -199,9 +189,6 @@ def test_span_and_spacing_are_swept_together_in_any_order(monkeypatch):
         assert found == {(50.0, 9), (50.0, 5), (65.0, 12), (65.0, 7)}
 
 
-LINE = ["--catenary", "periodic-stiffness", "--pantograph", "three-mass", "--distance", "650"]
-
-
 def call(*words, **options):
     """What a command with settings as options gets, and its help."""
     got = {}
@@ -219,8 +206,6 @@ def call(*words, **options):
 
 def test_a_time_step_is_given_in_milliseconds():
     assert call("--time-step", "2.5") == ({"time_step": 0.0025}, "")
-    done = CliRunner().invoke(make_app(), ["simulate", *LINE, "--time-step", "2.5", "--json"])
-    assert json.loads(done.stdout)["settings"]["time_step"] == 0.0025
 
 
 def test_the_help_says_defaults_unless_a_file_may_have_others():

@@ -38,15 +38,6 @@ def test_the_filter_of_pictures_attenuates_as_much_and_does_not_delay(reference_
     assert lag(force[inside], late[inside]) * step == pytest.approx(0.031, abs=0.006)
 
 
-def test_at_20_hz_and_beyond_it_attenuates_as_the_figures_filter():
-    time = np.arange(0, 20, 1e-3)
-    for frequency in (2.0, 20.0, 30.0):
-        wave = np.sin(2 * np.pi * frequency * time)
-        middle = slice(5000, 15000)
-        late, in_place = (f(wave, 1e-3)[middle].std() for f in (low_pass, zero_phase_low_pass))
-        assert in_place == pytest.approx(late, rel=1e-3)
-
-
 def test_a_run_s_plot_shows_the_evaluated_spans_their_supports_and_limits(run):
     figure = plot_run(run)
     contact, height, actuator = figure.axes

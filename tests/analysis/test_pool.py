@@ -11,6 +11,8 @@ from panto_env import InputError
 from panto_env.analysis import pool
 from panto_env.analysis.pool import collect, in_processes, in_threads, one_by_one, workers_for
 
+RUNNERS = [one_by_one, in_threads, pytest.param(in_processes, marks=pytest.mark.slow)]
+
 
 def later(seconds, result):
     time.sleep(seconds)
@@ -25,8 +27,7 @@ def environment_and_process():
     return os.environ.get("OPENBLAS_NUM_THREADS"), os.getpid()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("run", [one_by_one, in_threads, in_processes])
+@pytest.mark.parametrize("run", RUNNERS)
 def test_results_are_in_the_order_of_the_jobs_and_progress_counts_every_job(run):
     done = []
     jobs = [partial(later, 0.2, "first"), partial(later, 0.0, "second"), partial(later, 0.0, "third")]
@@ -34,8 +35,7 @@ def test_results_are_in_the_order_of_the_jobs_and_progress_counts_every_job(run)
     assert done == [(1, 3), (2, 3), (3, 3)]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("run", [one_by_one, in_threads, in_processes])
+@pytest.mark.parametrize("run", RUNNERS)
 def test_the_error_of_a_job_is_raised(run):
     with pytest.raises(InputError, match="This job fails"):
         run([fail, partial(later, 0.0, "never mind")])

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from panto_env import InputError, simulate
-from panto_env.analysis.simulation import TOLERANCE, check_made_anew, is_saved_run, load_with_settings
+from panto_env.analysis.simulation import TOLERANCE, check_made_anew, load_with_settings
 from panto_env.catalog.loader import text_of
 from panto_env.cli import make_app
 from panto_env.plant.alignment import Alignment
@@ -24,13 +24,19 @@ CASES = {
 }
 
 
+KINDS = ("rig", "motor")
+"""Kinds of lines and actuators, which are compiled apart."""
+
+
 def saved(path, **settings):
     run = simulate(**settings)
     run.save(path)
     return run
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in KINDS)) for name in CASES]
+)
 def test_a_run_is_made_anew_from_its_file_bit_for_bit(name, tmp_path):
     path, given, mine = tmp_path / "run.parquet", dict(CASES[name]), tmp_path / "mine.toml"
     if name == "stiffness":  # on a line of one's own, which the run's file has by value
@@ -123,11 +129,6 @@ def test_a_file_of_another_version_is_refused(kept, tmp_path, change):
     replace(kept[0], **change).save(path)
     with pytest.raises(InputError, match="was written by another version"):
         load_with_settings(path)
-
-
-def test_saved_runs_are_told_from_policies():
-    assert is_saved_run("runs/one.parquet")
-    assert not any(map(is_saved_run, ("pd", "model.safetensors", "mine.py:Class", object())))
 
 
 def film(*arguments):

@@ -65,11 +65,6 @@ def test_a_run_has_the_name_and_the_seed_it_was_given():
     assert simulate(**flexible, record_droppers=False).dropper_position.size == 0
 
 
-def test_a_policy_that_does_not_act_changes_nothing():
-    passive, still = simulate(**SHORT), simulate(**SHORT, policy=Still())
-    np.testing.assert_array_equal(passive.contact_force, still.contact_force)
-
-
 def test_the_signature_has_every_setting_once():
     names = list(inspect.signature(simulate).parameters)
     assert names[:4] == ["catenary", "pantograph", "speed_kmh", "policy"]
@@ -111,3 +106,8 @@ def test_requirements_are_printed_with_their_remarks_on_one_line_each(capsys, mo
     assert "All" in "".join(printed)
     print_criteria([Criterion("b", "two", "m", 0.25)], "None")
     assert capsys.readouterr().out == "two (m): 0.250\n"
+
+
+def test_a_policy_that_does_not_act_changes_nothing():
+    passive, still = simulate(**SHORT), simulate(**SHORT, policy=Still())
+    np.testing.assert_array_equal(passive.contact_force, still.contact_force)

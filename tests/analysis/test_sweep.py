@@ -9,7 +9,6 @@ import pyarrow.parquet
 import pytest
 
 from panto_env import InputError, simulate
-from panto_env.analysis.parameters import change, parameter_names
 from panto_env.analysis.sweep import labels, save, sweep
 from panto_env.analysis.sweep_plots import plot_sweep
 from panto_env.catalog import load_catenary, load_pantograph
@@ -60,15 +59,6 @@ def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path)
     assert figures(row) != expected(simulate(**PAPER_3, speed_kmh=280), (5, 8))
 
 
-def test_nested_value_of_a_flexible_line_takes_effect():
-    line = load_catenary("en50318-2002")
-    wire = line.contact_wire.model_copy(update={"tension": 25e3})
-    direct = simulate(line.model_copy(update={"contact_wire": wire}), distance=240)
-    (row,) = sweep({"catenary.contact_wire.tension": [25e3]}, distance=240, spans=(2, 4))
-    assert figures(row) == expected(direct, (2, 4))
-    assert row["max_uplift"] == direct.summary((2, 4)).max_uplift
-
-
 def test_speed_actuator_and_policy_parameters_take_effect():
     rows = sweep({"speed_kmh": [200, 250], "actuator.lag": [0.0, 0.02]}, **PAPER_3, policies=["pd"])
     assert [(row["speed_kmh"], row["actuator.lag"]) for row in rows] == [
@@ -94,23 +84,6 @@ def test_outcome_does_not_depend_on_threads_and_progress_counts_every_pass():
     three = sweep(values, **short, workers=3, progress=lambda *done: told.append(done))
     assert one == three
     assert told == [(k, 6) for k in range(1, 7)]
-
-
-def test_every_number_of_an_entry_has_a_name_that_can_be_changed():
-    for family, entry in (
-        ("catenary", load_catenary("benchmark-2015")),
-        ("pantograph", load_pantograph("three-mass")),
-        ("actuator", LaggedActuator()),
-    ):
-        names = parameter_names(entry, family)
-        assert names
-        for name in names:
-            value = entry
-            for part in name.split(".")[1:]:
-                value = value[int(part) - 1] if part.isdigit() else getattr(value, part, None)
-            if isinstance(value, int | float):
-                assert change(entry, name, value) == entry
-    assert "actuator.rate_limit" in parameter_names(LaggedActuator(), "actuator")
 
 
 @pytest.mark.parametrize(
@@ -163,12 +136,6 @@ def test_bad_input_is_refused_in_one_sentence(values, settings, message):
     with pytest.raises(InputError, match=message) as caught:
         sweep(values, **settings)
     assert "\n" not in str(caught.value)
-
-
-def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
-    monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
-    with pytest.raises(InputError, match="cannot be -1"):
-        sweep({"pantograph.masses.1": [7.0, 8.0, -1.0]})
 
 
 def test_run_that_ends_early_says_where_and_has_no_figures():
@@ -267,18 +234,6 @@ def test_plot_shows_what_varies():
     assert "1 of 4 passes ended early and are not shown" in early.get_suptitle()
 
 
-def test_a_plot_names_parameters_in_words_with_their_units():
-    wanted = {
-        "pantograph.masses.1": "pantograph: masses, head first, 1st (kg)",
-        "catenary.contact_wire.tension": "catenary: contact wire: tension (N)",
-        "catenary.droppers.stiffness": "catenary: droppers: stiffness in tension (N/m)",
-        "catenary.droppers.positions.11": "catenary: droppers: distance from support, 11th (m)",
-        "speed_kmh": "speed of the train (km/h)",
-        "policy.gain": "policy: gain",
-    }
-    assert {name: labels([name])[name] for name in wanted} == wanted
-
-
 SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "distance": 300.0, "spans": "all"}
 RUN = {name: value for name, value in SHORT.items() if name != "spans"}
 
@@ -369,3 +324,9 @@ def test_a_plot_of_three_parameters_that_vary_is_refused_before_the_first_pass(t
     done = panto("sweep", *three, *light, "--plot", tmp_path / "a.png")
     assert done.returncode == 2
     assert "A plot shows one or two parameters" in done.stderr
+
+
+def test_bad_value_is_refused_before_the_first_pass(monkeypatch):
+    monkeypatch.setattr("panto_env.analysis.sweep.simulate", lambda **_: pytest.fail("a pass was run"))
+    with pytest.raises(InputError, match="cannot be -1"):
+        sweep({"pantograph.masses.1": [7.0, 8.0, -1.0]})

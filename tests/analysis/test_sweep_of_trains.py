@@ -2,7 +2,6 @@
 
 import csv
 
-import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
@@ -96,14 +95,3 @@ def test_commands_for_one_pantograph_refuse_two(words, tmp_path):
     done = panto(*words, *PAIR, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == "panto: --pantograph is given twice; give it once.\n"
-
-
-def test_each_controlled_pantograph_has_a_policy_of_its_own():
-    """Its action is that of the same policy on the same readings, not the first pantograph's."""
-    both = simulate(
-        **LINE | {"spans": 12}, **TWO, distances=[80.0], distance=400.0, policy="p", controlled=[1, 2]
-    )
-    first, second = both.train
-    on_line = first.frame_force[-len(second.time) :]
-    assert np.abs(on_line - second.frame_force).max() > 5
-    assert np.corrcoef(second.frame_force, second.contact_force)[0, 1] < -0.5

@@ -84,18 +84,6 @@ def test_patterns_of_passes_are_taken_out_and_the_rest_is_as_large_as_it_was_mad
     assert np.std(levels) < 0.2 * np.mean(levels)
 
 
-def test_whitened_remainders_are_white_and_their_energy_is_one(learned):
-    passes = made_up(20, np.random.default_rng(3))
-    scores = np.array([learned.score(passes.only(k), 1.0)[0].score[PER_SPAN:] for k in range(20)])
-    assert scores.mean() == pytest.approx(1.0, rel=0.1)
-    # Of noise whose correlation falls by 0.8 from place to place, with the white noise that it reckons with.
-    lags = 0.8 ** np.arange(len(learned.predictor) + 1) + FLOOR * (np.arange(len(learned.predictor) + 1) == 0)
-    np.testing.assert_allclose(learned.predictor, solve_toeplitz(lags[:-1], lags[1:]), atol=0.05)
-    # Of each span at its place: nowhere louder than elsewhere.
-    by_place = scores.reshape(-1, PER_SPAN).mean(axis=0)
-    assert by_place.max() / by_place.min() < 1.4
-
-
 def test_a_place_is_predicted_by_those_before_it(learned):
     """So that what a defect does begins where it is: one step, then what was predicted of it in vain."""
     unit = np.zeros(60)
@@ -116,20 +104,7 @@ def test_threshold_has_the_false_alarms_that_it_is_asked_for(rate):
     assert 0.5 * rate < measured < 2 * rate
 
 
-def test_threshold_reckons_with_few_passes_that_differ():
-    """Made-up scores, some of whose passes lie far above others: further passes beyond it, over 150 lines."""
-    random, wanted = np.random.default_rng(1), 0.1
-    plain, cautious = [], []
-    for _ in range(150):
-        log = random.exponential(0.3, (45, 1)) + random.gumbel(0, 0.3, (45, 15))
-        seen, later = np.exp(log[:5]), np.exp(log[5:])
-        for found, limit in ((plain, threshold), (cautious, cautious_threshold)):
-            found.append((later > limit(seen, 1, SPAN, wanted)).mean() / (SPAN / 1e3))
-    assert np.mean(plain) > 1.5 * wanted
-    assert 0.4 * wanted < np.mean(cautious) < 1.3 * wanted
-
-
-@pytest.mark.parametrize("passes", [3, 5, 20])
+@pytest.mark.parametrize("passes", [3, 20])
 def test_the_spread_between_passes_counts_as_in_a_prediction_interval(passes):
     """By parts: from span to span by the normal quantile, between passes by Student's t of one more."""
     random = np.random.default_rng(passes)
@@ -194,14 +169,6 @@ def test_a_bump_is_found_where_it_is_and_a_healthy_pass_has_none(learned):
         (region,) = regions(evidence)
         assert abs(evidence.position[region.peak] - at * SPAN) < 8
     assert sum(len(regions(learned.score(passes.only(k), limit)[0])) for k in range(12)) <= 2
-
-
-def test_a_mean_of_passes_shows_what_one_does_not(learned):
-    passes = made_up(9, np.random.default_rng(5))
-    passes.force[:, 20 * PER_SPAN : 20 * PER_SPAN + 12] += 3.0
-    at = slice(20 * PER_SPAN - 10, 20 * PER_SPAN + 20)
-    alone = [learned.score(passes.only(k), 1.0)[0].score[at].max() for k in range(9)]
-    assert learned.score(passes, 1.0)[0].score[at].max() > 1.5 * np.median(alone)
 
 
 def evidence_of(score, rest=None):
@@ -411,3 +378,15 @@ def test_command_refuses(files, extra, message):
     told = CliRunner().invoke(make_app(), ["diagnose", files[0], *extra])
     assert isinstance(told.exception, InputError)
     assert message in str(told.exception)
+
+
+def test_whitened_remainders_are_white_and_their_energy_is_one(learned):
+    passes = made_up(20, np.random.default_rng(3))
+    scores = np.array([learned.score(passes.only(k), 1.0)[0].score[PER_SPAN:] for k in range(20)])
+    assert scores.mean() == pytest.approx(1.0, rel=0.1)
+    # Of noise whose correlation falls by 0.8 from place to place, with the white noise that it reckons with.
+    lags = 0.8 ** np.arange(len(learned.predictor) + 1) + FLOOR * (np.arange(len(learned.predictor) + 1) == 0)
+    np.testing.assert_allclose(learned.predictor, solve_toeplitz(lags[:-1], lags[1:]), atol=0.05)
+    # Of each span at its place: nowhere louder than elsewhere.
+    by_place = scores.reshape(-1, PER_SPAN).mean(axis=0)
+    assert by_place.max() / by_place.min() < 1.4

@@ -10,9 +10,7 @@ from panto_env import InputError, simulate
 from panto_env.catalog import load_pantograph
 from panto_env.cli import make_app
 from panto_env.diagnosis import diagnose, estimated_force
-from panto_env.diagnosis.passes import ESTIMATOR, RATE, known_pantograph
-from panto_env.estimation.estimate import estimate
-from panto_env.estimation.motion import measure
+from panto_env.diagnosis.passes import known_pantograph
 from panto_env.metrics.low_pass import zero_phase_low_pass
 
 
@@ -51,16 +49,6 @@ def test_displacements_and_forces_are_all_that_is_looked_at(runs):
     none = np.full(len(runs[0].time), np.nan)
     blind = replace(runs[0], head_velocity=none, frame_velocity=none, contact_force=none, wire=none)
     assert np.array_equal(estimated_force(runs[0], 0), estimated_force(blind, 0))
-
-
-def test_it_is_the_estimator_s_own(runs):
-    """Step by step what ``estimate`` gives of the same motion, less what that thinks of it."""
-    none = np.zeros(len(runs[0].time))
-    blind = replace(runs[0], head_velocity=none, frame_velocity=none)
-    motion = replace(measure(blind, rate=RATE, seed=5), head_velocity=None, frame_velocity=None)
-    force = estimate(motion, load_pantograph("dsa250"), ESTIMATOR).force
-    expected = zero_phase_low_pass(np.interp(runs[0].time, motion.time, force), runs[0].time_step)
-    assert np.array_equal(estimated_force(runs[0], 5), expected)
 
 
 def unknown(run):
@@ -131,11 +119,6 @@ def test_runs_that_no_force_can_be_estimated_from_are_refused(runs, case):
     assert told.endswith((".", "?"))
 
 
-def test_a_healthy_run_is_named_by_its_number(runs):
-    with pytest.raises(InputError, match=r"^Healthy run 2: Column head stays at one value"):
-        diagnose(runs[:1], [runs[1], replace(runs[2], head=0 * runs[2].head), runs[3]])
-
-
 def test_a_run_shorter_than_a_span_says_how_far_to_run(runs):
     cut = {
         name: getattr(runs[0], name)[:400]
@@ -164,3 +147,8 @@ def test_the_command_takes_the_pantograph_that_is_known(runs, tmp_path):
     assert other.stdout != told.stdout
     wrong = CliRunner().invoke(make_app(), [*call, "--pantograph", "dsa25"])
     assert "did you mean 'dsa250'" in str(wrong.exception)
+
+
+def test_a_healthy_run_is_named_by_its_number(runs):
+    with pytest.raises(InputError, match=r"^Healthy run 2: Column head stays at one value"):
+        diagnose(runs[:1], [runs[1], replace(runs[2], head=0 * runs[2].head), runs[3]])

@@ -32,9 +32,9 @@ def coarse():
         yield
 
 
-def record_of(condition, speed=250.0, seed=0, position_error=0.3, accuracy="fast"):
+def record_of(condition, speed=250.0, seed=0, position_error=0.3):
     run = simulate(
-        LINE, PANTOGRAPH, speed, spans=2 * SPANS, distance=60.0 * SPANS, accuracy=accuracy,
+        LINE, PANTOGRAPH, speed, spans=2 * SPANS, distance=60.0 * SPANS, accuracy="fast",
         line_condition=condition, record_droppers=False,
     )  # fmt: skip
     return measured(run, seed=seed, position_error=position_error, name=f"{speed:g} km/h")
@@ -81,18 +81,10 @@ def test_lost_tension_is_a_changed_line(known):
     assert diagnose_records([record_of({"lost_contact_tension": 0.03}, seed=3)], known).changed
 
 
-@pytest.mark.parametrize(("gain", "zero"), [(1.03, 0.0), (0.97, 5.0)])
-def test_sensors_with_a_gain_and_a_zero_make_no_line_unhealthy(healthy_record, known, gain, zero):
+def test_sensors_with_a_gain_and_a_zero_make_no_line_unhealthy(healthy_record, known):
     (piece,) = healthy_record.pieces
-    record = replace(healthy_record, pieces=(replace(piece, force=gain * piece.force + zero),))
+    record = replace(healthy_record, pieces=(replace(piece, force=0.97 * piece.force + 5.0),))
     assert diagnose_records([record], known).healthy
-
-
-def test_the_mean_of_records_is_judged(healthy_record, known):
-    own, healthy, _ = measured_passes([healthy_record, record_of({}, seed=4, position_error=0.0)], known)
-    assert own.force.shape[0] == 2
-    both, one = (np.std(force - healthy.force.mean(axis=0)) for force in (own.force.mean(axis=0), own.force))
-    assert both < 0.9 * one
 
 
 def test_a_record_with_a_gap_is_judged_by_its_longest_piece_and_says_so(healthy_record, known):
@@ -123,10 +115,8 @@ def test_what_cannot_be_judged_is_refused(healthy_record, known):
         measured_passes([healthy_record], replace(known, line='{"kind": "flexible"}'))
 
 
-def test_the_command(known, tmp_path, monkeypatch):
-    """At full accuracy, which a command has whatever these tests changed."""
-    monkeypatch.setattr(preparing, "NUMERICS", Numerics())
-    record = record_of({"broken_droppers": ((12, 4),)}, seed=2, accuracy="full")
+def test_the_command(known, tmp_path):
+    record = record_of({"broken_droppers": ((12, 4),)}, seed=2)
     write_record(record, tmp_path / "later.csv")
     store(replace(known, notes=("The fit to earlier has not settled.",)), tmp_path / "earlier.safetensors")
     asked = ("--fit", "earlier.safetensors", "--plot", "found.png", "--json")

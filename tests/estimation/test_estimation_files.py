@@ -9,10 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from panto_env import InputError
-from panto_env.base.record_columns import LENGTHS
 from panto_env.cli.estimate import _scores_table
 from panto_env.estimation.estimate import Score, phases
-from panto_env.estimation.motion import FORCES, SHORTEST, SPEEDS, measure, read_motion, write_motion
+from panto_env.estimation.motion import SHORTEST, measure, read_motion, write_motion
 from panto_env.studies.paper2.estimation import OBSERVATIONS, filtered, known_pantograph, settled_scores
 
 from ..command import panto
@@ -63,20 +62,13 @@ def test_the_bar_of_the_estimator(run):
     delays = {}
     for observation in OBSERVATIONS:
         scores = []
-        for seed in range(2):
-            seen = measure(run, seed=seed)
-            force = filtered("random-walk", 0.0, seen, known_pantograph(seed), observation)
-            scores.append(settled_scores(seen, force)[-1])
+        seen = measure(run)
+        force = filtered("random-walk", 0.0, seen, known_pantograph(0), observation)
+        scores.append(settled_scores(seen, force)[-1])
         delays[observation] = 1e3 * np.mean([each.delay for each in scores])
         assert min(each.correlation for each in scores) > (0.97 if "velocities" in observation else 0.94)
     assert 2.0 < delays[OBSERVATIONS[0]] < 3.5
     assert 4.2 < delays[OBSERVATIONS[1]] < 6.0
-
-
-def test_a_motion_survives_its_file(motion, record):
-    again = read_motion(record, lift=120.0, speed=motion.speed, span=60.0)
-    for name in ("head", "frame", "head_velocity", "frame_velocity", "frame_force", "contact_force", "time"):
-        np.testing.assert_allclose(getattr(again, name), getattr(motion, name), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -158,10 +150,6 @@ def test_bad_input_to_the_command_is_one_sentence(change, options, message, reco
     assert sorted(each.name for each in tmp_path.iterdir()) == ["mine.csv"]
 
 
-FACTORS = {"m": 1.0, "mm": 1e-3, "m/s": 1.0, "mm/s": 1e-3, "N": 1.0, "kN": 1e3}
-FACTORS |= dict.fromkeys(("um", "µm", "μm"), 1e-6)
-
-
 def file_of(path, headers, count=SHORTEST):
     rows = [",".join(headers)]
     rows += [
@@ -172,17 +160,29 @@ def file_of(path, headers, count=SHORTEST):
     return path
 
 
-@pytest.mark.parametrize("length", LENGTHS)
-@pytest.mark.parametrize("speed", SPEEDS)
-@pytest.mark.parametrize("force", FORCES)
-def test_each_column_is_read_in_its_unit(tmp_path, length, speed, force):
-    units = {"head": length, "frame": length, "head_velocity": speed, "frame_velocity": speed}
-    units |= dict.fromkeys(("frame_force", "head_force", "contact_force"), force)
-    path = file_of(tmp_path / "m.csv", ["time (s)", *(f"{name} ({unit})" for name, unit in units.items())])
-    motion = read_motion(path, 100.0, speed=70.0, span=60.0)
-    for i, (name, unit) in enumerate(units.items()):
-        expected = FACTORS[unit] * (7 + i + np.arange(SHORTEST))
-        np.testing.assert_allclose(getattr(motion, name), expected, rtol=1e-12)
+UNITS = {  # with the scale of each to SI
+    "usual": {
+        "head": ("m", 1.0),
+        "frame": ("mm", 1e-3),
+        "head_velocity": ("m/s", 1.0),
+        "head_force": ("N", 1.0),
+    },
+    "small": {"head": ("µm", 1e-6), "frame": ("um", 1e-6), "frame_velocity": ("mm/s", 1e-3)},
+    "large": {"head": ("m", 1.0), "frame": ("μm", 1e-6), "frame_force": ("kN", 1e3)},
+}
+
+
+@pytest.mark.parametrize("units", UNITS.values(), ids=UNITS)
+def test_each_column_is_read_in_its_unit(tmp_path, units):
+    headings = [f"{name} ({unit})" for name, (unit, _) in units.items()]
+    motion = read_motion(file_of(tmp_path / "m.csv", ["time (s)", *headings]), 100.0, speed=70.0, span=60.0)
+    for i, (name, (_, scale)) in enumerate(units.items()):
+        np.testing.assert_allclose(getattr(motion, name), scale * (7 + i + np.arange(SHORTEST)), rtol=1e-12)
+    write_motion(motion, tmp_path / "again.csv")
+    again = read_motion(tmp_path / "again.csv", 100.0)
+    for name in ("time", "head", "frame", "head_velocity", "frame_velocity", "frame_force", "head_force"):
+        if (own := getattr(motion, name)) is not None:
+            np.testing.assert_allclose(getattr(again, name), own, rtol=1e-9, atol=1e-12)
     assert motion.time_step == pytest.approx(0.01)
     assert (motion.start, motion.lift, motion.speed, motion.span) == (0.5, 100.0, 70.0, 60.0)
 
@@ -196,7 +196,7 @@ def test_what_is_not_measured_is_none_or_no_force(tmp_path):
         read_motion(file_of(tmp_path / "s.csv", ["time (s)", "head (m)", "frame (m)"], SHORTEST - 1), 100.0)
 
 
-@pytest.mark.parametrize(("seconds", "apart"), [(1.0, 2.0), (3.0, 2 / 3), (4.0, 0.5), (20.0, 0.5)])
+@pytest.mark.parametrize(("seconds", "apart"), [(3.0, 2 / 3), (20.0, 0.5)])
 def test_pieces_of_a_spectrum_are_of_2_s_or_half_of_a_short_record(seconds, apart):
     random, step = np.random.default_rng(0), 0.005
     true = random.normal(0, 1, round(seconds / step))

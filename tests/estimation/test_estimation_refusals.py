@@ -152,18 +152,6 @@ def test_what_not_to_believe_is_said(change, pantograph, reason, motion):
     assert reason is None or any(re.search(reason, each) for each in found.verdict.reasons), found.verdict
 
 
-def test_a_wrong_head_mass_and_a_wrong_lift_cannot_be_seen(motion):
-    """The limits of all tests, which documents and the command's help tell."""
-    heavy = estimate(motion, changed(TRUE, {"masses.1": 10.0}))
-    assert heavy.verdict.believe
-    assert (heavy.force - motion.contact_force)[2000:].std() > 1.05 * (
-        (estimate(motion, TRUE).force - motion.contact_force)[2000:].std()
-    )
-    lifted = estimate(dataclasses.replace(motion, lift=105.0), TRUE)
-    assert lifted.verdict.believe
-    assert (lifted.force - motion.contact_force)[2000:].mean() == pytest.approx(-15, abs=1)
-
-
 def made_up(nis=1.0, window=1.0, correlation=0.0):
     whiteness = Whiteness(correlation, 0.03, 1.0)
     return Consistency(nis, (0.98, 1.02), np.array([1.0, window]), np.arange(2.0), whiteness)
@@ -194,3 +182,15 @@ def test_an_estimate_is_judged_by_the_bounds_that_are_printed(name, found, suspe
             shown = float(test.text)
             assert (shown > high or bool(low and shown < low[0])) is not believed
             assert believed or f"{test.text}, not {bounds}" in judged.reasons[0]
+
+
+def test_a_wrong_head_mass_and_a_wrong_lift_cannot_be_seen(motion):
+    """The limits of all tests, which documents and the command's help tell."""
+    heavy = estimate(motion, changed(TRUE, {"masses.1": 10.0}))
+    assert heavy.verdict.believe
+    assert (heavy.force - motion.contact_force)[2000:].std() > 1.05 * (
+        (estimate(motion, TRUE).force - motion.contact_force)[2000:].std()
+    )
+    lifted = estimate(dataclasses.replace(motion, lift=105.0), TRUE)
+    assert lifted.verdict.believe
+    assert (lifted.force - motion.contact_force)[2000:].mean() == pytest.approx(-15, abs=1)

@@ -118,14 +118,6 @@ def test_an_unknown_input_is_found_whatever_it_does(driven):
     assert np.abs(found - middle)[100:].max() < 0.5
 
 
-def test_an_unknown_input_needs_what_its_settings_observe(driven):
-    motion, pantograph = driven
-    bare = dataclasses.replace(motion, head_velocity=None, frame_velocity=None)
-    unknown_input(bare, pantograph, EstimatorSettings(observation="displacements"))
-    with pytest.raises(InputError, match="no velocities"):
-        unknown_input(bare, pantograph)
-
-
 def test_an_unknown_input_is_that_of_least_squares_over_the_whole_record(driven):
     """Over all starts and all forces of 40 samples at once, without a recursion."""
     motion, pantograph = driven

@@ -160,7 +160,7 @@ def truths_of(found: Fit, seed: int, wrong: str, kind: str) -> dict[str, Any]:
     true = draw((LINE_CONDITIONS["as-built"],), np.random.default_rng(seed), droppers, spans - 1)
     assert true.scatter is not None
     assert true.heights is not None
-    phases = 2 * np.pi * (true.waves[:, 2] + found.before * true.waves[:, 1])
+    phases = 2 * np.pi * (true.waves[:, 2] + found.problem.before * true.waves[:, 1])
     pantograph = wrong_pantograph(seed) if wrong == "pantograph" else design
     return {
         "tensions": np.array(true.tensions) - 1,

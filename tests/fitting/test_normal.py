@@ -40,22 +40,12 @@ def test_values_do_not_hide_noise():
     """With as many values as a quarter of the coefficients, the residual is 13 % smaller than the noise."""
     random, ratios, raw = np.random.default_rng(2), [], []
     noise, prior = np.ones(BANDS), np.full(75, 10.0)
-    for _ in range(20):
+    for _ in range(8):
         jacobian, residual, band, _ = problem(random, 300, np.zeros(75), noise, 75)
         ratios.append(noise_of(UNKNOWN, jacobian, residual, band, prior, np.zeros(75)).mean())
         raw.append((residual - jacobian @ np.linalg.lstsq(jacobian, residual)[0]).std())
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03)
     assert np.mean(raw) == pytest.approx(0.87, abs=0.02)
-
-
-def test_two_parts_have_noise_of_their_own():
-    random = np.random.default_rng(3)
-    jacobian, residual, band, truth = problem(random)
-    second = problem(random, truth=truth, noise=2 * NOISE[::-1])
-    parts = zip((jacobian, residual, band), (*second[:2], BANDS + band), strict=True)
-    both = map(np.concatenate, parts)
-    found = noise_of(np.full((2, BANDS), np.nan), *both, PRIOR, np.zeros(len(PRIOR)))
-    np.testing.assert_allclose(found, [NOISE, 2 * NOISE[::-1]], rtol=0.15)
 
 
 def test_noise_does_not_fall_below_what_grid_and_time_step_leave():

@@ -7,7 +7,7 @@ import pytest
 
 from panto_env.base.errors import InputError
 from panto_env.fitting.fit import Found, slack_droppers
-from panto_env.fitting.values import FREE, TOLERANCES, USUAL, WAVES, Design, Value, Values
+from panto_env.fitting.values import FREE, TOLERANCES, WAVES, Design, Value, Values
 from panto_env.plant.line_condition import LINE_CONDITIONS, LineCondition, draw
 
 SPANS = 14
@@ -94,15 +94,6 @@ def test_waves_are_those_of_a_line_as_built(plan):
     amplitudes, turns, _ = drawn.waves.T
     np.testing.assert_allclose(WAVES, np.stack([1 / turns, amplitudes], axis=1))
     assert everything(plan).variant(np.zeros(len(everything(plan))), 70.0).line.waves.shape == (4, 3)
-
-
-def test_damping_comes_first_of_what_acts_everywhere(plan):
-    """Then few of the differences that are uncertain together change it."""
-    values = Values(plan, USUAL, (0.0, 900.0))
-    order = values.order
-    assert sorted(order) == list(range(len(values)))
-    assert (np.diff(values.begins[order]) >= 0).all()
-    assert sorted(order[:2]) == values.of_kind("damping")
 
 
 def test_damping_never_drives_waves_and_none_stays_none(plan):

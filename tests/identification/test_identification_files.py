@@ -123,22 +123,6 @@ def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "measured",
-    [
-        ["--measured", "k1T=32992", "--measured", "m2=5", "--measured", "k2=14544"],
-        ["--measured", "k1T=32992, m2=5 k2=14544"],
-    ],
-)
-def test_measured_values_in_other_spellings_print_one_table(measured, tmp_path):
-    write_record(clean_record(FREQUENCY_SWEEP, TRUTH, duration=5.0), tmp_path / "short.csv")
-    result = panto("identify", tmp_path / "short.csv", *measured)
-    assert result.returncode == 0, result.stderr
-    assert "condition number" in result.stdout
-    assert "fitting performance" in result.stdout
-    assert "not stable" in result.stdout or "output-error" in result.stdout
-
-
-@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["missing.csv", *MEASURED], "missing.csv could not be read"),

@@ -10,8 +10,10 @@ from panto_env import simulate
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.metrics.by_span import by_span, by_stretch, moving_droppers
+from panto_env.metrics.figures import chosen_spans
 from panto_env.metrics.low_pass import low_pass
-from panto_env.metrics.run_tables import droppers, of_spans, of_stretches
+from panto_env.metrics.run_tables import droppers, of_stretches
+from panto_env.plant.alignment import Alignment
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import droppers_at_rest
 
@@ -64,69 +66,33 @@ def test_each_dropper_has_a_row_with_what_it_is_at_rest(run):
     assert len({row["length"] for row in rows}) > 20  # they are not those of one span
 
 
-def test_the_table_by_spans_names_its_units(run):
-    sheet = of_spans(run, (3, 4))
-    assert list(sheet.columns["span"]) == [3, 4]
-    assert sheet.headings["uplift"] == "maximum uplift at its first support (m)"
-
-
-def test_figures_of_all_spans_follow_from_those_of_each_by_its_length(run):
-    """CF and CL over the distance, as in paper 1 (Eqs 13 and 14); mean and σ over samples of equal time.
-
-    At constant speed samples are equally spaced along the track, so that a span counts by its length. The
-    mean over spans, each counted alike, is another one.
-    """
-    away = (run.alignment.length_at(run.position) > 58) & (run.position % 7.0 < 1.5)  # in the long spans
-    lost = replace(run, contact_force=np.where(away, 0.0, run.contact_force))
-    for each_run in (run, lost):
-        spans = by_span(each_run, (3, 12))
-        length = np.array([each.length for each in spans])
-        share, whole = length / length.sum(), each_run.summary((3, 12))
-        means, deviations = (np.array([getattr(each, name) for each in spans]) for name in ("mean", "std"))
-        assert whole.distance == pytest.approx(length.sum(), abs=2 * each_run.stride)
-        assert share @ means == pytest.approx(whole.mean, abs=0.01)
-        variance = share @ (deviations**2 + (means - whole.mean) ** 2)
-        assert np.sqrt(variance) == pytest.approx(whole.std, rel=1e-3)
-        losses = np.array([each.contact_loss for each in spans])
-        assert share @ losses == pytest.approx(whole.contact_loss, abs=0.02)
-        costs = sum(each_run.summary((k, k)).cost_function for k in range(3, 13))
-        # Eq. 14 has no step from the last sample of a span to the first one of the next.
-        assert costs == pytest.approx(whole.cost_function, rel=10 * each_run.stride / length.sum())
-    assert whole.contact_loss > 3
-    assert abs(losses.mean() - whole.contact_loss) > 0.1  # each span counted alike
-    assert abs(np.sqrt(np.mean(deviations**2 + (means - means.mean()) ** 2)) / whole.std - 1) > 1e-3
-
-
-def test_the_evaluated_spans_end_before_the_line_s_end_is_felt(long_run, run):
-    """Its anchor reflects waves; a line that goes on behind it shows by how much the last spans are off."""
-    shorter, longer = long_run
-    assert shorter.spans() == (10, 22)  # of 30
-    assert longer.spans() == (10, 46)
-    ours, true = (by_span(each, (10, 29)) for each in long_run)
+@pytest.mark.slow
+def test_waves_from_the_line_s_end_change_figures_of_the_spans_that_are_left_out():
+    """A line that goes on behind its end shows by how much the last spans are off."""
+    base = load_catenary("re250")
+    table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    lengths = np.random.default_rng(0).uniform(0.8, 1.0, 54) * base.span_length
+    runs = []
+    for count in (30, 54):
+        spans = [{"span_length": length} for length in lengths[:count].tolist()]
+        line = FlexibleCatenaryData.model_validate(table | {"sequence": spans})
+        runs.append(simulate(line, "dsa380", 250, record_droppers=False))
+    shorter, longer = runs
+    ours, true = (by_span(each, (10, 29)) for each in runs)
     off = np.array([abs(a.max - b.max) / longer.summary().mean for a, b in zip(ours, true, strict=True)])
     assert off[:13].max() < 0.025  # the two lines have grids of their own
     assert off[13:].max() > 0.05
     assert shorter.summary() == shorter.summary((10, 22))
+
+
+def test_the_evaluated_spans_end_before_the_line_s_end_is_felt(run):
+    """Its anchor reflects waves."""
+    assert chosen_spans(None, 1700.0, Alignment.equal(60.0, 30), ends=True) == (10, 22)
     with pytest.warns(AccuracyWarning, match="The line has only 13 spans: in the last 8 its end reflects"):
         assert run.spans() == (10, 12)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert run.spans((10, 12)) == (10, 12)
-
-
-@pytest.fixture(scope="module")
-def long_run():
-    """Runs on a line of 30 spans, and on one that goes on with another 24."""
-    base = load_catenary("re250")
-    table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    lengths = np.random.default_rng(0).uniform(0.8, 1.0, 54) * base.span_length
-    lines = [
-        FlexibleCatenaryData.model_validate(
-            table | {"sequence": [{"span_length": length} for length in lengths[:count].tolist()]}
-        )
-        for count in (30, 54)
-    ]
-    return [simulate(line, "dsa380", 250, record_droppers=False) for line in lines]
 
 
 def test_figures_of_overlaps_and_behind_them_are_those_of_their_places():
@@ -169,15 +135,3 @@ def test_forces_are_those_of_the_evaluated_spans_over_the_whole_evaluated_run():
     assert whole.largest == 500.0
     required = by_key(made_up.compliance((2, 3)))
     assert (required["dropper force"].value, required["slack"].value) == (90.0, pytest.approx(100 * 1 / 20))
-
-
-def test_the_maximum_of_a_real_run_is_that_of_the_requirements():
-    """Of droppers beside a support it is reached while the train is in a span beside theirs."""
-    run = simulate("re250", "dsa250", 200.0)
-    largest = max(each.largest for each in moving_droppers(run))
-    assert largest == by_key(run.compliance())["dropper force"].value
-    train, own = run.alignment.span_of(run.position), run.alignment.span_of(run.dropper_position)
-    evaluated = run.dropper_force[run.inside()]
-    near = (train[:, None] == own)[run.inside()]
-    assert largest == evaluated[:, (own >= 10) & (own <= 19)].max()
-    assert largest > 1.1 * evaluated[near].max(), "the run does not show the difference"

@@ -5,8 +5,6 @@ import pytest
 from panto_env import Trajectory, simulate
 from panto_env.analysis.line_check import check, span_tables
 from panto_env.catalog import load_catenary, load_pantograph
-from panto_env.control.settings import run_settings
-from panto_env.control.task import Task
 from panto_env.fitting.values import Design, Values
 from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
@@ -44,11 +42,6 @@ def test_tables_of_the_line_at_rest(line):
         assert TWELFTH in [cells[0] for cells in table.cells]
 
 
-def test_masts_change_no_force(line, run):
-    bare = line.model_copy(update={"masts": ()})
-    assert (simulate(bare, "dsa380", 200, accuracy="fast").contact_force == run.contact_force).all()
-
-
 def test_files_of_a_run(run):
     for sheet in (of_spans(run, (10, 12)), droppers([run], (10, 12))):
         assert {"M009", "M010", "M011"} == set(sheet.columns["mast"])
@@ -74,6 +67,6 @@ def test_values_of_a_fit(line):
     assert "support 11 (M011, 12+190.0)" in names
 
 
-def test_where_a_run_ended_early(line):
-    task = Task(run_settings({"catenary": line, "pantograph": "dsa380"}), keep_samples=False)
-    assert task.plant.alignment.span_name(12) == TWELFTH
+def test_masts_change_no_force(line, run):
+    bare = line.model_copy(update={"masts": ()})
+    assert (simulate(bare, "dsa380", 200, accuracy="fast").contact_force == run.contact_force).all()

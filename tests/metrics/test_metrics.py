@@ -73,14 +73,6 @@ def test_spans_begin_at_a_support_and_end_before_the_next():
     assert line.within(position, (1, 1)).sum() == 2
 
 
-def test_last_whole_span_takes_nearly_whole_ones_only_where_asked():
-    line = Alignment.equal(60.0, 20)
-    assert line.last_whole_span(539.9) == 8
-    assert line.last_whole_span(540.0) == 9
-    nearly = 540.0 * (1 - 1e-12)
-    assert (line.last_whole_span(nearly), line.last_whole_span(nearly, tolerance=1e-9)) == (8, 9)
-
-
 STEP = 1e-3
 
 

@@ -18,14 +18,6 @@ def run():
     return simulate(distance=180.0)
 
 
-def test_arrays_fit_together(run):
-    n = len(run.time)
-    assert run.position == pytest.approx(run.time * run.speed_kmh / 3.6)
-    assert run.uplift.shape == (n, len(run.support_position))
-    assert run.dropper_force.shape == (n, len(run.dropper_position))
-    assert run.dropper_force.min() >= 0
-
-
 def test_where_there_is_contact_the_head_presses_into_the_wire(run):
     """The strip's spring of 50 kN/m joins force and heights."""
     touching = run.contact_force > 1.0

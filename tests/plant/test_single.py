@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu, spsolve
 
 from panto_baselines.policies.line_model import mean_of_single
 from panto_env import simulate
-from panto_env.analysis.single_check import spans_at_rest
+from panto_env.analysis.line_check import spans_at_rest
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact

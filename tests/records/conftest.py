@@ -8,13 +8,13 @@ from panto_env.records.measured import measured
 @pytest.fixture(scope="session")
 def run():
     """A pass along the reference line at 250 km/h."""
-    return simulate("en50318-2002", "dsa380", 250.0)
+    return simulate("en50318-2002", "dsa380", 250.0, record_droppers=False)
 
 
 @pytest.fixture(scope="session")
 def other_run():
     """A pass along another line, at the same speed."""
-    return simulate("re250", "dsa250", 250.0)
+    return simulate("re250", "dsa250", 250.0, record_droppers=False)
 
 
 @pytest.fixture(scope="session")

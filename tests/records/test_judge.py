@@ -125,15 +125,6 @@ def test_sections_from_overlap_to_overlap(run):
     assert [part.where for part in found.of("section")] == ["0 to 570 m", "570 to 1,200 m"]
 
 
-def test_runs_have_figures_of_their_own():
-    force = 100 + 10 * np.random.default_rng(1).standard_normal(2000)
-    record = Record("a", (steady(60, 4, run="up"), steady(60, 4, force, run="down")))
-    up, down = judge(record).of("run")
-    assert (up.where, down.where) == ("run up", "run down")
-    assert down.figures.mean == pytest.approx(100, abs=0.5)
-    assert up.figures.mean == pytest.approx(120, abs=1.5)
-
-
 def test_losses_of_contact_are_those_of_the_raw_force():
     force = 120 + 30 * np.random.default_rng(0).standard_normal(5000)
     force[1000:1004] = 0.0  # 8 ms

@@ -75,29 +75,43 @@ def test_parquet_has_the_same_columns(columns, written, tmp_path):
     assert piece.run == then.run == "a"
 
 
-def test_an_empty_force_is_a_gap(columns, written):
-    force = columns["force (N)"]
-    force[2000:2003] = np.nan
-    found = read_record(written(columns))
-    assert [len(piece.force) for piece in found.pieces] == [2000, 2997]
-    assert found.pieces[1].start == pytest.approx(2003 * 0.002)
-    assert "The force is missing once, at 1,200.0 m and 4 s; the record is cut there." in found.notes
+def empty(*samples):
+    return lambda columns: columns["force (N)"].put(samples, np.nan)
 
 
-def test_a_pantograph_that_is_down_is_a_gap(columns, written):
+def missing(*samples):
+    return lambda columns: columns.update({name: np.delete(each, samples) for name, each in columns.items()})
+
+
+def down(columns):
     columns["raised"] = np.where((columns["time (s)"] > 3) & (columns["time (s)"] < 4), 0, 1)
+
+
+def stands(columns):
+    behind = np.where(np.arange(5000) > 3000, 0.1 * np.arange(-3000, 2000), 0)
+    columns["position (m)"] = np.minimum(columns["position (m)"], 1200.0) + behind
+
+
+@pytest.mark.parametrize(
+    ("change", "samples", "note"),
+    [
+        (
+            empty(2000, 2001, 2002),
+            [2000, 2997],
+            "The force is missing once, at 1,200.0 m and 4 s; the",
+        ),
+        (empty(2000, 2200), [2000, 2799], "A piece is shorter than 1 s once"),
+        (down, [1501, 3000], "The pantograph is down once"),
+        (missing(1500, 1501, 3000), [1500, 1498, 1999], "Samples are missing 2 times, first at 1,149.9 m"),
+        (stands, [2000, 1999], "The train stands once, at 1,200.0 m"),
+    ],
+)
+def test_gaps_cut_a_record(change, samples, note, columns, written):
+    change(columns)
     found = read_record(written(columns))
-    assert [len(piece.force) for piece in found.pieces] == [1501, 3000]
-    assert any(note.startswith("The pantograph is down once") for note in found.notes)
-
-
-def test_missing_samples_are_gaps(columns, written):
-    kept = np.ones(5000, dtype=bool)
-    kept[[1500, 1501, 3000]] = False
-    found = read_record(written({name: each[kept] for name, each in columns.items()}))
-    assert [len(piece.force) for piece in found.pieces] == [1500, 1498, 1999]
-    (note,) = found.notes
-    assert note.startswith("Samples are missing 2 times, first at 1,149.9 m")
+    assert [len(piece.force) for piece in found.pieces] == samples
+    assert any(each.startswith(note) for each in found.notes)
+    assert found.pieces[-1].time[-1] == pytest.approx(9.998)
 
 
 @pytest.mark.parametrize("jump", [-800.0, 300.0])
@@ -108,14 +122,6 @@ def test_a_reset_of_the_odometer_cuts(columns, written, jump):
     assert "as an odometer that is reset once" in found.notes[0]
 
 
-def test_a_train_that_stands_is_a_gap(columns, written):
-    position = np.minimum(columns["position (m)"], 1200.0)
-    columns["position (m)"] = position + np.where(np.arange(5000) > 3000, 0.1 * np.arange(-3000, 2000), 0)
-    found = read_record(written(columns))
-    assert [len(piece.force) for piece in found.pieces] == [2000, 1999]
-    assert any(note.startswith("The train stands once, at 1,200.0 m") for note in found.notes)
-
-
 def test_positions_in_steps_of_the_odometer_rise_evenly(columns, written):
     true = columns["position (m)"]
     columns["position (m)"] = np.ceil(true - 1e-9)
@@ -123,13 +129,6 @@ def test_positions_in_steps_of_the_odometer_rise_evenly(columns, written):
     assert (np.diff(piece.position) > 0).all()
     assert np.abs(piece.position[20:] - true[20:]).max() < 1.0
     assert piece.speed == pytest.approx(50, rel=2e-3)
-
-
-def test_short_pieces_are_left_out(columns, written):
-    columns["force (N)"][[2000, 2200]] = np.nan
-    found = read_record(written(columns))
-    assert [len(piece.force) for piece in found.pieces] == [2000, 2799]
-    assert any(note.startswith("A piece is shorter than 1 s once") for note in found.notes)
 
 
 def test_several_runs(columns, written):
@@ -162,11 +161,3 @@ def test_a_record_over_place_is_brought_to_equal_steps_of_time(columns, written)
     np.testing.assert_allclose(piece.position, 50 * at + at**2 / 2, atol=1e-3)
     np.testing.assert_allclose(piece.force, 120 + 20 * np.sin(2 * np.pi * 1.5 * at), atol=0.01)
     assert time[-1] - 0.1 < at[-1] < time[-1] + 0.1
-
-
-def test_a_record_over_place_has_gaps_too(written):
-    position = 0.1 * np.r_[0:2000, 2005:5000]
-    force = 120 + 20 * np.sin(position)
-    columns = {"position (m)": position, "speed (m/s)": np.full(4995, 50.0), "force (N)": force}
-    found = read_record(written(columns))
-    assert [len(piece.force) for piece in found.pieces] == [2000, 2995]
