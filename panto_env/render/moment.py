@@ -145,11 +145,12 @@ def train_of(task: Task, lane: int, collector: int) -> TrainView | None:
         return None
     span, positions = plant.alignment.mean_length, [position_of(task, lane, k) for k in range(len(riding))]
     begin, end = positions[-1] - span, positions[0] + AHEAD * span
-    riders = []
-    for number, (pantograph, position) in enumerate(zip(riding, positions, strict=True)):
-        contact = felt(task, lane, (position - begin) / span, number)
-        riders.append(Rider(pantograph.name, position, contact.places, contact.filtered))
-    return TrainView(tuple(riders), collector, plant.model.view(lane, begin, end))
+    felt_by = [felt(task, lane, (position - begin) / span, k) for k, position in enumerate(positions)]
+    riders = tuple(
+        Rider(pantograph.name, position, contact.places, contact.filtered)
+        for pantograph, position, contact in zip(riding, positions, felt_by, strict=True)
+    )
+    return TrainView(riders, collector, plant.model.view(lane, begin, end))
 
 
 TITLE, CHART, ROOF = 0.075, 0.30, 0.045

@@ -31,6 +31,7 @@ from ..pages import DOCS
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 HOSTILE = "<script>alert(1)</script>"
+SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +174,7 @@ def test_a_browser_shows_the_values(file, found, tmp_path):
 
 
 def test_several_runs_stand_side_by_side(run, file, tmp_path):
-    slow = simulate("en50318-2002", speed_kmh=250.0)
+    slow = replace(run, speed=250 / 3.6, contact_force=0.9 * run.contact_force)
     slow.save(tmp_path / "slow.parquet")
     result = CliRunner().invoke(make_app(), ["report", str(tmp_path / "slow.parquet"), str(file)])
     assert result.exit_code == 0, result.output
@@ -186,7 +187,9 @@ def test_several_runs_stand_side_by_side(run, file, tmp_path):
 
 def test_the_report_is_of_the_line_that_was_run_whatever_its_file_says_now(tmp_path):
     source = (DOCS.parent / "panto_env/catalog/catenaries/en50318-2002.toml").read_text(encoding="utf-8")
-    without_wires = page([Findings(simulate("periodic-stiffness", "three-mass", 200.0), "run.parquet")])
+    without_wires = page(
+        [Findings(simulate("periodic-stiffness", "three-mass", 200.0, distance=200.0), "run.parquet")]
+    )
     assert "mean_stiffness" in without_wires
     assert "Elasticity" not in without_wires
     mine = tmp_path / "mine.toml"
@@ -237,7 +240,6 @@ def test_runs_that_share_a_name_stay_apart(run):
     assert values == ["60.0", "61.0"]
 
 
-SHORT = {"catenary": "periodic-stiffness", "pantograph": "three-mass", "speed_kmh": 200.0}
 CHARTS = ("force_along", "force_folded", "spectrum", "uplifts", "stiffness")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from ...plant.catenary.schema import CatenaryData
 from ...records.plots import save_page
 from ...report.charts import svg_of
 from ...terminal import number
+from ..study import Figure, legend_below
 from .scan import PASSIVE, Scan, verified
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NOTES = (
     "A speed is permissible where all passes at it, and at all lower speeds of the scan, keep every "
@@ -37,30 +35,16 @@ def answers_table(scan: Scan, again: Scan | None = None) -> Table:
     rows: list[tuple[str | float, ...]] = []
     for policy in scan.policies:
         found, acts = scan.answer(policy), policy != PASSIVE
-        limits = [found.limit] if again is None else [found.limit, again.limit(policy)]
-        lowest = found.limit if again is None else verified(scan, again, policy)
-        rows.append(
-            (
-                policy,
-                _speed(lowest),
-                *([" and ".join(map(_speed, limits))] if again is not None else []),
-                _speed(found.with_waves),
-                _speed(found.fallback) if acts else "",
-                f"{number(found.rms)} / {number(found.peak, 0)}" if acts else "",
-                number(found.watts) if acts else "",
-            )
-        )
-    both = () if again is None else ("of both scans",)
-    headings = (
-        "policy",
-        "permissible (km/h)",
-        *both,
-        "with v/c ≤ 0.7",
-        "if control fails",
-        "rms / peak (N)",
-        "W",
-    )
-    return Table("Permissible speeds", headings, rows)
+        limits = [_speed(found.limit)]
+        if again is not None:
+            both = " and ".join(_speed(each) for each in (found.limit, again.limit(policy)))
+            limits = [_speed(verified(scan, again, policy)), both]
+        limits += [_speed(found.with_waves), _speed(found.fallback) if acts else ""]
+        force = f"{number(found.rms)} / {number(found.peak, 0)}" if acts else ""
+        rows.append((policy, *limits, force, number(found.watts) if acts else ""))
+    headings = ("policy", "permissible (km/h)", *(() if again is None else ("of both scans",)))
+    others = ("with v/c ≤ 0.7", "if control fails", "rms / peak (N)", "W")
+    return Table("Permissible speeds", (*headings, *others), rows)
 
 
 def reasons(scan: Scan) -> list[str]:
@@ -72,9 +56,8 @@ def reasons(scan: Scan) -> list[str]:
         if not math.isnan(found.beyond):
             words += f"; forbidden at {found.beyond:g} by {found.reason}"
         if found.tightest:
-            words += (
-                f"; nearest to its limit at {found.limit:g}: {found.tightest}, by {number(found.margin)} %"
-            )
+            near = f"; nearest to its limit at {found.limit:g}: {found.tightest}"
+            words += f"{near}, by {number(found.margin)} %"
         sentences.append(f"{words}.")
     return sentences
 
@@ -116,10 +99,8 @@ def plot_scan(scan: Scan, line: CatenaryData) -> Figure:
         axis.grid(color="0.92")
     axes[-1].set(xlabel="speed (km/h)")
     seeds = len({each.seed for each in scan.passes})
-    title = f"{line.name}: the worst pantograph of each pass, median and range of {seeds} seeds"
-    figure.suptitle(title)
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize="small")
+    figure.suptitle(f"{line.name}: the worst pantograph of each pass, median and range of {seeds} seeds")
+    legend_below(figure, 3)
     return figure
 
 

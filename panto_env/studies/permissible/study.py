@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,12 +15,9 @@ from ...base.table import Table
 from ...catalog import load_catenary
 from ...metrics.compliance import WAVE_SHARE
 from ...plant.catenary.flexible import FlexibleCatenaryData
-from ..study import Outcome, Report
+from ..study import Figure, Outcome, Report, legend_below
 from .scan import PASSIVE, VERIFIED_FROM, Scan, bands_of, scan, verified
 from .shown import in_words
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Case(NamedTuple):
@@ -31,24 +29,25 @@ class Case(NamedTuple):
 
 
 STEP = 20.0
-CASES = (
-    Case("en50318-2002", "dsa380", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("benchmark-2015", "dsa380", np.arange(180.0, 341.0, STEP).tolist()),
-    Case("ln2", "dsa250", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("re250", "dsa380", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("re330", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
-    Case("shinkansen-simple", "dsa380", np.arange(220.0, 381.0, STEP).tolist()),
-    Case("beijing-shanghai", "dsa380", np.arange(220.0, 401.0, STEP).tolist()),
-    Case("beijing-tianjin", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
-    Case("re330-stitched", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
+CASES = tuple(
+    Case(line, pantograph, np.arange(first, last + 1, STEP).tolist())
+    for line, pantograph, first, last in (
+        ("en50318-2002", "dsa380", 180.0, 320.0),
+        ("benchmark-2015", "dsa380", 180.0, 340.0),
+        ("ln2", "dsa250", 180.0, 320.0),
+        ("re250", "dsa380", 180.0, 320.0),
+        ("re330", "dsa380", 220.0, 420.0),
+        ("shinkansen-simple", "dsa380", 220.0, 380.0),
+        ("beijing-shanghai", "dsa380", 220.0, 400.0),
+        ("beijing-tianjin", "dsa380", 220.0, 420.0),
+        ("re330-stitched", "dsa380", 220.0, 420.0),
+    )
 )
 DISTANCES: tuple[float | None, ...] = (None, 100.0, 200.0, 300.0)
 """Distances of two pantographs (m); none for one alone."""
 POLICIES = ("pd:washout=1", "fb+ff:gain=0.3,washout=1", "repetitive", "agent-any-pantograph")
-SEEDS = 3
-"""Lines as built for each speed, and as many others for the verification."""
-SHOWN = 200.0
-"""Distance of the picture (m)."""
+SEEDS = 3  # lines as built for each speed, and as many others for the verification
+SHOWN = 200.0  # distance of the picture (m)
 
 
 class Found(NamedTuple):
@@ -105,11 +104,7 @@ def outcome_of(found: Sequence[Found]) -> Outcome:
     return Outcome(
         title="Permissible speeds with control and without",
         comparisons=(),
-        tables=(
-            *(limits_table(found, distance) for distance in DISTANCES),
-            gains_table(found),
-            fell_table(found),
-        ),
+        tables=(*(limits_table(found, each) for each in DISTANCES), gains_table(found), fell_table(found)),
         plots={"permissible-speeds": plot_bands([one for one in found if one.distance == SHOWN])},
         numbers={"cases": [as_dict(one) for one in found]},
         rows={"permissible-speeds": [row for one in found for row in rows_of(one)]},
@@ -122,13 +117,7 @@ def scanned(case: Case, distance: float | None) -> Found:
     train = {"pantographs": [case.pantograph] * 2, "distances": [distance]}
     riding: dict[str, Any] = {"pantograph": case.pantograph} if distance is None else train
     first, again = (
-        scan(
-            case.speeds_kmh,
-            POLICIES,
-            seeds=range(begin, begin + SEEDS),
-            catenary=case.line,
-            **riding,
-        )
+        scan(case.speeds_kmh, POLICIES, seeds=range(begin, begin + SEEDS), catenary=case.line, **riding)
         for begin in (0, VERIFIED_FROM)
     )
     return Found(case, distance, first, again)
@@ -171,30 +160,22 @@ def rows_of(one: Found) -> list[dict[str, Any]]:
 def limits_table(found: Sequence[Found], distance: float | None) -> Table:
     """Permissible speed on each line, without control, if control fails, and with each policy."""
     rows = []
-    for one in found:
-        if one.distance != distance:
-            continue
-        waves = _wave_limit(one.case.line)
+    for one in [one for one in found if one.distance == distance]:
         best = max(POLICIES, key=lambda policy: (_or_zero(one.limit(policy)), policy))
         fallback = verified(one.first, one.again, best, failing=True)
-        rows.append(
-            (
-                one.case.line,
-                one.case.pantograph,
-                f"{waves:.0f}",
-                *(_speed(one, policy) for policy in (PASSIVE, *POLICIES)),
-                "none" if math.isnan(fallback) else f"{fallback:g}",
-            )
-        )
+        limits = [_speed(one, policy) for policy in (PASSIVE, *POLICIES)]
+        limits.append("none" if math.isnan(fallback) else f"{fallback:g}")
+        rows.append((one.case.line, one.case.pantograph, f"{wave_limit(one.case.line):.0f}", *limits))
     headings = ("line", "pantograph", "0.7 c", PASSIVE, *POLICIES, "if the best fails")
     return Table(f"Permissible speeds (km/h): {where(distance)}", headings, rows, text_columns=2)
 
 
-def _wave_limit(name: str) -> float:
-    """Speed at ``WAVE_SHARE`` of the wave speed (km/h)."""
+def wave_limit(name: str, tension: float | None = None) -> float:
+    """Speed (km/h) at ``WAVE_SHARE`` of a contact wire's wave speed; tension: another than its own (N)."""
     line = load_catenary(name)
     assert isinstance(line, FlexibleCatenaryData)
-    return WAVE_SHARE * to_kmh(line.contact_wire.wave_speed)
+    wire = line.contact_wire if tension is None else line.contact_wire.model_copy(update={"tension": tension})
+    return WAVE_SHARE * to_kmh(wire.wave_speed)
 
 
 def _or_zero(value: float) -> float:
@@ -215,21 +196,12 @@ def gains_table(found: Sequence[Found]) -> Table:
     Gains are lower bounds where a policy keeps all up to the last speed of the scan.
     """
     rows = []
-    for distance in DISTANCES:
+    for distance, policy in product(DISTANCES, POLICIES):
         own = [one for one in found if one.distance == distance]
-        for policy in POLICIES:
-            gains = [one.gain(policy) for one in own]
-            std = [one.reduction(policy) for one in own]
-            rows.append(
-                (
-                    where(distance),
-                    policy,
-                    f"{np.median(gains):+.0f}",
-                    f"{min(gains):+.0f} to {max(gains):+.0f}",
-                    f"{-np.median(std):+.0f}",
-                    f"{-max(std):+.0f} to {-min(std):+.0f}",
-                )
-            )
+        gains, std = [one.gain(policy) for one in own], [one.reduction(policy) for one in own]
+        medians = f"{np.median(gains):+.0f}", f"{-np.median(std):+.0f}"
+        ranges = f"{min(gains):+.0f} to {max(gains):+.0f}", f"{-max(std):+.0f} to {-min(std):+.0f}"
+        rows.append((where(distance), policy, medians[0], ranges[0], medians[1], ranges[1]))
     ends = tuple(len(POLICIES) * (k + 1) - 1 for k in range(len(DISTANCES)))
     headings = ("train", "policy", "gain, median (km/h)", "range", "σ/F_m, median (%)", "range of lines")
     return Table("Gain over passive, over the lines", headings, rows, text_columns=2, section_ends=ends)
@@ -256,23 +228,17 @@ def plot_bands(found: Sequence[Found]) -> Figure:
         for j, policy in enumerate(names):
             place = k + 0.8 * (j + 0.5) / len(names) - 0.4
             kept = speeds[one.kept(policy)]
-            axis.barh(
-                np.full(kept.size, place),
-                np.full(kept.size, STEP),
-                0.7 / len(names),
-                kept - STEP / 2,
-                color="0.45" if policy == PASSIVE else series_colour(j - 1),
-                label=policy if k == 0 else None,
-            )
-        waves = _wave_limit(one.case.line)
-        axis.plot([waves] * 2, [k - 0.42, k + 0.42], color=LIMIT, linewidth=0.9)
+            colour = "0.45" if policy == PASSIVE else series_colour(j - 1)
+            bars = np.full(kept.size, place), np.full(kept.size, STEP), 0.7 / len(names), kept - STEP / 2
+            axis.barh(*bars, color=colour, label=policy if k == 0 else None)
+        axis.plot([wave_limit(one.case.line)] * 2, [k - 0.42, k + 0.42], color=LIMIT, linewidth=0.9)
     axis.set(xlabel="speed (km/h); black: 0.7 of the wave speed", ylim=(len(found) - 0.5, -0.5))
     axis.set_yticks(range(len(found)), [one.case.line for one in found])
     axis.set_xlim(min(one.first.speeds_kmh[0] for one in found) - STEP)
     axis.grid(axis="x", color="0.92")
     axis.set_axisbelow(True)
     figure.suptitle(f"Speeds at which all requirements are kept: {where(found[0].distance)}")
-    figure.legend(loc="outside lower center", ncols=3, fontsize="small")
+    legend_below(figure, 3)
     return figure
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,14 +35,11 @@ CASES = Case("en50318-2002", "en50318-2002"), Case("beijing-tianjin", "dsa380")
 SPEEDS_KMH = (200.0, 250.0, 300.0)
 DISTANCES = tuple(np.arange(35.0, 400.1, 2.5).tolist())
 """Distances (m): droppers are 6 to 7 m apart, and steps of 5 m would not show what they do."""
-FIGURES = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
-"""Figures that the study keeps."""
-WATCHED = range(10, 16)
-"""Spans in whose middle the wire is watched after a pantograph alone has passed."""
+FIGURES = ("mean", "std", "max", "min", "contact_loss", "max_uplift")  # figures that the study keeps
+WATCHED = range(10, 16)  # spans in whose middle the wire is watched after a pantograph alone has passed
 AFTERWARDS = 7.0
 """Time (s) for which it is watched: a second one, 400 m behind at 200 km/h, comes after this time."""
-INTERVAL = 0.01
-"""Time (s) between two looks at it."""
+INTERVAL = 0.01  # time (s) between two looks at it
 
 
 @dataclass(frozen=True)
@@ -66,22 +63,12 @@ class Wake(NamedTuple):
 
 def curves(case: Case, distances: Sequence[float] = DISTANCES) -> tuple[list[Curve], list[Row]]:
     """Curves of a line at all speeds, and all rows of the sweep behind them."""
-    rows = sweep(
-        {"speed_kmh": SPEEDS_KMH, "distances": distances},
-        catenary=case.line,
-        pantographs=[case.pantograph] * 2,
-    )
+    swept = {"speed_kmh": SPEEDS_KMH, "distances": distances}
+    rows = sweep(swept, catenary=case.line, pantographs=[case.pantograph] * 2)
     found = []
     for speed in SPEEDS_KMH:
-        first, second = (
-            {
-                key: np.array(
-                    [row[key] for row in rows if (row["speed_kmh"], row[NUMBER]) == (speed, number)]
-                )
-                for key in FIGURES
-            }
-            for number in (1, 2)
-        )
+        both = [[row for row in rows if (row["speed_kmh"], row[NUMBER]) == (speed, k)] for k in (1, 2)]
+        first, second = ({key: np.array([row[key] for row in own]) for key in FIGURES} for own in both)
         found.append(Curve(case, speed, np.array(distances, dtype=float), first, second))
     return found, rows
 
@@ -104,23 +91,11 @@ def wake(case: Case, speed_kmh: float) -> Wake:
     # watched far behind the pantograph. The line goes on until the last place has been watched.
     end = float(middles[-1]) + AFTERWARDS * speed
     spans = int(np.ceil(line.alignment().in_spans(end))) + 3
-    simulate(
-        case.line,
-        case.pantograph,
-        speed_kmh,
-        policy="passive",
-        watch=watch,
-        record_droppers=False,
-        spans=spans,
-        distance=end,
-        window=0.0,
-    )
+    given: dict[str, Any] = {"spans": spans, "distance": end, "window": 0.0, "record_droppers": False}
+    simulate(case.line, case.pantograph, speed_kmh, policy="passive", watch=watch, **given)
     time = np.arange(0.0, AFTERWARDS - INTERVAL, INTERVAL)
-    each = [
-        np.interp(middle / speed + time, times, height)
-        for middle, height in zip(middles, np.array(heights).T, strict=True)
-    ]
-    height = np.mean(each, axis=0)
+    pairs = zip(middles, np.array(heights).T, strict=True)
+    height = np.mean([np.interp(middle / speed + time, times, own) for middle, own in pairs], axis=0)
     return Wake(time, height, np.gradient(height, INTERVAL))
 
 
@@ -132,12 +107,9 @@ THEORIES = {
     "measured": "wire after one pantograph, its strongest frequency",
 }
 """Where a frequency is from, by key."""
-BEST = "best"
-"""Key of the frequency that fits a curve best."""
-SCANNED = np.linspace(0.4, 3.0, 1301)
-"""Frequencies (Hz) among which the best one is looked for."""
-BEGIN = 0.3
-"""Time (s) after a pantograph from which the wire swings freely."""
+BEST = "best"  # key of the frequency that fits a curve best
+SCANNED = np.linspace(0.4, 3.0, 1301)  # frequencies (Hz) among which the best one is looked for
+BEGIN = 0.3  # time (s) after a pantograph from which the wire swings freely
 PADDED = 16
 """Factor by which a motion is padded with zeros, to find its strongest frequency between two of its own."""
 
@@ -154,14 +126,15 @@ class Fit(NamedTuple):
 def frequencies(case: Case, speed_kmh: float, after: Wake) -> dict[str, float]:
     """Frequencies of ``THEORIES`` (Hz)."""
     line = load_catenary(case.line)
-    length, per_span = line.alignment().mean_length, from_kmh(speed_kmh) / line.alignment().mean_length
+    length = line.alignment().mean_length
+    per_span = from_kmh(speed_kmh) / length
     wires = [getattr(line, name) for name in ("contact_wire", "messenger_wire")]
-    tensions, masses = [wire.tension for wire in wires], [wire.mass for wire in wires]
+    together = math.sqrt(sum(wire.tension for wire in wires) / sum(wire.mass for wire in wires))
     return {
         "span": per_span,
         "half_span": 2 * per_span,
         "contact_wire": wires[0].wave_speed / (2 * length),
-        "both_wires": math.sqrt(sum(tensions) / sum(masses)) / (2 * length),
+        "both_wires": together / (2 * length),
         "measured": strongest(after),
     }
 

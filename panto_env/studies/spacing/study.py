@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,19 +12,13 @@ from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, panels, series_colou
 from ...base.table import Table
 from ...catalog import load_catenary
 from ...metrics.compliance import STD_OF_MEAN
-from ..study import Cell, Comparison, Outcome, Report, said, tabled
+from ..study import Comparison, Figure, Outcome, Report, legend_below, said, tabled
 from . import passes
 from .passes import BEST, THEORIES, Case, Curve, at_arrival, curves, fits
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-EVERY = 10.0
-"""Distance (m) between two rows that are printed; the CSV has all."""
-FAR = 100.0
-"""Distance (m) from which the second is said to hardly touch the first."""
-CLOSE = 0.05
-"""Relative difference within which a finite-element model's σ over spans 4 to 11 should lie."""
+EVERY = 10.0  # distance (m) between two rows that are printed; the CSV has all
+FAR = 100.0  # distance (m) from which the second is said to hardly touch the first
+CLOSE = 0.05  # relative difference within which a finite-element model's σ over spans 4 to 11 should lie
 KEPT = ("distances", "speed_kmh", "catenary", "pantograph_number", "pantograph", "spans", "mean", "std",
         "max", "min", "contact_loss", "max_uplift")  # fmt: skip
 """Columns of the CSV."""
@@ -38,32 +32,29 @@ def run(report: Report) -> Outcome:
         report(case.line, 0.4 * k)
         by_case[case], own = curves(case)
         rows += [{key: row[key] for key in KEPT} for row in own]
-    found, arrivals = [], []
+    found: list[tuple[Curve, Found]] = []
+    arrivals = []
     for k, curve in enumerate(curve for each in by_case.values() for curve in each):
         report("the wire behind one pantograph", 0.8 + 0.03 * k)
         after = passes.wake(curve.case, curve.speed_kmh)
         found.append((curve, fits(curve, after)))
         arrivals.append((curve, at_arrival(curve, after)))
-    measured = {(curve.case, curve.speed_kmh): each["measured"] for curve, each in found}
     report("plots", 0.98)
+    plain = [
+        {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
+        | {key: each._asdict() for key, each in own.items()}
+        for (curve, own), (_, arrival) in zip(found, arrivals, strict=True)
+    ]
     return Outcome(
         title="Two pantographs: ours beside others",
         comparisons=tuple(_comparisons(by_case, arrivals)),
-        tables=(
-            *(distances_table(each) for each in by_case.values()),
-            extremes_table(arrivals),
-            theories_table(found),
-        ),
-        plots={"spacing-sigma": plot_std(by_case, measured), "spacing-uplift": plot_uplift(by_case)},
+        tables=(*map(distances_table, by_case.values()), extremes_table(arrivals), theories_table(found)),
+        plots={"spacing-sigma": plot_std(by_case, found), "spacing-uplift": plot_uplift(by_case)},
         numbers={
             "distances_m": list(passes.DISTANCES),
             "speeds_kmh": list(passes.SPEEDS_KMH),
             "mean_correlation": means(found),
-            "fits": [
-                {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
-                | {key: each._asdict() for key, each in own.items()}
-                for (curve, own), (_, arrival) in zip(found, arrivals, strict=True)
-            ],
+            "fits": plain,
         },
         rows={"spacing": rows},
         verdict=verdict(found),
@@ -73,28 +64,18 @@ def run(report: Report) -> Outcome:
 def distances_table(curves: Sequence[Curve]) -> Table:
     """σ, loss of contact and uplift of the second, and σ of the first, of one line at all speeds."""
     first = curves[0]
-
-    def cell(curve: Curve, whose: str, key: str, digits: int, scale: float) -> Cell:
-        return lambda k: f"{scale * getattr(curve, whose)[key][k]:.{digits}f}"
-
-    return tabled(
-        f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)",
-        (
-            ("distance (m)", lambda k: f"{first.distances[k]:g}"),
-            *(
-                (f"{name}, {curve.speed_kmh:g}", cell(curve, whose, key, digits, scale))
-                for name, whose, key, digits, scale in (
-                    ("σ (N)", "second", "std", 1, 1.0),
-                    ("σ of the first (N)", "first", "std", 1, 1.0),
-                    ("CL (%)", "second", "contact_loss", 2, 1.0),
-                    ("uplift (mm)", "second", "max_uplift", 1, 1e3),
-                )
-                for curve in curves
-            ),
-        ),
-        np.flatnonzero((first.distances - first.distances[0]) % EVERY < 1e-9).tolist(),
-        text_columns=0,
-    )
+    rows = []
+    for k in np.flatnonzero((first.distances - first.distances[0]) % EVERY < 1e-9):
+        cells = [f"{first.distances[k]:g}"]
+        cells += [f"{curve.second['std'][k]:.1f}" for curve in curves]
+        cells += [f"{curve.first['std'][k]:.1f}" for curve in curves]
+        cells += [f"{curve.second['contact_loss'][k]:.2f}" for curve in curves]
+        cells += [f"{1e3 * curve.second['max_uplift'][k]:.1f}" for curve in curves]
+        rows.append(tuple(cells))
+    names = ("σ (N)", "σ of the first (N)", "CL (%)", "uplift (mm)")
+    headings = (f"{name}, {curve.speed_kmh:g}" for name in names for curve in curves)
+    title = f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)"
+    return Table(title, ("distance (m)", *headings), rows, text_columns=0)
 
 
 def extremes_table(found: Sequence[tuple[Curve, Mapping[str, float]]]) -> Table:
@@ -177,13 +158,8 @@ def _comparisons(
         ("first", 250.0, 200.0, 26.9),
         ("second", 300.0, 200.0, 51.6),
     ):
-        names: dict[str, Any] = {
-            "whose": f"{whose}'s",
-            "distance": distance,
-            "speed": speed,
-            "judged": judged,
-        }
-        names |= {"low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
+        names: dict[str, Any] = {"whose": f"{whose}'s", "distance": distance, "speed": speed}
+        names |= {"judged": judged, "low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
         yield said("spacing-std", std(speed, distance, whose=whose), **names)
     ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in passes.SPEEDS_KMH}
     other = ", ".join(f"{ratios[speed]:.2f} at {speed:g}" for speed in (200.0, 300.0))
@@ -198,43 +174,35 @@ def _comparisons(
     yield said("spacing-arrival", float(np.mean(velocities)), low=low, high=high)
 
 
-def plot_std(curves: Mapping[Case, Sequence[Curve]], fits: Mapping[tuple[Case, float], passes.Fit]) -> Figure:
-    """σ over the distance, a column for each line and a row for each speed.
-
-    fits: of the frequency measured behind one pantograph, by line and speed.
-    """
-    count = len(next(iter(curves.values())))  # of speeds
-    figure, axes = panels(
-        (14, 2.9 * count + 0.8), count, len(curves), sharex=True, sharey="col", squeeze=False
-    )
+def plot_std(curves: Mapping[Case, Sequence[Curve]], found: Sequence[tuple[Curve, Found]]) -> Figure:
+    """σ over the distance, a column for each line and a row for each speed; found: fits of all curves."""
+    fits, count = {id(curve): own["measured"] for curve, own in found}, len(next(iter(curves.values())))
+    size = 14, 2.9 * count + 0.8
+    figure, axes = panels(size, count, len(curves), sharex=True, sharey="col", squeeze=False)
     for column, (case, of_line) in zip(axes.T, curves.items(), strict=True):
         length = load_catenary(case.line).alignment().mean_length
         for axis, curve in zip(column, of_line, strict=True):
-            best, distances = fits[case, curve.speed_kmh], curve.distances
+            best, distances = fits[id(curve)], curve.distances
             axis.plot(distances, curve.second["std"], color=VERMILION, label="second pantograph")
             axis.plot(distances, curve.first["std"], color=BLUE, label="first pantograph")
             period = from_kmh(curve.speed_kmh) / best.frequency
-            swing = _wave(curve, best)
-            axis.plot(
-                distances, swing, "--", color=GREEN, linewidth=1.6,
-                label="period v / f of the wire's own swing behind one pantograph, fitted height and phase",
-            )  # fmt: skip
+            cosine = np.cos(2 * np.pi * (best.frequency * distances / from_kmh(curve.speed_kmh) - best.phase))
+            slope, mean = np.polyfit(cosine, curve.second["std"], 1)
+            label = "period v / f of the wire's own swing behind one pantograph, fitted height and phase"
+            axis.plot(distances, mean + slope * cosine, "--", color=GREEN, linewidth=1.6, label=label)
             limit = STD_OF_MEAN * float(np.median(curve.second["mean"]))
             axis.axhline(limit, color=LIMIT, linestyle=":", linewidth=1.0, label="EN 50367: 0.3 of the mean")
             for k in range(1, int(distances[-1] / length) + 1):
-                label = "whole spans" if k == 1 else None
-                axis.axvline(k * length, color="0.82", linewidth=0.9, zorder=0, label=label)
+                name = "whole spans" if k == 1 else None
+                axis.axvline(k * length, color="0.82", linewidth=0.9, zorder=0, label=name)
             words = f"{curve.speed_kmh:g} km/h: f = {best.frequency:.2f} Hz, v / f = {period:.0f} m"
-            axis.set_title(f"{words}, R = {best.correlation:.2f}", fontsize="medium", loc="left")
+            above = f"{case.pantograph} twice on {case.line}\n" if axis is column[0] else ""
+            title = f"{above}{words}, R = {best.correlation:.2f}"
+            axis.set_title(title, fontsize="medium", loc="left")
             axis.set(ylabel="σ (N)", xlim=(distances[0], distances[-1]))
         column[0].set_ylim(0, 1.05 * max(float(curve.second["std"].max()) for curve in of_line))
-        column[0].set_title(
-            f"{case.pantograph} twice on {case.line}\n{column[0].get_title(loc='left')}", loc="left",
-            fontsize="medium",
-        )  # fmt: skip
         column[-1].set(xlabel="distance between the pantographs (m)")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="medium")
+    legend_below(figure, 3, "medium")
     return figure
 
 
@@ -254,14 +222,5 @@ def plot_uplift(curves: Mapping[Case, Sequence[Curve]]) -> Figure:
             axis.grid(color="0.9")
     for row in axes:  # now: all of a row have one scale
         row[0].set_ylim(bottom=0)
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="medium"
-    )
+    legend_below(figure, 3, "medium")
     return figure
-
-
-def _wave(curve: Curve, best: passes.Fit) -> np.ndarray:
-    """The cosine of a fit, with the height and the mean that fit σ, (n,)."""
-    angle = 2 * np.pi * (best.frequency * curve.distances / from_kmh(curve.speed_kmh) - best.phase)
-    slope, mean = np.polyfit(np.cos(angle), curve.second["std"], 1)
-    return np.asarray(mean + slope * np.cos(angle))
