@@ -18,7 +18,7 @@ from ..control.identity import plain
 from ..control.settings import run_settings
 from ..studies.permissible import USUAL, Scan, scan
 from ..studies.permissible.scan import VERIFIED_FROM
-from ..studies.permissible.shown import NOTES, answers_table, plot_scan, reasons, write_page
+from ..studies.permissible.study import NOTES, answers_table, plot_scan, reasons, write_page
 from ..terminal import Json, Plot, console, counting, into_file, print_json, print_table, written_last
 
 

@@ -31,12 +31,10 @@ from .canvas import (
 )
 from .moment import AHEAD, BEHIND, TITLE, Layout, Moment, force_axis, lost
 
-SHARE = 0.24
-"""Share of a frame's height that the strip of a train has."""
+SHARE = 0.24  # share of a frame's height that the strip of a train has
 NAMES, WIRE, ROOF, CHART = 0.11, 0.20, 0.42, 0.47
 """Shares of the strip's height: middle of the names, the wire, the roof, top of the chart."""
-LIFT, RISE = 0.05, 0.06
-"""Height (m) that the wire is shown to rise by this share of the strip's height."""
+LIFT, RISE = 0.05, 0.06  # height (m) that the wire is shown to rise by this share of the strip's height
 
 
 def draw_train(canvas: Canvas, moment: Moment, top: float, size: float, margin: float, axis: float) -> None:
@@ -119,8 +117,7 @@ def _dots(canvas: Canvas, x: float, top: float, bottom: float, apart: float, lon
 
 STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
 """Possible distances of the lines of the chart (N), and how many there are at most."""
-NEAREST = 4
-"""Minimum distance of the points of a wire (px)."""
+NEAREST = 4  # minimum distance of the points of a wire (px)
 
 
 class Picture:

@@ -76,7 +76,8 @@ class Outcome:
 Study = Callable[[Report], Outcome]
 """A study of one part of a paper: run it, on all cores where it takes long."""
 Cell = str | Callable[[Any], str | float]  # of an entry: a format such as "{.std:.2f}", or a function
-Columns = Sequence[tuple[str, Cell]]  # headings, and the cells under them
+Columns = Sequence[str | tuple[str, Cell]]
+"""Headings and the cells under them; a text has several columns, as "line: {.line} | km/h: {.speed:g}"."""
 
 
 @cache
@@ -96,9 +97,17 @@ def said(key: str, ours: float, **names: Any) -> Comparison:
     return Comparison(quantity, unit, ours, *others)
 
 
-def row(columns: Columns, entry: Any) -> tuple[str | float, ...]:
-    """The cells of an entry."""
-    return tuple(cell.format(entry) if isinstance(cell, str) else cell(entry) for _, cell in columns)
+def columns_of(columns: Columns) -> list[tuple[str, Cell]]:
+    """Heading and cell of each column."""
+    found: list[tuple[str, Cell]] = []
+    for each in columns:
+        if isinstance(each, str):
+            found += [
+                (heading, cell) for heading, _, cell in (text.partition(": ") for text in each.split(" | "))
+            ]
+        else:
+            found.append(each)
+    return found
 
 
 def tabled(
@@ -109,10 +118,14 @@ def tabled(
     section: Callable[[Any], Any] | None = None,
 ) -> Table:
     """A row for each entry, columns by heading, and a line after entries that ``section`` groups together."""
-    rows = [row(columns, each) for each in entries]
+    headings, cells = zip(*columns_of(columns), strict=True)
+    rows = [
+        tuple(cell.format(each) if isinstance(cell, str) else cell(each) for cell in cells)
+        for each in entries
+    ]
     groups = [*map(section, entries)] if section else []
     ends = tuple(k for k, group in enumerate(groups) if groups[k + 1 : k + 2] != [group])
-    return Table(title, tuple(heading for heading, _ in columns), rows, text_columns, ends)
+    return Table(title, headings, rows, text_columns, ends)
 
 
 def over(report: Report, what: str, begin: float, end: float) -> Callable[[int, int], None]:

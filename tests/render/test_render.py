@@ -76,15 +76,6 @@ def test_the_wire_that_is_drawn_is_the_one_that_the_pantograph_touches(name):
     assert np.all(np.diff(view.x) > 0)
 
 
-def test_the_messenger_is_where_the_static_shape_hangs_it():
-    task = driven(steps=60)
-    view = moment(task).line
-    data = task.plant.catenary
-    at_support = np.interp(data.span_length, view.x, view.messenger)
-    carried = 9.81 * (data.contact_wire.mass + data.messenger_wire.mass) * data.span_length
-    assert at_support == pytest.approx(data.encumbrance - carried / data.support.stiffness, abs=3e-3)
-
-
 def test_slack_droppers_are_those_without_tension():
     run = simulate("en50318-2002", speed_kmh=300.0, distance=200.0)
     task = Task(run_settings({"speed_kmh": 300.0, "distance": 200.0}), record_droppers=True)
@@ -208,24 +199,6 @@ def test_a_window_shows_each_step_and_closes(monkeypatch):
     env.close()
     copy.close()
     assert not pygame.display.get_init()
-
-
-@pytest.mark.slow
-def test_record_video_writes_an_episode(tmp_path):
-    pytest.importorskip("moviepy")
-    short = {"distance": 60.0, "run_in": 0.0, "settle": 0.0}
-    env = gymnasium.make("Pantograph-v0", render_mode="rgb_array", render_size=SIZE, **short)
-    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), disable_logger=True)
-    env.reset(seed=0)
-    steps, ended = 0, False
-    while not ended:
-        *_, terminated, truncated, _ = env.step(env.action_space.sample())
-        steps, ended = steps + 1, terminated or truncated
-    env.close()
-    (film,) = tmp_path.glob("*.mp4")
-    meta, number = read(film)
-    assert meta["fps"] == 100
-    assert number == steps + 1
 
 
 def read(path):

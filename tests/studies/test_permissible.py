@@ -14,8 +14,7 @@ from panto_env.cli.permissible import parse_speeds
 from panto_env.studies import write
 from panto_env.studies.permissible import PASSIVE, Scan, scan, study, verified
 from panto_env.studies.permissible.scan import WAVES, Broken, Pass
-from panto_env.studies.permissible.shown import answers_table
-from panto_env.studies.permissible.study import Case
+from panto_env.studies.permissible.study import Case, answers_table
 
 from ..pages import DOCS, tables_of
 

@@ -9,7 +9,7 @@ import pytest
 
 from panto_env import simulate
 from panto_env.studies import Outcome, write
-from panto_env.studies.spacing import passes
+from panto_env.studies.spacing import study as passes
 from panto_env.studies.spacing.study import distances_table, extremes_table, verdict
 
 from ..pages import check_page

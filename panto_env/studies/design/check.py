@@ -97,8 +97,7 @@ def checked_table(checked: Sequence[Checked]) -> Table:
         return Alarm(words) if found.broken or found.refused else words
 
     columns: Columns = (
-        ("design", "{.design}"),
-        ("control", "{.policy}"),
+        "design: {.design} | control: {.policy}",
         ("searched", lambda one: ratio(one.searched)),
         ("held out", lambda one: ratio(one.held_out)),
         ("as built", lambda one: ratio(one.as_built)),

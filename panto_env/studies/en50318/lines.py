@@ -265,7 +265,8 @@ def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> l
         true = run.summary(SETTLED).std
         errors_of_lines.append([100 * (run.summary((k, LAST_USUAL)).std / true - 1) for k in first_spans])
     errors = np.array(errors_of_lines)
-    rms, worst = np.sqrt(np.mean(errors**2, axis=0)).tolist(), np.abs(errors).max(axis=0).tolist()
+    rms = [float(np.sqrt(np.mean(errors[:, k] ** 2))) for k in range(len(first_spans))]
+    worst = np.abs(errors).max(axis=0).tolist()
     given = {"speed_kmh": speed_kmh, "lines": len(errors)}
     return [
         SimpleNamespace(**given, first=first, last=LAST_USUAL, rms=rms[k], worst=worst[k])

@@ -55,10 +55,7 @@ def kinds_table(checks: Sequence[dict[str, Any]]) -> Table:
     return tabled(
         "Lines of the kinds that EN 50318:2018 asks for; its own lines, and DC ones, were in no source",
         (
-            ("kind", "{[line_kind]}"),
-            ("line", "{[catenary]}"),
-            ("pantograph", "{[pantograph]}"),
-            ("km/h", "{[speed_kmh]:g}"),
+            "kind: {[line_kind]} | line: {[catenary]} | pantograph: {[pantograph]} | km/h: {[speed_kmh]:g}",
             *((LABELS[name].column, f"{{[{name}]:.1f}}") for name in ("mean", "std", "max", "min")),
             ("uplift (mm)", lambda check: number(1e3 * check["max_uplift"], 1)),
             (LABELS["contact_loss"].column, "{[contact_loss]:.2f}"),
@@ -77,8 +74,7 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
     return tabled(
         "Convergence; σ relative to the first row of its speed",
         (
-            ("km/h", "{[speed_kmh]:g}"),
-            ("grid\n(m)", "{[spacing]:.3g}"),
+            "km/h: {[speed_kmh]:g} | grid\n(m): {[spacing]:.3g}",
             ("step\n(ms)", lambda row: f"{1e3 * row['time_step']:.3g}"),
             ("window\n(spans)", lambda row: str(row["window"] or "all")),
             ("precision", "{[precision]}"),
@@ -156,13 +152,9 @@ def conditions_table(checks: Sequence[SimpleNamespace]) -> Table:
     return tabled(
         f"Passive runs in each condition; mean ± standard deviation over {conditions.LEVEL_SEEDS} seeds",
         (
-            ("line", "{.catenary}"),
-            ("pantograph", "{.pantograph}"),
-            ("km/h", "{.speed_kmh:g}"),
-            ("condition", "{.condition}"),
+            "line: {.catenary} | pantograph: {.pantograph} | km/h: {.speed_kmh:g} | condition: {.condition}",
             (LABELS["std"].column, _spread("std")),
-            ("σ from\nnew (%)", "{.change:+.1f}"),
-            ("worse\nthan new", "{0.worse} of {0.seeds}"),
+            "σ from\nnew (%): {.change:+.1f} | worse\nthan new: {0.worse} of {0.seeds}",
             *EXTREMES,
         ),
         checks,
@@ -182,8 +174,7 @@ def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
         f"Every flexible line beside a grid of {lines.GRID:g} m and a step of at most "
         f"{1e3 * lines.LONGEST_STEP:g} ms, spans {first} to {last}",
         (
-            ("line", "{.catenary}"),
-            ("km/h", "{.speed_kmh:.0f}"),
+            "line: {.catenary} | km/h: {.speed_kmh:.0f}",
             ("accuracy", lambda check: f"{check.accuracy}{', warned' * check.warned}"),
             ("grid\n(m)", "{.spacing:.3g}"),
             ("step\n(ms)", lambda check: f"{1e3 * check.time_step:.3g}"),
@@ -222,14 +213,13 @@ def start_table(checks: Sequence[SimpleNamespace]) -> Table:
     first, last = lines.SETTLED
     return tabled(
         f"Error of σ over these spans beside spans {first} to {last} (%): rms over the lines (worst)",
-        (
-            ("km/h", "{[0].speed_kmh:g}"),
-            ("lines", "{[0].lines}"),
+        [
+            "km/h: {[0].speed_kmh:g} | lines: {[0].lines}",
             *(
-                (f"{each.first}-{each.last}", f"{{0[{k}].rms:.1f}} ({{0[{k}].worst:.1f}})")
+                f"{each.first}-{each.last}: {{0[{k}].rms:.1f}} ({{0[{k}].worst:.1f}})"
                 for k, each in enumerate(by_speed[0])
             ),
-        ),
+        ],
         by_speed,
         text_columns=0,
     )
@@ -239,48 +229,42 @@ class _Part(NamedTuple):
     """What may be requested: its cases, words for them, and what is found of each, in tables."""
 
     cases: Callable[[], Iterable[Any]]
-    words: Callable[[Any], str]
-    check: Callable[[Any], list[Any]]
+    words: str  # a format
+    check: Callable[..., Any]  # of a case, whose parts are its arguments where it has several
     tables: tuple[Callable[[Any], Table], ...]
 
 
+def _at_speeds(cases: Iterable[Any]) -> Callable[[], Iterable[Any]]:
+    """Each case, whose last part are speeds, at each of them."""
+    return lambda: [(*each, speed) for *each, speeds in cases for speed in speeds]
+
+
 PARTS = {
-    "kinds": _Part(
-        lambda: [(*each, speed) for *each, speeds in reference.KINDS for speed in speeds],
-        lambda case: case[1],
-        lambda case: [reference.check_kind(*case)],
-        (kinds_table,),
-    ),
-    "convergence": _Part(lambda: reference.DISCRETISATIONS, str, reference.converge, (convergence_table,)),
+    "kinds": _Part(_at_speeds(reference.KINDS), "{[1]}", reference.check_kind, (kinds_table,)),
+    "convergence": _Part(lambda: reference.DISCRETISATIONS, "{}", reference.converge, (convergence_table,)),
     "windows": _Part(
         lines.window_cases,
-        lambda case: f"windows on {case.name} at {case.speed_kmh:g} km/h",
+        "windows on {0.name} at {0.speed_kmh:g} km/h",
         lines.check_windows,
         (windows_table,),
     ),
     "wear": _Part(
         lambda: product(conditions.CONDITIONS, conditions.DISCRETISATIONS),
-        lambda case: f"{case[0]}, {case[1]}",
-        lambda case: [conditions.check_wear(*case)],
+        "{0[0]}, {0[1]}",
+        conditions.check_wear,
         (wear_table,),
     ),
     "conditions": _Part(
-        lambda: [(*each, speed) for *each, speeds in conditions.CASES for speed in speeds],
-        lambda case: f"conditions of {case[0]} at {case[2]:g} km/h",
-        lambda case: conditions.check_conditions(*case),
+        _at_speeds(conditions.CASES),
+        "conditions of {0[0]} at {0[2]:g} km/h",
+        conditions.check_conditions,
         (conditions_table,),
     ),
     "lines": _Part(
-        lines.every_case,
-        lambda case: f"{case.name} at {case.speed_kmh:.0f} km/h",
-        lines.check_case,
-        (lines_table, largest_table),
+        lines.every_case, "{0.name} at {0.speed_kmh:.0f} km/h", lines.check_case, (lines_table, largest_table)
     ),
     "start": _Part(
-        lambda: lines.START_SPEEDS_KMH,
-        lambda speed: f"the start of runs at {speed:g} km/h",
-        lines.check_start,
-        (start_table,),
+        lambda: lines.START_SPEEDS_KMH, "the start of runs at {:g} km/h", lines.check_start, (start_table,)
     ),
 }
 
@@ -326,7 +310,8 @@ def run(report: Report = lambda _: None, **requested: bool) -> Validation:
     for name, part in PARTS.items():
         found[name] = []
         for case in part.cases() if requested.get(f"with_{name}", name == "kinds") else ():
-            report(part.words(case))
-            found[name] += part.check(case)
+            report(part.words.format(case))
+            some = part.check(*case) if isinstance(case, tuple) else part.check(case)
+            found[name] += some if isinstance(some, list) else [some]
     compliance = [run.compliance(reference.SPANS) for run in runs]
     return Validation(runs, reference.check(runs), compliance, found)

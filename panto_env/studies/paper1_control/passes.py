@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, product
@@ -145,12 +145,8 @@ LOOPS = (("ideal", OFTEN), ("ideal", SAMPLED), ("realistic", SAMPLED))
 """Actuators and control intervals under which the gain is varied."""
 
 
-def all_cases() -> list[Case]:
-    """Every pass of the study, each once, but those with another static force."""
-    return list(dict.fromkeys(_cases()))
-
-
-def _cases() -> Iterator[Case]:
+def all_cases() -> Iterator[Case]:
+    """Every pass of the study, some of them several times, but those with another static force."""
     for fine, speed in product((False, True), SPEEDS):  # Figs 17, 18
         for policy in OVER_SPEED.values():
             yield Case(speed, policy, fine=fine)
@@ -195,7 +191,7 @@ class Result:
         return self.figures.cost_function / self.figures.distance
 
 
-def run_all(cases: Sequence[Case], progress: Progress) -> dict[Case, Result]:
+def run_all(cases: Collection[Case], progress: Progress) -> dict[Case, Result]:
     """Results of all cases, from all cores. Raises InputError if a worker process dies."""
     found = in_processes([partial(run, batch) for batch in _batches(cases)], progress=progress)
     results = {result.case: result for batch in found for result in batch}
@@ -267,7 +263,7 @@ def result_of(case: Case, record: Trajectory) -> Result:
     )
 
 
-def _batches(cases: Sequence[Case]) -> Iterator[list[Case]]:
+def _batches(cases: Collection[Case]) -> Iterator[list[Case]]:
     """Cases that differ in their policy alone, LANES at a time, slow trains first: theirs take longest."""
 
     def plant(case: Case) -> tuple[Any, ...]:

@@ -10,45 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from ... import identification as ident
 from ...analysis.pool import Job, in_processes
 from ...base.arrays import Array
 from ...base.table import Table
-from ...identification import (
-    EXPERIMENTS,
-    FILTERED,
-    FREQUENCY_SWEEP,
-    IDENTIFIED,
-    MEASURED,
-    METHODS,
-    OUTPUT_ERROR,
-    PRINTED,
-    UNITS,
-    Excitation,
-    Fit,
-    Identification,
-    Match,
-    Record,
-    add_noise,
-    clean_record,
-    excited_band,
-    fit_equation_error,
-    force_matches,
-    identify,
-    run_trials,
-)
+from ...identification import EXPERIMENTS, FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, OUTPUT_ERROR, UNITS
 from ...identification.performance import plot_matches, plot_record
 from ..study import Comparison, Outcome, Report, over, said, tabled
-from . import plots
-from .published import (
-    PUBLISHED,
-    TRUTH,
-    best_performance,
-    dry_friction,
-    expected,
-    largest_mean_error,
-)
+from . import plots, published
+from .published import PUBLISHED, TRUTH, best_performance, expected
 
-Fits = Mapping[str, Identification]
+Fits = Mapping[str, ident.Identification]
 Rows = list[tuple[str | float, ...]]
 SECONDS = 4.0  # shown of a record. Own choice: the paper's figures are not at hand, only their captions
 
@@ -63,17 +35,17 @@ TRIALS = 200
 COVERED = (*((excitation, False) for excitation in EXPERIMENTS), (FREQUENCY_SWEEP, True))
 """Records whose coverage is counted, and whether their offset is free: only the sweep allows that."""
 BAR = 0.005  # share by which identified parameters may differ from the truth on records without noise
-KNOWN = {name: TRUTH[name] for name in MEASURED}
+KNOWN = {name: TRUTH[name] for name in ident.MEASURED}
 K3 = IDENTIFIED.index("k3")
 
 
-def _jobs(noisy: Mapping[str, Record]) -> dict[tuple[Any, ...], Job[Any]]:
+def _jobs(noisy: Mapping[str, ident.Record]) -> dict[tuple[Any, ...], Job[Any]]:
     """What is computed of each record, of sweeps and over sampling and noise, by keys."""
     jobs: dict[tuple[Any, ...], Job[Any]] = {}
     for excitation in (*EXPERIMENTS, FREQUENCY_SWEEP):
         name = excitation.name
         for free in (False, True):
-            jobs["record", name, free] = partial(identify, noisy[name], KNOWN, free_offset=free)
+            jobs["record", name, free] = partial(ident.identify, noisy[name], KNOWN, free_offset=free)
         for rate in SAMPLINGS:
             jobs["sampling", name, rate] = partial(_errors_by_sampling, excitation, rate)
     for (excitation, free), level in product((COVERED[0], COVERED[-1]), NOISES):
@@ -86,34 +58,34 @@ def _jobs(noisy: Mapping[str, Record]) -> dict[tuple[Any, ...], Job[Any]]:
     return jobs
 
 
-def _errors(fit: Fit) -> Array:
+def _errors(fit: ident.Fit) -> Array:
     """Errors (%), (5,)."""
     return np.asarray(100 * (fit.values / np.array([TRUTH[name] for name in IDENTIFIED]) - 1))
 
 
-def _errors_by_sampling(excitation: Excitation, rate: float) -> Array:
+def _errors_by_sampling(excitation: ident.Excitation, rate: float) -> Array:
     """Errors (%), (5,), of the equations as printed on a clean record sampled at ``rate`` (1/s)."""
-    record = clean_record(excitation, TRUTH, time_step=1 / rate, duration=10.0)
-    return _errors(fit_equation_error(record, KNOWN))
+    record = ident.clean_record(excitation, TRUTH, time_step=1 / rate, duration=10.0)
+    return _errors(ident.fit_equation_error(record, KNOWN))
 
 
-def _errors_by_noise(excitation: Excitation, free_offset: bool, level: float) -> dict[str, float]:
+def _errors_by_noise(excitation: ident.Excitation, free_offset: bool, level: float) -> dict[str, float]:
     """Largest error (%) of the five parameters by method, median over seeds; level: noise, rms (m)."""
-    clean = clean_record(excitation, TRUTH)
+    clean = ident.clean_record(excitation, TRUTH)
     largest: dict[str, list[float]] = {method: [] for method in METHODS}
     for seed in range(SEEDS):
-        record = add_noise(clean, np.random.default_rng(seed), displacement=level)
-        for method, fit in identify(record, KNOWN, free_offset=free_offset).fits.items():
+        record = ident.add_noise(clean, np.random.default_rng(seed), displacement=level)
+        for method, fit in ident.identify(record, KNOWN, free_offset=free_offset).fits.items():
             largest[method].append(float(np.abs(_errors(fit)).max()))
     return {method: float(np.median(errors or [np.nan])) for method, errors in largest.items()}
 
 
-def _median_rsd(excitation: Excitation, free_offset: bool, seeds: int) -> list[float]:
+def _median_rsd(excitation: ident.Excitation, free_offset: bool, seeds: int) -> list[float]:
     """RSD (%) of the five, low-passed equation error, median over seeds."""
-    clean = clean_record(excitation, TRUTH)
-    band = excited_band(clean)
-    records = (add_noise(clean, np.random.default_rng(seed)) for seed in range(seeds))
-    fits = [fit_equation_error(each, KNOWN, band=band, free_offset=free_offset) for each in records]
+    clean = ident.clean_record(excitation, TRUTH)
+    band = ident.excited_band(clean)
+    records = (ident.add_noise(clean, np.random.default_rng(seed)) for seed in range(seeds))
+    fits = [ident.fit_equation_error(each, KNOWN, band=band, free_offset=free_offset) for each in records]
     medians: list[float] = np.median([fit.rsd for fit in fits], axis=0).tolist()
     return medians
 
@@ -121,15 +93,17 @@ def _median_rsd(excitation: Excitation, free_offset: bool, seeds: int) -> list[f
 def run(report: Report) -> Outcome:
     """Tables 1 to 5 and Figs 6 to 11 on synthetic records, coverage, and why k3 is so unsure."""
     report("records", 0.0)
-    clean = {each.name: clean_record(each, TRUTH) for each in (*EXPERIMENTS, FREQUENCY_SWEEP)}
-    noisy = {name: add_noise(record, np.random.default_rng(0)) for name, record in clean.items()}
+    clean = {each.name: ident.clean_record(each, TRUTH) for each in (*EXPERIMENTS, FREQUENCY_SWEEP)}
+    noisy = {name: ident.add_noise(record, np.random.default_rng(0)) for name, record in clean.items()}
     jobs = _jobs(noisy)
     values = in_processes(list(jobs.values()), progress=over(report, "records", 0.0, 0.3))
     results = dict(zip(jobs, values, strict=True))
-    trials = run_trials(COVERED, TRUTH, TRIALS, progress=over(report, f"{TRIALS} trials", 0.3, 0.9))
+    trials = ident.run_trials(COVERED, TRUTH, TRIALS, progress=over(report, f"{TRIALS} trials", 0.3, 0.9))
     kept, free = ({name: results["record", name, free] for name in clean} for free in (False, True))
     names = [excitation.name for excitation in EXPERIMENTS]
-    driven = {name: force_matches(noisy[name], kept[name].fits[OUTPUT_ERROR].parameters) for name in names}
+    driven = {
+        name: ident.force_matches(noisy[name], kept[name].fits[OUTPUT_ERROR].parameters) for name in names
+    }
     coverage = {
         f"{each.name}, offset {'free' if free_ else 'kept'}": {
             method: by_method[method].coverage for method in METHODS
@@ -195,7 +169,7 @@ def _tables(
     kept: Fits,
     free: Fits,
     medians: Mapping[str, Sequence[float]],
-    driven: Mapping[str, Sequence[Match]],
+    driven: Mapping[str, Sequence[ident.Match]],
     coverage: Mapping[str, Mapping[str, Array]],
 ) -> Iterator[Table]:
     """Ours beside the paper's."""
@@ -228,7 +202,7 @@ def _tables(
             ("paper", lambda each: each[0].performance[each[1]]),
             ("mean error (mm)", lambda each: 1e3 * each[2].mean_error),
             ("paper", lambda each: each[0].mean_error[each[1]]),
-            ("most that its P_f allows", lambda each: largest_mean_error(*each[:2])),
+            ("most that its P_f allows", lambda each: published.largest_mean_error(*each[:2])),
         ),
         [(printed, k, match) for printed in PUBLISHED for k, match in enumerate(driven[printed.name])],
     )
@@ -271,7 +245,7 @@ def _tables(
             ("experiment", "{.name}"),
             ("force amplitude (N)", lambda printed: expected(printed)[0][2]),
             ("paper", lambda printed: printed.force[0]),
-            ("dry friction that would explain it (N)", dry_friction),
+            ("dry friction that would explain it (N)", published.dry_friction),
             ("best P_f of y_p1 under the paper's force (%)", best_performance),
             ("paper", lambda printed: printed.performance[0]),
         ),
@@ -283,7 +257,7 @@ def _comparisons(
     kept: Fits,
     clean: Array,
     medians: Mapping[str, Sequence[float]],
-    driven: Mapping[str, Sequence[Match]],
+    driven: Mapping[str, Sequence[ident.Match]],
     coverage: Mapping[str, Mapping[str, Array]],
 ) -> Iterator[Comparison]:
     """All of them. clean: errors of Experiment I without noise over SAMPLINGS."""
@@ -322,10 +296,10 @@ def _comparisons(
         yield about("best", best_performance(printed), printed.performance[0], 10.0, name=printed.name)
     for printed in PUBLISHED:
         # mm: what the rounding of mean error, amplitude and P_f can hide
-        paper, ours = printed.mean_error[0], largest_mean_error(printed, 0)
+        paper, ours = printed.mean_error[0], published.largest_mean_error(printed, 0)
         yield said("identification-allowed", ours, name=printed.name, paper=paper, low=paper - 0.01)
     notes = {
-        PRINTED: "noise in the derivatives biases least squares; RSD knows nothing of it",
+        ident.PRINTED: "noise in the derivatives biases least squares; RSD knows nothing of it",
         FILTERED: "bias mostly gone, intervals too narrow: the residuals of both equations are unlike",
     }
     for method in METHODS:

@@ -179,8 +179,7 @@ def ways_table(cases: Sequence[Case]) -> Table:
     return tabled(
         f"The estimated force at {SPEED_KMH:g} km/h, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds",
         [
-            ("observations", "{.observation}"),
-            ("method", "{.method}"),
+            "observations: {.observation} | method: {.method}",
             *by_band("correlation", lambda score: number(score.correlation, 4)),
             *by_band("rms error (N)", lambda score: number(score.rms, 2)),
             ("all", lambda case: number(case.scores[-1].whole_rms, 2)),

@@ -19,28 +19,8 @@ from ...base.table import Table
 from ...metrics import compliance as en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison, Figure, Outcome, Report, said, tabled
-from .passes import (
-    CATENARY,
-    FACTORS,
-    PANTOGRAPH,
-    RUN_TIME,
-    SHARE,
-    SHARES,
-    SPANS,
-    SPEED_KMH,
-    SPEEDS_KMH,
-    SYSTEM,
-    TIME_STEP,
-    Equations,
-    Influence,
-    Pass,
-    Passes,
-    influences,
-    largest_static_force,
-    measure,
-    run_pass,
-    statistics,
-)
+from . import passes as model
+from .passes import SPANS, SPEED_KMH, SPEEDS_KMH, SYSTEM, Equations, Influence, Pass, Passes, run_pass
 
 SWEPT_KMH = tuple(np.arange(150.0, 501.0, 5.0).tolist())
 """Speeds at which the plant's resonance is looked for."""
@@ -54,7 +34,7 @@ def run(report: Report) -> Outcome:
 
     The same statements with a contact that can only push stand in a table and in the numbers.
     """
-    varied = influences()
+    varied = model.influences()
     passes: dict[bool, Passes] = {}
     ranking: dict[bool, list[SimpleNamespace]] = {}
     for share, bilateral in ((0.0, True), (0.3, False)):
@@ -63,7 +43,9 @@ def run(report: Report) -> Outcome:
             each.key: [run_pass(each.parameter, value, bilateral=bilateral) for value in each.values]
             for each in varied
         }
-        ranking[bilateral] = [measure(each, size, bilateral=bilateral) for each in varied for size in SHARES]
+        ranking[bilateral] = [
+            model.measure(each, size, bilateral=bilateral) for each in varied for size in model.SHARES
+        ]
     report("speeds", 0.6)
     over_speed = {bilateral: _sweep_speed(bilateral) for bilateral in READINGS}
     comparisons = {
@@ -108,7 +90,12 @@ def run(report: Report) -> Outcome:
 
 def _sweep_speed(bilateral: bool) -> list[Row]:
     """Rows over speed, without what is the same in all: that they go to their ends, and their spans."""
-    given = {"catenary": CATENARY, "pantograph": PANTOGRAPH, "spans": SPANS, "time_step": TIME_STEP}
+    given = {
+        "catenary": model.CATENARY,
+        "pantograph": model.PANTOGRAPH,
+        "spans": SPANS,
+        "time_step": model.TIME_STEP,
+    }
     rows = sweep({"speed_kmh": SWEPT_KMH}, bilateral=bilateral, **given)
     return [{key: value for key, value in row.items() if key not in ("ending", "spans")} for row in rows]
 
@@ -135,7 +122,7 @@ def _statements(
         yield from _extremes(what, passes[key][good], passes[key][-1 - good])
     yield from _along_the_span(stiffnesses[0], stiffnesses[-1])
     yield from _extremes("m_1 lower", passes["mass"][0], passes["mass"][-1])  # Figs 10 and 11
-    measured = {change.influence: change for change in ranking if change.share == SHARE}
+    measured = {change.influence: change for change in ranking if change.share == model.SHARE}
     for key in ("swing", "travel", "std"):  # Figs 12 and 13
         yield said(f"parameters-k1-{key}", getattr(measured["suspension"], key))
     # The conclusion: speed first, then the catenary's stiffness, the pantograph last.
@@ -160,7 +147,7 @@ def _of_standard(passes: Passes) -> Iterator[Comparison]:
         names: dict[str, Any] = {"where": where, "speed": first.speed_kmh, "note": ""}
         names["limit"] = _maximum_limit(first.speed_kmh)
         if not where and largest > names["limit"]:
-            bound = largest_static_force(first)
+            bound = model.largest_static_force(first)
             names["note"] = f"kept only with F_S up to {bound:.0f} N, which is not printed"
         yield said("parameters-largest", largest, **names)
     allowed = [en50367.largest_mean(from_kmh(each.speed_kmh), SYSTEM) for each in speeds]
@@ -176,7 +163,7 @@ def _extremes(what: str, better: Pass, worse: Pass) -> Iterator[Comparison]:
     for name, unit, scale, key in (("F_C", "N", 1.0, "force"), ("z_1", "mm", 1e3, "displacement")):
         ours, theirs = scale * getattr(better, key), scale * getattr(worse, key)
         names: dict[str, Any] = {"what": what, "name": name, "unit": unit}
-        names |= {"low": FACTORS[0], "high": FACTORS[-1]}
+        names |= {"low": model.FACTORS[0], "high": model.FACTORS[-1]}
         yield said("parameters-max", float(ours.max() - theirs.max()), **names)
         yield said("parameters-min", float(ours.min() - theirs.min()), **names)
 
@@ -226,7 +213,7 @@ def _landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[
         "sigma least above 200 km/h at": min(
             (row["std"], row["speed_kmh"]) for row in rows if row["speed_kmh"] > 200
         )[1],
-        "reach of 600 m in 12 s from": to_kmh(600 / RUN_TIME),
+        "reach of 600 m in 12 s from": to_kmh(600 / model.RUN_TIME),
     }
 
 
@@ -245,20 +232,23 @@ def _tables(
     rows: list[tuple[str, ...]] = []
     for name, pulls, _ in every:
         broken = ", ".join(key for key, kept in pulls.within_en50367.items() if not kept)
-        figures = (*statistics(pulls.force).values(), *statistics(1e3 * pulls.displacement).values())
+        figures = (
+            *model.statistics(pulls.force).values(),
+            *model.statistics(1e3 * pulls.displacement).values(),
+        )
         rows.append((name, *(f"{x:.1f}" for x in figures), broken or "–"))
     headings = (f"{what} {x}" for what in "Fz" for x in ("max", "min", "mean", "σ"))
     title = "500 to 600 m, contact that may pull"
     yield Table(title, ("F_C (N), z_1 (mm)", *headings, "EN 50367 broken"), rows)
     by_influence = [[each for each in ranking if each.influence == one.key] for one in varied]
-    by_influence.sort(key=lambda over_shares: -abs(over_shares[len(SHARES) // 2].std))
+    by_influence.sort(key=lambda over_shares: -abs(over_shares[len(model.SHARES) // 2].std))
     rows = []
     for over_shares in by_influence:
         changes = (getattr(one, key) for key in ("std", "swing", "travel") for one in over_shares)
         rows.append((over_shares[0].symbol, *(f"{100 * change:+.1f}" for change in changes)))
     yield Table(
         "Change (%) of σ and of the amplitudes of F_C and z_1 when a parameter goes from -x to +x, 300 km/h",
-        ("parameter", *(f"{what} ±{100 * share:g}%" for what in ("σ", "F", "z") for share in SHARES)),
+        ("parameter", *(f"{what} ±{100 * share:g}%" for what in ("σ", "F", "z") for share in model.SHARES)),
         rows,
     )
     rows = []
@@ -277,26 +267,21 @@ def _tables(
             ("max / F(v)", lambda one_pass: f"{one_pass.force.max() / one_pass.nominal_force:.3f}"),
             ("σ / F(v)", lambda one_pass: f"{one_pass.force.std() / one_pass.nominal_force:.3f}"),
             ("limit of max (N)", lambda one_pass: f"{_maximum_limit(one_pass.speed_kmh):g}"),
-            ("maximum F_S that keeps it (N)", lambda one_pass: f"{largest_static_force(one_pass):.0f}"),
+            ("maximum F_S that keeps it (N)", lambda one_pass: f"{model.largest_static_force(one_pass):.0f}"),
         ),
         passes[True]["speed"],
     )
     yield tabled(
-        f"Initial values are not printed; the paper runs {RUN_TIME:g} s",
+        f"Initial values are not printed; the paper runs {model.RUN_TIME:g} s",
         (
-            ("km/h", "{[speed_kmh]:g}"),
-            ("left after a span", "{[growth]:.3f}"),
+            "km/h: {[speed_kmh]:g} | left after a span: {[growth]:.3f}",
             ("after 10 spans", lambda beginning: f"{beginning['growth'] ** (SPANS[0] - 1):.1e}"),
-            ("F_C, flat less at rest (N)", "{[difference]:.4f}"),
-            ("to 600 m (s)", "{[seconds]:.1f}"),
+            "F_C, flat less at rest (N): {[difference]:.4f} | to 600 m (s): {[seconds]:.1f}",
         ),
         beginnings,
     )
-    yield tabled(
-        "Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N",
-        (("what", "{[0]}"), ("km/h", "{[1]:.0f}")),
-        [*landmarks.items()],
-    )
+    title = "Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N"
+    yield tabled(title, ["what: {[0]} | km/h: {[1]:.0f}"], [*landmarks.items()])
 
 
 def _draw(
