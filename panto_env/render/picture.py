@@ -97,7 +97,8 @@ def draw_train(canvas: Canvas, moment: Moment, top: float, size: float, margin: 
             few = slice(None, None, -max(1, int(rider.places.size / 2000)))  # from the newest sample back
             points = np.column_stack([across(rider.places), level(rider.filtered)])[few]
             canvas.line(points, colour, 2 if shown else 1)
-            canvas.dot(*points[0].tolist(), 4, colour, PAPER)
+            x, y = points[0].tolist()
+            canvas.dot(x, y, 4, colour, PAPER)
         felt = f"{rider.filtered[-1]:.0f} N" if rider.filtered.size else "–"
         words = f"{number + 1} {rider.name} {'not yet on the line' if rider.position < 0 else felt}"
         words += ", above" if shown else ""
@@ -179,9 +180,9 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
         y = float(layout.forces(float(force), axis))
         canvas.line([(left, y), (right, y)], INK if force == 0 else FAINT)
         canvas.words(left - 0.4 * size, y, f"{force} N", QUIET, 0.8 * size, anchor="right")
-    for force, colour in ((moment.nominal_force, QUIET), (moment.largest_force, INK)):
-        y = float(layout.forces(force, axis))
-        for x in np.arange(left, right, 14) if force <= axis else ():
+    for marked, colour in ((moment.nominal_force, QUIET), (moment.largest_force, INK)):
+        y = float(layout.forces(marked, axis))
+        for x in np.arange(left, right, 14) if marked <= axis else ():
             canvas.line([(x, y), (min(x + 7, right), y)], colour)
     _draw_legend(canvas, layout, moment, axis)
 

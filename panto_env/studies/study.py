@@ -20,7 +20,7 @@ from ..base.table import Table, write_rows
 from ..metrics.figures import HEADINGS
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 else:
     Figure = Any  # for annotations alone, here and in all studies: Matplotlib is slow to import
 

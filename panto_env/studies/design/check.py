@@ -70,8 +70,8 @@ def check(design: Design, candidates: Mapping[str, Mapping[str, float]]) -> list
                 )
                 for k, speed in enumerate(speeds)
             }
-            judged = (worst(part) if part else Found(math.nan, 0.0, ()) for part in parts)
-            found.append(Checked(name, policy, *judged, dict(sorted(by_speed.items()))))
+            some, unseen, built = (worst(part) if part else Found(math.nan, 0.0, ()) for part in parts)
+            found.append(Checked(name, policy, some, unseen, built, dict(sorted(by_speed.items()))))
     return found
 
 

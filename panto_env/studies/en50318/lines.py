@@ -158,7 +158,8 @@ def check_case(case: LineCase) -> list[LineCheck]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             used = resolution(case.line, given, Runs((speed, speed)))
-        ours, changes = _run(case, given), {}
+        ours = _run(case, given)
+        changes: dict[str, Any] = {}
         if not (ours.terminated or true.terminated):
             a, b = (run.summary(spans) for run in (ours, true))
             highest, lowest = _extremes(ours, spans)

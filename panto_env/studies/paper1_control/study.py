@@ -14,7 +14,7 @@ from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
 from ...base.plotting import POSITION, SERIES, legend_above, panels, series_colour
 from ...base.table import Table
 from ...metrics.figures import LABELS, Label
-from ..study import Cell, Columns, Comparison, Figure, Outcome, Report, legend_below, over, said, tabled
+from ..study import Columns, Comparison, Figure, Outcome, Report, legend_below, over, said, tabled
 from . import passes
 from .passes import GAIN, LINE, SHOWN_SPEEDS, SPAN, SPEEDS, Case, Result, control, cost_over_angle, sampled
 
@@ -95,10 +95,10 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
         yield said("control-angle", theta, speed=speed, paper=paper, low=low, high=high)
 
 
-def _figures(*places: tuple[str, int]) -> list[tuple[str, Cell]]:
+def _figures(*places: tuple[str, int]) -> list[tuple[str, Callable[[Result], str]]]:
     """Columns of ``Figures``, by name and number of decimals."""
 
-    def cell(label: Label, name: str, decimals: int) -> Cell:
+    def cell(label: Label, name: str, decimals: int) -> Callable[[Result], str]:
         return lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
 
     return [(LABELS[name].short_heading, cell(LABELS[name], name, decimals)) for name, decimals in places]

@@ -46,7 +46,7 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
 
 
 def stiffness(
-    clean: Mapping[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
+    clean: dict[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
 ) -> Figure:
     """Why k3 is unsure: its column beside m3's; and what a frequency sweep does.
 
@@ -135,7 +135,7 @@ def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
 
 def _legend_below(axis: Axes, columns: int) -> None:
     """A legend that covers no data."""
-    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
+    below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
     axis.legend(fontsize="small", ncols=columns, frameon=False, **below)
 
 

@@ -210,8 +210,8 @@ def _tables(
     for printed in PUBLISHED:
         both = zip(medians[printed.name], printed.rsd, strict=True)
         deviations = (f"{ours:.3g} / {theirs:.3g}" for ours, theirs in both)
-        condition = kept[printed.name].fits[FILTERED].condition
-        rows.append((printed.name, condition, printed.condition, *deviations))
+        ours_kept = kept[printed.name].fits[FILTERED].condition
+        rows.append((printed.name, ours_kept, printed.condition, *deviations))
     deviations = (f"RSD {name} (%), ours / paper" for name in IDENTIFIED)
     title = "Ranking: condition number with offset kept, median RSD with offset free (low-passed)"
     yield Table(title, ("experiment", "condition number", "paper", *deviations), rows)

@@ -141,7 +141,10 @@ def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
     """Scores in 0 to 20 Hz by observation and noise of displacements (m), velocities' in proportion."""
     found, known = {}, known_pantograph(0)
     for noise in NOISES:
-        noises = {"displacement_noise": noise, "velocity_noise": noise / DISPLACEMENT_NOISE * VELOCITY_NOISE}
+        noises: dict[str, Any] = {
+            "displacement_noise": noise,
+            "velocity_noise": noise / DISPLACEMENT_NOISE * VELOCITY_NOISE,
+        }
         motion = measure(trajectory, **noises)
         for observation in OBSERVATIONS:
             force = estimate(motion, known, EstimatorSettings(observation=observation, **noises)).force

@@ -90,13 +90,8 @@ def run(report: Report) -> Outcome:
 
 def _sweep_speed(bilateral: bool) -> list[Row]:
     """Rows over speed, without what is the same in all: that they go to their ends, and their spans."""
-    given = {
-        "catenary": model.CATENARY,
-        "pantograph": model.PANTOGRAPH,
-        "spans": SPANS,
-        "time_step": model.TIME_STEP,
-    }
-    rows = sweep({"speed_kmh": SWEPT_KMH}, bilateral=bilateral, **given)
+    line: dict[str, Any] = {"catenary": model.CATENARY, "pantograph": model.PANTOGRAPH, "spans": SPANS}
+    rows = sweep({"speed_kmh": SWEPT_KMH}, bilateral=bilateral, time_step=model.TIME_STEP, **line)
     return [{key: value for key, value in row.items() if key not in ("ending", "spans")} for row in rows]
 
 
@@ -225,10 +220,13 @@ def _tables(
     beginnings: Sequence[Mapping[str, float]],
     landmarks: Mapping[str, float],
 ) -> Iterator[Table]:
-    every = []
-    for each in varied:
-        of_values = zip(each.values, passes[True][each.key], passes[False][each.key], strict=True)
-        every += [(f"{each.symbol} = {value:g} {each.unit}".rstrip(), *both) for value, *both in of_values]
+    every = [
+        (f"{each.symbol} = {value:g} {each.unit}".rstrip(), pulls, pushes)
+        for each in varied
+        for value, pulls, pushes in zip(
+            each.values, passes[True][each.key], passes[False][each.key], strict=True
+        )
+    ]
     rows: list[tuple[str, ...]] = []
     for name, pulls, _ in every:
         broken = ", ".join(key for key, kept in pulls.within_en50367.items() if not kept)
@@ -290,7 +288,8 @@ def _draw(
     """As a figure of the paper; where contact is lost both readings are drawn."""
     from matplotlib.lines import Line2D
 
-    (figure, axis), handles = panels((8, 4.4)), []
+    figure, axis = panels((8, 4.4))
+    handles: list[Line2D] = []
     what, unit, scale = "contact force $F_C$", "N", 1.0
     if quantity == "displacement":
         what, unit, scale = "head displacement $z_1$", "mm", 1e3

@@ -138,7 +138,9 @@ class Scan:
             self.limit(policy, waves=True),
             tight.tightest if tight else "",
             tight.margin if tight else math.nan,
-            *map(most, ("rms", "peak", "watts")),
+            most("rms"),
+            most("peak"),
+            most("watts"),
             math.nan if policy == PASSIVE else self.limit(policy, failing=True),
         )
 

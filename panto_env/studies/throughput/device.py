@@ -32,7 +32,8 @@ PAIR = 2**30  # bytes that are copied to measure the memory
 
 def run(name: str, repeats: int, report: Report = lambda _: None) -> dict[str, Any]:
     """Everything, as plain data; name: of the device. Raises InputError where it cannot be used."""
-    device, rows = usable_device(name), []
+    device = usable_device(name)
+    rows: list[dict[str, Any]] = []
     for (label, (id_, settings)), lanes in product(CASES.items(), LANES):
         if rows and rows[-1]["case"] == label and "refused" in rows[-1]:
             continue

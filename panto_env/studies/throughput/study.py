@@ -282,7 +282,7 @@ def _time(step: Callable[[], None], count: int) -> float:
 def _by_lanes(repeats: int, report: Report) -> list[Measured]:
     """Every environment of ours beside its yardstick: single, then as vectors of more and more lanes."""
     singles = (("Pantograph-v0", IDEAL), *((name, {}) for name in IDS))
-    cases = [(name, None, settings, "single") for name, settings in singles]
+    cases: list[tuple[str, int | None, Any, str]] = [(name, None, how, "single") for name, how in singles]
     cases += [(name, lanes, None, f"{lanes} lanes") for name in IDS for lanes in LANES[name]]
     rows = []
     for name, lanes, settings, words in cases:
