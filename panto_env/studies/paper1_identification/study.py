@@ -270,10 +270,8 @@ def _comparisons(
         for series, unit, amplitude, their_amplitude, offset, their_offset in expected(printed):
             # Displacements: the last printed digit of both; force: the springs' measured values.
             near, far = (0.1 * their_amplitude, 0.03 * their_offset) if unit == "N" else (0.02, 0.1)
-            names, note = (
-                {"name": printed.name, "series": series, "unit": unit},
-                _amplitude_note(printed, series),
-            )
+            names = {"name": printed.name, "series": series, "unit": unit}
+            note = _amplitude_note(printed.name, series)
             yield about("amplitude", amplitude, their_amplitude, near, note=note, **names)
             yield about("offset", offset, their_offset, far, **names)
     for name, error in zip(IDENTIFIED, clean[-1], strict=True):  # Table 2's parameters, sampled fast enough
