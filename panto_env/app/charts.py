@@ -17,8 +17,7 @@ from ..metrics.low_pass import amplitudes, zero_phase_low_pass
 from ..report.charts import HIGHEST
 from ..report.findings import Findings
 
-COLOURS = {"passive": ORANGE, "policy": BLUE}
-"""Colours of the two runs."""
+COLOURS = {"passive": ORANGE, "policy": BLUE}  # colours of the two runs
 RAW, SUPPORT, BLACK = "#c8ccd2", "#9aa3ad", "#1a1a1a"
 LEGEND = {
     "without control": f"solid {ORANGE}",
@@ -29,8 +28,7 @@ LEGEND = {
     "supports; in the spectrum once per span": f"dashed {SUPPORT}",
 }
 """What the charts show, and how."""
-BAR = 0.3
-"""Width of an uplift's bar over a span."""
+BAR = 0.3  # width of an uplift's bar over a span
 Columns = dict[str, ArrayLike]
 
 

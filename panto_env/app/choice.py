@@ -20,8 +20,7 @@ from ..policies import policy_names
 from ..report.findings import Findings
 
 PASSIVE = "passive"
-HARDWARE = ("ideal", "realistic")
-"""Presets that both actuators and sensors have."""
+HARDWARE = ("ideal", "realistic")  # presets that both actuators and sensors have
 MEANS = ("as the pantograph", "en50367")
 """How the mean force is set: as the pantograph's data say, or trimmed for that standard's maximum."""
 CODE = """\
@@ -60,15 +59,11 @@ class Choice(NamedTuple):
     @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of ``simulate`` without those that have their default."""
-        usual = {"policy": PASSIVE, "mean_force": MEANS[0], "seed": 0}
         given = self._asdict()
         given["actuator"] = given["sensors"] = given.pop("hardware")
-        always = ("catenary", "pantograph", "speed_kmh")
-        return {
-            name: value
-            for name, value in given.items()
-            if name in always or value != (usual[name] if name in usual else default(name))
-        }
+        usual = {"policy": PASSIVE, "mean_force": MEANS[0], "seed": 0}
+        usual |= {name: default(name) for name in ("line_condition", "actuator", "sensors")}
+        return {name: value for name, value in given.items() if name not in usual or value != usual[name]}
 
     @property
     def title(self) -> str:

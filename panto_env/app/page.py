@@ -26,15 +26,11 @@ from ..terminal import number
 from .charts import LEGEND, Charts
 from .choice import PASSIVE, TITLES, Choice, Seen, look, offered
 
-HOST = "127.0.0.1"
-"""Only browsers of this machine reach the page."""
-SPEEDS = 80, 450, 5
-"""Lowest and highest speed of the slider, and its step (km/h)."""
-FIGURES = ("mean", "std", "max", "min", "max_uplift", "contact_loss", "effort")
-"""Figures in the page's table."""
+HOST = "127.0.0.1"  # only browsers of this machine reach the page
+SPEEDS = 80, 450, 5  # lowest and highest speed of the slider, and its step (km/h)
+FIGURES = ("mean", "std", "max", "min", "max_uplift", "contact_loss", "effort")  # figures in the page's table
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
-EVERY = 0.2
-"""Least time between two messages about the progress of a run (s)."""
+EVERY = 0.2  # least time between two messages about the progress of a run (s)
 passively = lru_cache(maxsize=2)(look)
 """``look`` for runs without control: when only the policy changes, its run is there at once."""
 
@@ -64,13 +60,9 @@ class Page:
             code = "navigator.clipboard.writeText(text.text)"
             button.js_on_event("button_click", CustomJS(args={"text": text}, code=code))
             copied += [button, text]
-        charts = {name: getattr(self._charts, name) for name in ("force", "uplift", "spectrum")}
-        roots = charts | {
-            "controls": column(list(self._controls.values()), **WIDE),
-            "status": self._status,
-            "tables": self._tables,
-            "texts": column(copied, **WIDE),
-        }
+        roots = {name: getattr(self._charts, name) for name in ("force", "uplift", "spectrum")}
+        roots |= {"controls": column(list(self._controls.values()), **WIDE), "texts": column(copied, **WIDE)}
+        roots |= {"status": self._status, "tables": self._tables}
         for name, root in roots.items():
             root.name = name
             document.add_root(root)
@@ -138,6 +130,9 @@ class Page:
         self._status.text = status(list(runs.values()), own is None)
 
 
+VERDICTS = ("kept", "broken", "not judged")
+
+
 def status(runs: list[Seen], running: bool) -> str:
     """Errors, warnings and the verdict on the last run, as HTML; running: whether another one follows."""
     last = runs[-1]
@@ -147,16 +142,13 @@ def status(runs: list[Seen], running: bool) -> str:
     if running:
         lines.append(("", "The policy is running."))
     elif last.requirements:
-        names: dict[str, list[str]] = {"kept": [], "broken": [], "not judged": []}
-        for _, each in last.requirements:
-            names[each.verdict].append(each.name)
-        words = f"{last.choice.title}: {len(names['kept'])} of {len(last.requirements)} requirements kept"
-        others = [
-            f"; {verdict}: {', '.join(names[verdict])}"
-            for verdict in ("broken", "not judged")
-            if names[verdict]
-        ]
-        lines.append(("verdict broken" if names["broken"] else "verdict", f"{words}{''.join(others)}."))
+        kept, *others = (
+            [each.name for _, each in last.requirements if each.verdict == verdict] for verdict in VERDICTS
+        )
+        words = f"{last.choice.title}: {len(kept)} of {len(last.requirements)} requirements kept"
+        for verdict, names in zip(VERDICTS[1:], others, strict=True):
+            words += f"; {verdict}: {', '.join(names)}" if names else ""
+        lines.append(("verdict broken" if others[0] else "verdict", f"{words}."))
     return "".join(f'<p class="{kind}">{escape(text)}</p>' for kind, text in lines)
 
 
@@ -165,10 +157,9 @@ def tables(runs: list[Seen]) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     words = {"limits": limits_in_words, "value": value_in_words, "in_words": in_words}
     environment.filters |= words | {"number": partial(number, digits=2)}
-    return environment.from_string(_text("tables.html.jinja")).render(
-        runs=[seen for seen in runs if seen.requirements],
-        labels={name: LABELS[name] for name in FIGURES},
-    )
+    labels = {name: LABELS[name] for name in FIGURES}
+    judged = [seen for seen in runs if seen.requirements]
+    return environment.from_string(_text("tables.html.jinja")).render(runs=judged, labels=labels)
 
 
 def _controls() -> dict[str, Any]:
@@ -207,9 +198,8 @@ def serve(port: int, ready: Callable[[str], None]) -> None:
         origins = [f"{HOST}:{port}", f"localhost:{port}"]
         server = Server(opened, address=HOST, port=port, allow_websocket_origin=origins)
     except OSError as error:
-        raise InputError(
-            f"Port {port} cannot be had ({error.strerror}); give another one: --port."
-        ) from error
+        reason = f"Port {port} cannot be had ({error.strerror})"
+        raise InputError(f"{reason}; give another one: --port.") from error
     worker.submit(passively, Choice())  # the kernels are loaded while the browser starts
     server.start()
     ready(f"http://{HOST}:{port}/")

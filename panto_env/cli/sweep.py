@@ -35,7 +35,7 @@ from ..studies.design import check as designs_of
 from ..studies.design.search import best_of, read_design, search
 from ..studies.permissible import USUAL, Scan, scan
 from ..studies.permissible.scan import VERIFIED_FROM
-from ..studies.permissible.shown import NOTES, answers_table, plot_scan, reasons, write_page
+from ..studies.permissible.study import NOTES, answers_table, plot_scan, reasons, write_page
 from ..terminal import (
     Json,
     Plot,

@@ -14,10 +14,8 @@ from ..base.extras import require
 from ..base.plotting import BLUE, BROWN, GREEN, ORANGE, PURPLE, VERMILION
 
 Colour = tuple[int, int, int]
-PARTS = 4
-"""Resolution of places: 1 / 2^PARTS of a pixel."""
-SMALLEST = 8
-"""Minimum size of words (px)."""
+PARTS = 4  # resolution of places: 1 / 2^PARTS of a pixel
+SMALLEST = 8  # minimum size of words (px)
 
 
 def rgb(colour: str) -> Colour:
@@ -129,5 +127,4 @@ SUPPORT, PAPER = (135, 144, 154), (255, 255, 255)
 FORCE, PUSH, BAD = rgb(BLUE), rgb(ORANGE), rgb(VERMILION)
 OTHERS = rgb(GREEN), rgb(PURPLE), rgb(BROWN)
 """Colours of the pantographs of a train that a picture does not show, from the front."""
-WORDS = 0.0222
-"""Size of words, as a share of a frame's height; at 720 rows, 16 px."""
+WORDS = 0.0222  # size of words, as a share of a frame's height; at 720 rows, 16 px

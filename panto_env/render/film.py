@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -84,11 +83,10 @@ def check_together(filmed: Sequence[Filmed]) -> None:
                 f"Passes above each other must have the same spans, but those of {first.title} and "
                 f"{other.title} differ in number or length; make a film of each."
             )
-        pairs = {
-            "speed (km/h)": (first.run.speed_kmh, other.run.speed_kmh),
-            "control_interval (s)": (first.control_interval, other.control_interval),
-        }
-        for name, (one, two) in pairs.items():
+        for name, one, two in (
+            ("speed (km/h)", first.run.speed_kmh, other.run.speed_kmh),
+            ("control_interval (s)", first.control_interval, other.control_interval),
+        ):
             if abs(one - two) > 1e-9 * abs(one):
                 raise InputError(
                     f"Passes above each other must have the same {name}, but {first.title} has {one:g} and "
@@ -102,12 +100,10 @@ def _but_for_control(run: Trajectory) -> str:
     return json.dumps([settings, run.design, run.seed, run.speed_kmh, run.nominal_force], sort_keys=True)
 
 
-FASTEST = 25.0
-"""Maximum frames per second of a film."""
+FASTEST = 25.0  # maximum frames per second of a film
 
 
-@dataclass(frozen=True)
-class Excerpt:
+class Excerpt(NamedTuple):
     """The part of a pass that a film shows, and its frames."""
 
     begin: float  # s
@@ -142,19 +138,17 @@ def frames(
 
     size: width and height of the film (px). progress: called with the finished share.
     """
-    width, height = size[0], size[1] // len(filmed)
+    part = size[0], size[1] // len(filmed)
     highest = max(_highest(each.run, what) for each in filmed)  # one scale for all
-    passes = [_Pass(each, figures_in_words(each, filmed[0]), (width, height), highest) for each in filmed]
-    number = 0
+    passes = [_Pass(each, figures_in_words(each, filmed[0]), part, highest) for each in filmed]
+    tell, number = progress or (lambda share: None), 0
     while passes[0].time < what.end and all(each.step() for each in passes):
         if passes[0].time < what.begin:
-            if progress is not None:
-                progress(0.2 * passes[0].time / what.begin)
+            tell(0.2 * passes[0].time / what.begin)
             continue
         if number % what.every == 0:
             yield np.concatenate([each.frame() for each in passes])
-            if progress is not None:
-                progress(0.2 + 0.8 * (passes[0].time - what.begin) / (what.end - what.begin))
+            tell(0.2 + 0.8 * (passes[0].time - what.begin) / (what.end - what.begin))
         number += 1
 
 
@@ -202,8 +196,9 @@ def figures_in_words(filmed: Filmed, first: Filmed) -> dict[str, str]:
     if run.terminated:
         return {"figures": "none: it ends early"}
     figures, spans = run.controlled.summary(run.common_spans()), in_words(run.common_spans())
-    values = {"mean": figures.mean, "std": figures.std}
-    texts = {f"{LABELS[name].short}, spans {spans}": f"{value:.1f} N" for name, value in values.items()}
+    texts = {
+        f"{LABELS[name].short}, spans {spans}": f"{getattr(figures, name):.1f} N" for name in ("mean", "std")
+    }
     other = first.run
     if filmed is not first and not other.terminated and _but_for_control(run) == _but_for_control(other):
         change = 100 * (figures.std / other.controlled.summary(other.common_spans()).std - 1)

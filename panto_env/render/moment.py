@@ -17,10 +17,8 @@ from ..plant.alignment import Alignment
 from ..plant.catenary.protocol import LineView
 from ..plant.state import Place, Row
 
-BEHIND, AHEAD = 1.3, 0.75
-"""Part of the line that a picture shows behind and ahead of the pantograph (spans)."""
-SETTLING = 0.5
-"""Time (s) for which the low-pass of the force runs before the shown part."""
+BEHIND, AHEAD = 1.3, 0.75  # part of the line that a picture shows behind and ahead of the pantograph (spans)
+SETTLING = 0.5  # time (s) for which the low-pass of the force runs before the shown part
 
 
 class Rider(NamedTuple):
@@ -145,19 +143,18 @@ def train_of(task: Task, lane: int, collector: int) -> TrainView | None:
         return None
     span, positions = plant.alignment.mean_length, [position_of(task, lane, k) for k in range(len(riding))]
     begin, end = positions[-1] - span, positions[0] + AHEAD * span
-    riders = []
-    for number, (pantograph, position) in enumerate(zip(riding, positions, strict=True)):
-        contact = felt(task, lane, (position - begin) / span, number)
-        riders.append(Rider(pantograph.name, position, contact.places, contact.filtered))
-    return TrainView(tuple(riders), collector, plant.model.view(lane, begin, end))
+    felt_by = [felt(task, lane, (position - begin) / span, k) for k, position in enumerate(positions)]
+    riders = tuple(
+        Rider(pantograph.name, position, contact.places, contact.filtered)
+        for pantograph, position, contact in zip(riding, positions, felt_by, strict=True)
+    )
+    return TrainView(riders, collector, plant.model.view(lane, begin, end))
 
 
 TITLE, CHART, ROOF = 0.075, 0.30, 0.045
 """Shares of the frame's height: of the title, of the chart below, and of the train's roof."""
-PANTOGRAPH = 0.22
-"""Share of the frame's height from the contact wire down to the roof."""
-MINIMUM_HEIGHT = 0.35
-"""Minimum height that a picture shows above the contact wire (m)."""
+PANTOGRAPH = 0.22  # share of the frame's height from the contact wire down to the roof
+MINIMUM_HEIGHT = 0.35  # minimum height that a picture shows above the contact wire (m)
 ROUND_TO = (1, 2, 5, 10, 15, 20, 30, 50, 100, 200)
 """Possible exaggerations of heights: round numbers that are easy to remember."""
 

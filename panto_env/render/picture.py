@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -30,36 +29,12 @@ from .canvas import (
     Colour,
     zigzag,
 )
-from .moment import AHEAD, BEHIND, TITLE, Layout, Moment, Rider, TrainView, force_axis, lost
+from .moment import AHEAD, BEHIND, TITLE, Layout, Moment, force_axis, lost
 
-SHARE = 0.24
-"""Share of a frame's height that the strip has."""
+SHARE = 0.24  # share of a frame's height that the strip of a train has
 NAMES, WIRE, ROOF, CHART = 0.11, 0.20, 0.42, 0.47
 """Shares of the strip's height: middle of the names, the wire, the roof, top of the chart."""
-LIFT = 0.05
-"""Height (m) that the wire is shown to rise by ``RISE`` of the strip's height."""
-RISE = 0.06
-
-
-@dataclass(frozen=True)
-class Overview:
-    """Layout of the strip, and what it is drawn on."""
-
-    canvas: Canvas
-    top: float  # px
-    width: float  # px
-    height: float  # px
-    margin: float  # of the chart (px from the left)
-    begin: float  # position at the left end of the chart (m)
-    per_metre: float  # px
-
-    def across(self, places: Array | float) -> Array:
-        """Pixels from the left for places along the line (m)."""
-        return self.margin + self.per_metre * (np.asarray(places) - self.begin)
-
-    def down(self, share: Array | float) -> Array:
-        """Pixels from the picture's top for shares of the strip's height."""
-        return self.top + self.height * np.asarray(share)
+LIFT, RISE = 0.05, 0.06  # height (m) that the wire is shown to rise by this share of the strip's height
 
 
 def draw_train(canvas: Canvas, moment: Moment, top: float, size: float, margin: float, axis: float) -> None:
@@ -69,24 +44,65 @@ def draw_train(canvas: Canvas, moment: Moment, top: float, size: float, margin: 
     """
     train = moment.train
     assert train is not None
-    height, width = canvas.pixels.shape[:2]
-    span, right = moment.alignment.mean_length, 0.985 * width
-    begin = train.riders[-1].position - span
-    per_metre = (right - margin) / (train.riders[0].position + AHEAD * span - begin)
-    strip = Overview(canvas, top, right, height - top, margin, begin, per_metre)
-    canvas.box(0, top, width, height - top, GROUND)
-    canvas.line([(0, top), (width, top)], FAINT, 2)
-    _draw_part_shown(strip, moment, span)
-    _draw_chart(strip, moment, axis, size)
-    _draw_wire(strip, train)
-    x = margin
+    rows, columns = canvas.pixels.shape[:2]
+    span, width, height = moment.alignment.mean_length, 0.985 * columns, rows - top
+    begin = train.riders[-1].position - span  # position at the left end of the chart (m)
+    per_metre = (width - margin) / (train.riders[0].position + AHEAD * span - begin)
+
+    def across(places: Array | float) -> Array:
+        """Pixels from the left for places along the line (m)."""
+        return margin + per_metre * (np.asarray(places) - begin)
+
+    def down(share: Array | float) -> Array:
+        """Pixels from the picture's top for shares of the strip's height."""
+        return top + height * np.asarray(share)
+
+    def wire(heights: Array | float) -> Array:
+        return down(WIRE + 0.06 - RISE / LIFT * np.asarray(heights))
+
+    def level(forces: Array | float) -> Array:
+        """Pixels from the picture's top for contact forces (N), from 0 to ``axis``."""
+        low, high = CHART + 0.47, CHART + 0.04
+        return down(low - (low - high) * np.clip(np.asarray(forces) / axis, -0.04, 1.06))
+
+    canvas.box(0, top, columns, height, GROUND)
+    canvas.line([(0, top), (columns, top)], FAINT, 2)
+    ends = across(np.array([moment.position - BEHIND * span, moment.position + AHEAD * span])).tolist()
+    left, right, high = max(ends[0], margin), min(ends[1], width), float(down(NAMES + 0.05))
+    foot, upper, lower = float(down(ROOF)), float(down(CHART)), float(down(0.97))
+    canvas.box(
+        left, high, right - left, float(down(ROOF) - down(NAMES + 0.05)), PAPER
+    )  # the part shown above
+    canvas.box(margin, upper, width - margin, lower - upper, PAPER)
+    for force, colour in ((0.0, INK), (axis, FAINT)):
+        y = float(level(force))
+        canvas.line([(margin, y), (width, y)], colour)
+        canvas.words(margin - 0.4 * size, y, f"{force:.0f} N", QUIET, 0.8 * size, anchor="right")
+    end = begin + (width - margin) / per_metre
+    for x in across(moment.alignment.supports_within(begin, end)).tolist():
+        _dots(canvas, x, upper, lower, 9, 4)
+    inside = train.line.x >= begin
+    canvas.wire(np.column_stack([across(train.line.x[inside]), wire(train.line.contact[inside])]), INK, 2)
+    last, first = (float(across(train.riders[k].position)) for k in (-1, 0))
+    beyond = 8 * per_metre
+    canvas.box(last - beyond, foot, first - last + 2 * beyond, 0.03 * height, TRAIN)
+    at = margin  # of the next name
     for number, rider in enumerate(train.riders):
-        colour = colour_of(number, train.shown)
-        _draw_rider(strip, train, rider, colour, number == train.shown)
-        _draw_rider_force(strip, rider, colour, axis, number == train.shown)
-        words = f"{number + 1} {rider.name} {_rider_force(rider)}{', above' if number == train.shown else ''}"
-        y, bold = float(strip.down(NAMES)), number == train.shown
-        x += canvas.words(x, y, words, colour, size, bold=bold) + 1.5 * size
+        colour, shown = colour_of(number, train.shown), number == train.shown
+        x = float(across(rider.position))
+        head = float(wire(float(np.interp(rider.position, train.line.x, train.line.contact))))
+        canvas.line([(x, head), (x + 5, 0.5 * (head + foot)), (x, foot)], colour if shown else METAL, 2)
+        canvas.line([(x - 7, head), (x + 7, head)], colour, 5 if shown else 3)
+        if rider.filtered.size >= 2:
+            few = slice(None, None, -max(1, int(rider.places.size / 2000)))  # from the newest sample back
+            points = np.column_stack([across(rider.places), level(rider.filtered)])[few]
+            canvas.line(points, colour, 2 if shown else 1)
+            x, y = points[0].tolist()
+            canvas.dot(x, y, 4, colour, PAPER)
+        felt = f"{rider.filtered[-1]:.0f} N" if rider.filtered.size else "–"
+        words = f"{number + 1} {rider.name} {'not yet on the line' if rider.position < 0 else felt}"
+        words += ", above" if shown else ""
+        at += canvas.words(at, float(down(NAMES)), words, colour, size, bold=shown) + 1.5 * size
 
 
 def colour_of(number: int, shown: int) -> Colour:
@@ -94,72 +110,15 @@ def colour_of(number: int, shown: int) -> Colour:
     return FORCE if number == shown else OTHERS[number - (number > shown)]
 
 
-def _rider_force(rider: Rider) -> str:
-    if rider.position < 0:
-        return "not yet on the line"
-    return f"{rider.filtered[-1]:.0f} N" if rider.filtered.size else "–"
-
-
-def _draw_part_shown(strip: Overview, moment: Moment, span: float) -> None:
-    left, right = strip.across(np.array([moment.position - BEHIND * span, moment.position + AHEAD * span]))
-    left, right = max(float(left), strip.margin), min(float(right), strip.width)
-    high, low = strip.down(NAMES + 0.05), strip.down(ROOF)
-    strip.canvas.box(left, float(high), right - left, float(low - high), PAPER)
-
-
-def _draw_chart(strip: Overview, moment: Moment, axis: float, size: float) -> None:
-    top, bottom = float(strip.down(CHART)), float(strip.down(0.97))
-    strip.canvas.box(strip.margin, top, strip.width - strip.margin, bottom - top, PAPER)
-    for force, colour in ((0.0, INK), (axis, FAINT)):
-        y = float(_level(strip, force, axis))
-        strip.canvas.line([(strip.margin, y), (strip.width, y)], colour)
-        strip.canvas.words(strip.margin - 0.4 * size, y, f"{force:.0f} N", QUIET, 0.8 * size, anchor="right")
-    end = strip.begin + (strip.width - strip.margin) / strip.per_metre
-    for x in strip.across(moment.alignment.supports_within(strip.begin, end)).tolist():
-        for y in np.arange(top, bottom, 9):
-            strip.canvas.line([(x, y), (x, min(y + 4, bottom))], SUPPORT)
-
-
-def _draw_wire(strip: Overview, train: TrainView) -> None:
-    inside = train.line.x >= strip.begin
-    places, heights = train.line.x[inside], train.line.contact[inside]
-    strip.canvas.wire(np.column_stack([strip.across(places), _wire(strip, heights)]), INK, 2)
-    left, right = (float(strip.across(train.riders[k].position)) for k in (-1, 0))
-    ends, top = 8 * strip.per_metre, float(strip.down(ROOF))
-    strip.canvas.box(left - ends, top, right - left + 2 * ends, 0.03 * strip.height, TRAIN)
-
-
-def _wire(strip: Overview, heights: Array | float) -> Array:
-    return strip.down(WIRE + 0.06 - RISE / LIFT * np.asarray(heights))
-
-
-def _draw_rider(strip: Overview, train: TrainView, rider: Rider, colour: Colour, shown: bool) -> None:
-    x, foot = float(strip.across(rider.position)), float(strip.down(ROOF))
-    head = float(_wire(strip, float(np.interp(rider.position, train.line.x, train.line.contact))))
-    strip.canvas.line([(x, head), (x + 5, 0.5 * (head + foot)), (x, foot)], colour if shown else METAL, 2)
-    strip.canvas.line([(x - 7, head), (x + 7, head)], colour, 5 if shown else 3)
-
-
-def _draw_rider_force(strip: Overview, rider: Rider, colour: Colour, axis: float, shown: bool) -> None:
-    if rider.filtered.size < 2:
-        return
-    few = slice(None, None, -max(1, int(rider.places.size / 2000)))  # from the newest sample back
-    points = np.column_stack([strip.across(rider.places), _level(strip, rider.filtered, axis)])[few]
-    strip.canvas.line(points, colour, 2 if shown else 1)
-    x, y = points[0].tolist()
-    strip.canvas.dot(x, y, 4, colour, PAPER)
-
-
-def _level(strip: Overview, forces: Array | float, axis: float) -> Array:
-    """Pixels from the picture's top for contact forces (N), from 0 to ``axis``."""
-    low, high = CHART + 0.47, CHART + 0.04
-    return strip.down(low - (low - high) * np.clip(np.asarray(forces) / axis, -0.04, 1.06))
+def _dots(canvas: Canvas, x: float, top: float, bottom: float, apart: float, long: float) -> None:
+    """Draw the dashed line of a support in a chart."""
+    for y in np.arange(top, bottom, apart):
+        canvas.line([(x, y), (x, min(y + long, bottom))], SUPPORT)
 
 
 STEPS, MOST_STEPS = (20, 50, 100, 200, 500, 1000, 5000, 20_000, 10**9), 5
 """Possible distances of the lines of the chart (N), and how many there are at most."""
-NEAREST = 4
-"""Minimum distance of the points of a wire (px)."""
+NEAREST = 4  # minimum distance of the points of a wire (px)
 
 
 class Picture:
@@ -213,48 +172,42 @@ def _draw_still(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
     canvas.words(0.015 * layout.width, 0.04 * layout.height, moment.title, INK, 1.35 * size, bold=True)
     _draw_scale(canvas, layout)
     canvas.box(0, layout.roof, layout.pantograph + 0.1 * layout.width, 0.027 * layout.height, TRAIN)
-    words = "train"
-    canvas.words(0.01 * layout.width, layout.roof + 0.0135 * layout.height, words, METAL, 0.8 * size)
+    middle = layout.roof + 0.0135 * layout.height
+    canvas.words(0.01 * layout.width, middle, "train", METAL, 0.8 * size)
     top, bottom = layout.chart
     canvas.box(left, top, right - left, bottom - top, (255, 255, 255))
     for force in range(0, int(axis) + 1, next(step for step in STEPS if axis <= MOST_STEPS * step)):
         y = float(layout.forces(float(force), axis))
         canvas.line([(left, y), (right, y)], INK if force == 0 else FAINT)
         canvas.words(left - 0.4 * size, y, f"{force} N", QUIET, 0.8 * size, anchor="right")
-    _dashes(canvas, left, right, float(layout.forces(moment.nominal_force, axis)), QUIET)
-    if moment.largest_force <= axis:
-        _dashes(canvas, left, right, float(layout.forces(moment.largest_force, axis)), INK)
+    for marked, colour in ((moment.nominal_force, QUIET), (moment.largest_force, INK)):
+        y = float(layout.forces(marked, axis))
+        for x in np.arange(left, right, 14) if marked <= axis else ():
+            canvas.line([(x, y), (min(x + 7, right), y)], colour)
     _draw_legend(canvas, layout, moment, axis)
 
 
 def _draw_legend(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> None:
     size, y = 0.85 * (WORDS * layout.height), layout.chart[0] - 0.75 * (WORDS * layout.height)
     x = layout.margin
-    limit = f"{moment.standard}: {moment.largest_force:.0f} N"
-    if moment.largest_force > axis:
-        limit += ", above"
-    entries = (("contact force to 20 Hz", FORCE), ("raw", RAW), ("contact lost", BAD), ("support", SUPPORT))
-    for words, colour in entries:
-        _draw_sign(canvas, x, y, size, words, colour)
+    for words, colour in (
+        ("contact force to 20 Hz", FORCE),
+        ("raw", RAW),
+        ("contact lost", BAD),
+        ("support", SUPPORT),
+    ):
+        if words == "contact lost":
+            canvas.box(x + 0.7 * size, y - 0.35 * size, 0.7 * size, 0.7 * size, colour)
+        elif words == "support":
+            for k in range(2):
+                top = y + (0.7 * k - 0.6) * size
+                canvas.line([(x + 1.1 * size, top), (x + 1.1 * size, top + 0.45 * size)], colour)
+        else:
+            canvas.line([(x, y), (x + 1.5 * size, y)], colour, 2.4)
         x += 1.8 * size
         x += canvas.words(x, y, words, QUIET, size) + 0.9 * size
+    limit = f"{moment.standard}: {moment.largest_force:.0f} N{', above' * (moment.largest_force > axis)}"
     canvas.words(layout.pantograph, y, limit, INK, size, anchor="right")
-
-
-def _draw_sign(canvas: Canvas, x: float, y: float, size: float, words: str, colour: Colour) -> None:
-    if words == "contact lost":
-        canvas.box(x + 0.7 * size, y - 0.35 * size, 0.7 * size, 0.7 * size, colour)
-    elif words == "support":
-        for k in range(2):
-            top = y + (0.7 * k - 0.6) * size
-            canvas.line([(x + 1.1 * size, top), (x + 1.1 * size, top + 0.45 * size)], colour)
-    else:
-        canvas.line([(x, y), (x + 1.5 * size, y)], colour, 2.4)
-
-
-def _dashes(canvas: Canvas, left: float, right: float, y: float, colour: Colour) -> None:
-    for x in np.arange(left, right, 14):
-        canvas.line([(x, y), (min(x + 7, right), y)], colour)
 
 
 def _draw_scale(canvas: Canvas, layout: Layout) -> None:
@@ -287,28 +240,22 @@ def _draw_line(canvas: Canvas, layout: Layout, moment: Moment) -> None:
     for places, heights in line.further:
         canvas.wire(layout.points(places, heights, at), METAL, 1)
     ends = (layout.up(heights).tolist() for heights in (line.tops, line.bottoms))
-    for x, top, bottom, slack in zip(
-        layout.across(line.droppers, at).tolist(), *ends, line.slack.tolist(), strict=True
-    ):
+    droppers = layout.across(line.droppers, at).tolist(), *ends, line.slack.tolist()
+    for x, top, bottom, slack in zip(*droppers, strict=True):
         if slack:
             bow = np.linspace(0, 1, 9)
-            points = np.column_stack([x + 28 * bow * (1 - bow), top + (bottom - top) * bow])
-            canvas.line(points, BAD, 2)
+            canvas.line(np.column_stack([x + 28 * bow * (1 - bow), top + (bottom - top) * bow]), BAD, 2)
         else:
             canvas.line([(x, top), (x, bottom)], QUIET)
     canvas.wire(contact, INK, 3)
-    _name_parts(canvas, layout, contact, upper if line.messenger.size else None, bool(line.slack.any()))
-
-
-def _name_parts(canvas: Canvas, layout: Layout, contact: Array, upper: Array | None, slack: bool) -> None:
-    size, x = 0.85 * (WORDS * layout.height), 0.01 * layout.width
-    canvas.words(x, float(contact[0, 1]) + size, "contact wire", QUIET, size)
-    if upper is not None:
-        highest = float(upper[:, 1].min())
+    size, left, low = 0.85 * (WORDS * layout.height), 0.01 * layout.width, float(contact[0, 1])
+    canvas.words(left, low + size, "contact wire", QUIET, size)
+    if line.messenger.size:
         below_title = (TITLE + 0.01) * layout.height
-        canvas.words(x, max(highest - 1.2 * size, below_title), "messenger wire", QUIET, size)
-    if slack:
-        canvas.words(x, float(contact[0, 1]) + 2.4 * size, "slack dropper", BAD, size)
+        highest = max(float(upper[:, 1].min()) - 1.2 * size, below_title)
+        canvas.words(left, highest, "messenger wire", QUIET, size)
+    if line.slack.any():
+        canvas.words(left, low + 2.4 * size, "slack dropper", BAD, size)
 
 
 def _draw_mast(canvas: Canvas, layout: Layout, x: float, contact: Array, upper: Array | None) -> None:
@@ -366,16 +313,15 @@ def _draw_actuators(canvas: Canvas, layout: Layout, moment: Moment) -> None:
     """Draw an arrow for each actuator's force, upwards where it increases the contact force."""
     chain, scale = layout.chain(moment.heights).tolist(), layout.height / 720
     for place, force in moment.actuators.items():
-        y = chain[0] if place is Place.HEAD else chain[-1]
-        x = layout.pantograph - (100 if place is Place.HEAD else 64) * scale
-        name = "head" if place is Place.HEAD else "frame"
+        head = place is Place.HEAD
+        y, x = chain[0 if head else -1], layout.pantograph - (100 if head else 64) * scale
         length = layout.arrow(force, moment.force_limit)
         canvas.line([(x - 12 * scale, y), (x + 12 * scale, y)], PUSH, 2)
         if abs(length) > 1:
             tip, wing = y - length, np.sign(length) * min(11 * scale, abs(length))
             canvas.line([(x, y), (x, tip + 0.6 * wing)], PUSH, 5 * scale)
             canvas.shape([(x, tip), (x - 9 * scale, tip + wing), (x + 9 * scale, tip + wing)], PUSH)
-        words = f"actuator on the {name} {force:+.0f} N"
+        words = f"actuator on the {'head' if head else 'frame'} {force:+.0f} N"
         canvas.words(x - 20 * scale, y, words, (176, 110, 0), WORDS * layout.height, anchor="right")
 
 
@@ -383,8 +329,7 @@ def _draw_force(canvas: Canvas, layout: Layout, moment: Moment, axis: float) -> 
     begin = moment.position - (layout.pantograph - layout.margin) / layout.per_metre
     supports = moment.alignment.supports_within(begin, moment.position)
     for at in layout.across(supports, moment.position).tolist():
-        for y in np.arange(layout.chart[0], layout.chart[1], 11):
-            canvas.line([(at, y), (at, min(y + 6, layout.chart[1]))], SUPPORT)
+        _dots(canvas, at, *layout.chart, 11, 6)
     shown = moment.places >= begin
     if shown.sum() < 2:
         return

@@ -18,13 +18,10 @@ from ..metrics import compliance as en50367
 from ..plant.state import Row
 from .moment import Rider, felt, position_of, shown_collector, train_of
 
-SPANS = 3.0
-"""Length of the shown part of the line (spans)."""
+SPANS = 3.0  # length of the shown part of the line (spans)
 FORCE_ROWS, HEIGHT_ROWS = 10, 6
-WIDE = 120
-"""Maximum number of columns."""
-AXIS = 9
-"""Columns for the numbers next to a chart."""
+WIDE = 120  # maximum number of columns
+AXIS = 9  # columns for the numbers next to a chart
 EMPTY = "\u2800"
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bits of the dots in a character of Unicode's Braille patterns: four rows of two."""
@@ -153,8 +150,7 @@ def _round(heights: Array) -> tuple[float, float]:
     return float(low), float(max(high, low + 10))
 
 
-INTERVAL = 0.1
-"""Time (s) between two pictures."""
+INTERVAL = 0.1  # time (s) between two pictures
 
 
 @contextmanager

@@ -22,8 +22,7 @@ from ..base.extras import require
 from ..base.files import check_output, write_whole
 
 Frames = Iterable[NDArray[np.uint8]]
-FILMS = (".mp4", ".gif")
-"""Suffixes of files for films."""
+FILMS = (".mp4", ".gif")  # suffixes of files for films
 
 
 def write_film(frames: Frames, path: str | Path, rate: float, size: tuple[int, int]) -> None:

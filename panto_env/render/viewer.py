@@ -80,6 +80,5 @@ def figures_so_far(task: Task, row: int) -> dict[str, str]:
         values = task.figures(row).as_dict()
     except InputError:
         return {}
-    shown = ("mean", "std", "contact_loss")
-    texts = {name: f"{LABELS[name].scale * values[name]:.1f} {LABELS[name].unit}" for name in shown}
-    return {f"{LABELS[name].short} so far": text for name, text in texts.items()}
+    shown = {name: LABELS[name] for name in ("mean", "std", "contact_loss")}
+    return {f"{of.short} so far": f"{of.scale * values[name]:.1f} {of.unit}" for name, of in shown.items()}

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-HIGHEST = 25.0
-"""Maximum frequency of the spectra (Hz)."""
+HIGHEST = 25.0  # maximum frequency of the spectra (Hz)
 
 
 P = ParamSpec("P")
@@ -60,9 +59,8 @@ def as_svg(height: float = 3.2, *, along_line: bool = False) -> Callable[[Draw[P
 @as_svg(along_line=True)
 def force_along(axes: Axes, one: Findings, found: Sequence[Findings]) -> None:
     """Contact force along the evaluated spans; found: all runs of the page, for the same scale."""
-    extremes = [
-        extreme(each.run.contact_force[each.inside]) for each in found for extreme in (np.min, np.max)
-    ]
+    forces = [each.run.contact_force[each.inside] for each in found]
+    extremes = [extreme(force) for force in forces for extreme in (np.min, np.max)]
     run, inside = one.run, one.inside
     position, smooth = run.position[inside], zero_phase_low_pass(run.contact_force, run.time_step)[inside]
     axes.plot(position, run.contact_force[inside], color="0.78", linewidth=0.7, label="raw")
@@ -93,8 +91,7 @@ def force_together(axes: Axes, one: Findings) -> None:
 def force_folded(axes: Axes, names: Mapping[Findings, str]) -> None:
     """Contact force over the place within the span: median, minimum and maximum of all spans."""
     for k, one in enumerate(names):
-        folded = one.folded
-        if folded is None:
+        if (folded := one.folded) is None:
             continue
         colour = series_colour(k)
         axes.fill_between(folded.share, folded.low, folded.high, color=colour, alpha=0.2, linewidth=0)
@@ -128,13 +125,11 @@ def spectrum(axes: Axes, names: Mapping[Findings, str]) -> None:
 @as_svg(2.6)
 def uplifts(axes: Axes, names: Mapping[Findings, str]) -> None:
     """Maximum uplift at each support."""
-    supports = sorted({number for one in names for number, _, _ in one.uplifts})
-    for k, one in enumerate(names):
-        numbers = [number for number, _, _ in one.uplifts]
+    supports, width = sorted({number for one in names for number, _, _ in one.uplifts}), 0.8 / len(names)
+    for k, (one, words) in enumerate(names.items()):
+        at = np.array([number for number, _, _ in one.uplifts]) + width * (k - (len(names) - 1) / 2)
         heights = [1e3 * uplift for _, _, uplift in one.uplifts]
-        width = 0.8 / len(names)
-        at = np.array(numbers) + width * (k - (len(names) - 1) / 2)
-        axes.bar(at, heights, width, color=series_colour(k), label=names[one])
+        axes.bar(at, heights, width, color=series_colour(k), label=words)
     name, turned = next(iter(names)).run.alignment.mast, 90 if len(supports) > 8 else 0
     axes.set(xlabel="support", ylabel="maximum uplift (mm)", xticks=supports)
     if any(map(name, supports)):
@@ -148,9 +143,8 @@ def strips(axes: Axes, names: Mapping[Findings, str]) -> None:
     for k, (one, name) in enumerate(names.items()):
         assert one.strip_use is not None
         axes.stairs(100 * one.strip_use.wear, 1e3 * one.strip_use.edges, color=series_colour(k), label=name)
-    axes.set(
-        xlabel="from the middle of the head, to the right (mm)", ylabel="share of wear (%)", ylim=(0, None)
-    )
+    axes.set(xlabel="from the middle of the head, to the right (mm)")
+    axes.set(ylabel="share of wear (%)", ylim=(0, None))
     legend_above(axes, 4)
 
 

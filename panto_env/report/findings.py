@@ -27,8 +27,7 @@ from ..plant.catenary.flexible.as_run import AsRun, as_run, as_run_tables, non_u
 from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest
 from ..plant.pantograph.schema import PantographData
 
-FOLDS = 240
-"""Number of places in a span at which spans are compared."""
+FOLDS = 240  # number of places in a span at which spans are compared
 
 
 class Loss(NamedTuple):
@@ -157,10 +156,8 @@ class Findings:
             return None
         share = np.linspace(0.0, 1.0, FOLDS, endpoint=False)
         first, last = self.covered
-        spans = [
-            np.interp(self.run.alignment.support(k - 1 + share), self.run.position, self.filtered)
-            for k in range(first, last + 1)
-        ]
+        places = (self.run.alignment.support(k - 1 + share) for k in range(first, last + 1))
+        spans = [np.interp(each, self.run.position, self.filtered) for each in places]
         return Folded(share, np.median(spans, axis=0), np.min(spans, axis=0), np.max(spans, axis=0))
 
     @cached_property
@@ -232,6 +229,4 @@ class Findings:
     def plan_tables(self) -> list[Table]:
         """Supports and spans seen from above; none without stagger."""
         alignment = self.run.alignment
-        return (
-            self.plan.tables(lambda number: alignment.support_name(number, number + 1)) if self.plan else []
-        )
+        return self.plan.tables(lambda k: alignment.support_name(k, k + 1)) if self.plan else []

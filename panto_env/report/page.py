@@ -72,8 +72,7 @@ the raw force.
 """.strip()
 
 
-MOST = 8
-"""Maximum number of runs on one page: more cannot be distinguished."""
+MOST = 8  # maximum number of runs on one page: more cannot be distinguished
 
 
 def page(found: Sequence[Findings]) -> str:

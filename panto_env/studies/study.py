@@ -20,27 +20,24 @@ from ..base.table import Table, write_rows
 from ..metrics.figures import HEADINGS
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
+else:
+    Figure = Any  # for annotations alone, here and in all studies: Matplotlib is slow to import
 
-NUMBERS = "numbers.json"
-"""File with every number of a study."""
+NUMBERS = "numbers.json"  # file with every number of a study
 Report = Callable[[str, float], None]
 """Called with what is being done and the share of the study that is done, 0..1."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One figure of ours beside the paper's, and the range in which they agree.
-
-    Where the paper makes a statement without a figure, ``paper`` is that statement in short. ``low`` and
-    ``high`` are inclusive.
-    """
+    """One figure of ours beside the paper's, and the range in which they agree."""
 
     quantity: str
     unit: str
     ours: float
-    paper: float | str
-    low: float
+    paper: float | str  # where the paper makes a statement without a figure, that statement in short
+    low: float  # inclusive, as high
     high: float
     note: str = ""  # why they differ, or what the paper leaves open
 
@@ -68,18 +65,19 @@ class Outcome:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: nan becomes None."""
-        comparisons = {"comparisons": [comparison.as_dict() for comparison in self.comparisons]}
         verdict = {"verdict": self.verdict} if self.verdict else {}
-        table: dict[str, Any] = finite({"title": self.title} | verdict | comparisons | dict(self.numbers))
+        comparisons = [comparison.as_dict() for comparison in self.comparisons]
+        table: dict[str, Any] = finite(
+            {"title": self.title} | verdict | {"comparisons": comparisons} | dict(self.numbers)
+        )
         return table
 
 
 Study = Callable[[Report], Outcome]
 """A study of one part of a paper: run it, on all cores where it takes long."""
-Cell = str | Callable[[Any], str | float]
-"""Of an entry: a format such as "{.std:.2f}", or a function."""
-Columns = Sequence[tuple[str, Cell]]
-"""Headings, and the cells under them."""
+Cell = str | Callable[[Any], str | float]  # of an entry: a format such as "{.std:.2f}", or a function
+Columns = Sequence[str | tuple[str, Cell]]
+"""Headings and the cells under them; a text has several columns, as "line: {.line} | km/h: {.speed:g}"."""
 
 
 @cache
@@ -99,9 +97,17 @@ def said(key: str, ours: float, **names: Any) -> Comparison:
     return Comparison(quantity, unit, ours, *others)
 
 
-def row(columns: Columns, entry: Any) -> tuple[str | float, ...]:
-    """The cells of an entry."""
-    return tuple(cell.format(entry) if isinstance(cell, str) else cell(entry) for _, cell in columns)
+def columns_of(columns: Columns) -> list[tuple[str, Cell]]:
+    """Heading and cell of each column."""
+    found: list[tuple[str, Cell]] = []
+    for each in columns:
+        if isinstance(each, str):
+            found += [
+                (heading, cell) for heading, _, cell in (text.partition(": ") for text in each.split(" | "))
+            ]
+        else:
+            found.append(each)
+    return found
 
 
 def tabled(
@@ -112,12 +118,25 @@ def tabled(
     section: Callable[[Any], Any] | None = None,
 ) -> Table:
     """A row for each entry, columns by heading, and a line after entries that ``section`` groups together."""
-    rows = [row(columns, each) for each in entries]
-    ends: tuple[int, ...] = ()
-    if section is not None:
-        groups = [*map(section, entries)]
-        ends = tuple(k for k, group in enumerate(groups) if groups[k + 1 : k + 2] != [group])
-    return Table(title, tuple(heading for heading, _ in columns), rows, text_columns, ends)
+    headings, cells = zip(*columns_of(columns), strict=True)
+    rows = [
+        tuple(cell.format(each) if isinstance(cell, str) else cell(each) for cell in cells)
+        for each in entries
+    ]
+    groups = [*map(section, entries)] if section else []
+    ends = tuple(k for k, group in enumerate(groups) if groups[k + 1 : k + 2] != [group])
+    return Table(title, headings, rows, text_columns, ends)
+
+
+def over(report: Report, what: str, begin: float, end: float) -> Callable[[int, int], None]:
+    """Progress of jobs, done and in all, as a part of a study's, from one share of it to another."""
+    return lambda done, total: report(what, begin + (end - begin) * done / total)
+
+
+def legend_below(figure: Figure, columns: int, size: str = "small") -> None:
+    """One legend of the first panel's curves below all panels."""
+    named = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*named, loc="outside lower center", ncols=columns, fontsize=size)
 
 
 def check_writable(folder: Path) -> None:

@@ -30,10 +30,8 @@ QUICK = Choice("periodic-stiffness", "three-mass", 200)
 TOO_FAST = Choice(speed_kmh=450)
 
 
-@pytest.mark.parametrize(
-    "choice", [QUICK, QUICK._replace(policy="p", hardware="realistic", line_condition="fair", seed=3)]
-)
-def test_the_code_and_the_command_are_the_run_that_is_shown(choice):
+def test_the_code_and_the_command_are_the_run_that_is_shown():
+    choice = QUICK._replace(policy="p", hardware="realistic", line_condition="fair", seed=3)
     seen = look(choice)
     names, printed = {}, io.StringIO()
     with contextlib.redirect_stdout(printed):
@@ -86,9 +84,6 @@ def test_warnings_of_a_run_are_told():
     seen = look(Choice("re250-stitched", speed_kmh=200))
     assert [each[:40] for each in seen.warnings] == ["Waves travel far along a line with stitc"]
     assert '<p class="warning">Waves travel far' in page.status([seen], running=False)
-
-
-# --- the page without a browser --------------------------------------------------------------------
 
 
 class Worker:
@@ -201,9 +196,6 @@ def test_a_fault_of_the_program_is_shown_and_the_page_goes_on(monkeypatch, capsy
     assert "210 km/h, passive: " in opened.see()
 
 
-# --- the command -----------------------------------------------------------------------------------
-
-
 def test_what_the_command_cannot_do_is_one_sentence(monkeypatch):
     def taken(*_, **__):
         raise OSError(98, "Address already in use")
@@ -211,9 +203,8 @@ def test_what_the_command_cannot_do_is_one_sentence(monkeypatch):
     monkeypatch.setattr(page, "Server", taken)
     done = panto("app", "--no-browser")
     assert (done.returncode, done.stdout) == (2, "")
-    assert (
-        done.stderr == "panto: Port 5006 cannot be had (Address already in use); give another one: --port.\n"
-    )
+    words = "Port 5006 cannot be had (Address already in use); give another one: --port."
+    assert done.stderr == f"panto: {words}\n"
 
 
 def test_the_extra_weighs_what_the_document_says():

@@ -64,7 +64,7 @@ def test_a_level_line_does_not_hide_the_curve():
 
 
 def test_what_is_shown_is_what_the_run_has():
-    task, run = driven(450), simulate()
+    task, run = driven(450), simulate(distance=380.0)
     contact = felt(task, 0, 3.0)
     shown = (run.position > 4.5 * 300 / 3.6 - 180) & (run.position < 4.5 * 300 / 3.6)
     for name in ("force", "head"):
@@ -97,7 +97,10 @@ def test_no_line_is_wider_than_the_terminal_or_too_wide_to_read(width):
 
 @pytest.mark.parametrize(
     ("policy", "settings"),
-    [(None, {}), ("pd", STIFFNESS | {"sensors": "realistic", "pantograph_scatter": 0.1})],
+    [
+        (None, {"distance": 200.0}),
+        ("pd", STIFFNESS | {"distance": 200.0, "sensors": "realistic", "pantograph_scatter": 0.1}),
+    ],
 )
 def test_a_run_that_is_watched_is_the_same_bit_for_bit(policy, settings):
     plain = simulate(policy=policy, seed=3, **settings)
@@ -166,9 +169,8 @@ def test_an_interrupted_run_gives_the_cursor_back(tmp_path):
 def test_without_a_terminal_it_says_so_and_goes_on():
     told = panto("simulate", "--live", "--catenary", "periodic-stiffness", "--pantograph", "three-mass")
     assert told.returncode == 0
-    assert (
-        told.stderr == "panto: --live needs a terminal of 40 columns to draw in; the run continues without.\n"
-    )
+    message = "--live needs a terminal of 40 columns to draw in; the run continues without."
+    assert told.stderr == f"panto: {message}\n"
     assert "standard deviation" in told.stdout
     assert "height of the head" not in told.stdout
 
@@ -178,11 +180,8 @@ def test_the_labels_of_a_chart_stand_at_their_rows():
         return [line.plain.partition("│")[0] for line in chart(np.arange(3.0), np.zeros(3), *given)]
 
     assert labels((10.0, 50.0), 5, 20) == ["     50 ", "        ", "        ", "        ", "     10 "]
-    assert labels((0.0, 100.0), 6, 20, 62.0) == [
-        *(["    100 ", "        ", "     62 "]),
-        *["        "] * 2,
-        "      0 ",
-    ]
+    ends = ["        "] * 2
+    assert labels((0.0, 100.0), 6, 20, 62.0) == ["    100 ", ends[0], "     62 ", *ends, "      0 "]
     assert [len(line.plain) for line in chart(np.arange(3.0), np.zeros(3), (0.0, 1.0), 2, 20)] == [29, 29]
 
 

@@ -16,6 +16,7 @@ import cv2
 
 from panto_env.render.picture import Picture
 
+from ..marks import some_at_once
 from .made_up_plots import PLOTS
 from .test_render import driven, moment
 
@@ -48,8 +49,7 @@ PICTURES = {f"frame-{name}": partial(frame, name) for name in FRAMES}
 PICTURES |= {name: partial(pixels, plot) for name, plot in PLOTS.items()}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize("name", some_at_once(PICTURES, ("frame-flexible", "frame-stiffness")))
 def test_a_picture_is_as_it_was(name):
     now = np.asarray(PICTURES[name]()).astype(int)
     then = cv2.imread(str(STORED / f"{name}.png"))[..., ::-1].astype(int)

@@ -3,6 +3,7 @@
 import csv
 import html
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_a_workbook_has_figures_and_droppers_of_each(run, tmp_path):
 
 
 def test_runs_of_one_pantograph_and_trains_share_a_table(run, tmp_path):
-    alone = simulate("en50318-2002", speed_kmh=250.0)
+    alone = replace(run, followers=())
     save_figures([alone, run], tmp_path / "f.csv")
     with (tmp_path / "f.csv").open(encoding="utf-8-sig") as file:
         rows = [row for row in csv.DictReader(file) if row["key"] == "mean"]

@@ -13,20 +13,15 @@ from panto_env.catalog import load_catenary
 pytest.importorskip("optuna")
 
 from panto_env.studies import write
-from panto_env.studies.design import Design, read_design, retrofit, study
-from panto_env.studies.design.check import AS_BUILT
-from panto_env.studies.design.retrofit import CONTACT, SPACING, Replaced, Step, replaced
+from panto_env.studies.design import Design, check, read_design, study
+from panto_env.studies.design.check import AS_BUILT, CONTACT, SPACING, Replaced, Step, replaced
 from panto_env.studies.permissible.scan import VERIFIED_FROM
 
 from ..pages import DOCS, check_page, tables_of
 
 PAGE, STORED = "design.md", DOCS / "design" / "numbers.json"
-RUN = {
-    "catenary": "en50318-2002",
-    "pantographs": ["dsa380", "dsa380"],
-    "distances": [200.0],
-    "controlled": [1, 2],
-}
+TRAIN = {"pantographs": ["dsa380", "dsa380"], "distances": [200.0], "controlled": [1, 2]}
+RUN = {"catenary": "en50318-2002"} | TRAIN
 
 
 def steps(*each: tuple[float, tuple[str, ...]]) -> Replaced:
@@ -48,7 +43,7 @@ def test_what_is_replaced_ends_at_the_first_step_that_is_worse():
 @pytest.mark.slow
 def test_what_control_replaces_is_what_passes_say(monkeypatch):
     """At 250 km/h on the reference line: without control, and under it with nine tenths of the tension."""
-    monkeypatch.setattr(retrofit, "SHARES", (0.9,))
+    monkeypatch.setattr(check, "SHARES", (0.9,))
     design = Design(
         variables={CONTACT: (1e4, 2e4)}, speeds_kmh=(250.0,), check_seeds=1, run=RUN | {"distance": 700.0}
     )
@@ -83,6 +78,7 @@ def test_the_page_shows_what_is_stored():
     check_page(PAGE, printed)
     text = " ".join((DOCS / PAGE).read_text(encoding="utf-8").split())
     assert outcome.verdict in text
+    assert sum(any(map(str.isalnum, word)) for word in text.split()) <= 900  # it is short
 
 
 def test_what_is_stored_is_of_the_files_of_the_study():
@@ -91,23 +87,15 @@ def test_what_is_stored_is_of_the_files_of_the_study():
     assert [case["name"] for case in numbers["cases"]] == list(study.CASES)
     for case in numbers["cases"]:
         design = read_design(study.file_of(case["name"]))
-        assert case["line"] == design.settings["catenary"]
-        assert case["policy"] == design.policy
-        assert tuple(case["speeds_kmh"]) == design.speeds_kmh
-        assert case["designs"] == design.designs
-        ranges = {name: tuple(own["range"]) for name, own in case["variables"].items()}
-        assert ranges == design.variables
+        assert (case["line"], case["policy"]) == (design.settings["catenary"], design.policy)
+        assert (tuple(case["speeds_kmh"]), case["designs"]) == (design.speeds_kmh, design.designs)
+        assert {name: tuple(own["range"]) for name, own in case["variables"].items()} == design.variables
         for name, own in case["variables"].items():
             assert own["start"] == pytest.approx(study.start_of(design, name))
             assert own["range"][0] <= own["best"] <= own["range"][1]
     design = read_design(study.file_of(study.FRONT))
     assert [each["seed"] for each in numbers["fronts"]] == list(study.FRONT_SEEDS)
     assert {each["designs"] for each in numbers["fronts"]} == {design.designs}
-
-
-def test_the_page_is_short():
-    words = (DOCS / PAGE).read_text(encoding="utf-8").split()
-    assert sum(any(map(str.isalnum, word)) for word in words) <= 900
 
 
 SHORT = """
@@ -135,7 +123,7 @@ def test_the_study_on_one_line(monkeypatch, tmp_path):
     for name, value in {"CASES": ("one",), "RETROFITTED": ("one",), "FRONT_SEEDS": (0, 1)}.items():
         monkeypatch.setattr(study, name, value)
     monkeypatch.setattr(study, "file_of", lambda name: Path(tmp_path / f"{name}.toml"))
-    monkeypatch.setattr(retrofit, "SHARES", (0.9,))
+    monkeypatch.setattr(check, "SHARES", (0.9,))
     outcome = study.run(lambda what, share: None)
     bought, _, values, slackened = outcome.tables
     (row,) = bought.cells

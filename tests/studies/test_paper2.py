@@ -44,14 +44,6 @@ def test_the_pages_show_what_the_study_prints(outcome):
 
 def test_figures_and_numbers_are_written(outcome, tmp_path):
     names = {path.name for path in write(outcome, tmp_path)}
-    figures = {
-        "fig05-08-rig",
-        "fig11-displacements-and-velocities",
-        "fig12-displacements",
-        "estimator-delay",
-        "diagnosis",
-        "diagnosis-false-alarms",
-        "fig14-15-bench",
-        "closed-loop",
-    }
-    assert names == {"numbers.json", *(f"{name}.png" for name in figures)}
+    names_of = ("fig11-displacements-and-velocities", "fig12-displacements", "fig14-15-bench", "closed-loop")
+    others = ("fig05-08-rig", "estimator-delay", "diagnosis", "diagnosis-false-alarms")
+    assert names == {"numbers.json", *(f"{name}.png" for name in (*names_of, *others))}

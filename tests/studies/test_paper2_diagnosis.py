@@ -36,8 +36,8 @@ def test_what_is_judged_was_not_trained_on():
 def test_shares_have_wilson_s_interval():
     """Of 8 in 10: (0.490, 0.943), in every table of them."""
     cases = [case(BROKEN, 1.0, k < 8) for k in range(10)]
-    assert study.share(cases, lambda each: each.detected) == pytest.approx((0.8, 0.490, 0.943), abs=1e-3)
-    assert np.isnan(study.share([], lambda each: each.detected)[0])
+    assert study.share(cases, detected=True) == pytest.approx((0.8, 0.490, 0.943), abs=1e-3)
+    assert np.isnan(study.share([], detected=True)[0])
 
 
 def test_false_alarms_are_those_of_healthy_lines_alone():
@@ -55,13 +55,8 @@ def test_smallest_severity_needs_all_worse_ones():
 
 
 def test_tables_and_curves_hold_every_case():
-    cases = [
-        case(kind, size, True, passes=count)
-        for kind, sizes in SEVERITIES.items()
-        for size in sizes
-        for count in study.MEANS
-    ]
-    cases += [case(passes=count) for count in study.MEANS]
+    sizes = [("", 0.0), *((kind, size) for kind, several in SEVERITIES.items() for size in several)]
+    cases = [case(*each, bool(each[0]), passes=count) for each in sizes for count in study.MEANS]
     table = study.severity_table(cases)
     assert [row[2] for row in table.rows] == ["100"] * sum(map(len, SEVERITIES.values()))
     confusion = study.confusion_table(cases, 1)
@@ -71,11 +66,8 @@ def test_tables_and_curves_hold_every_case():
 
 
 def test_outer_droppers_are_those_next_to_a_support():
-    assert [study.is_outer(TRACK, 12 * 60 + x) for x in TRACK.data.droppers.positions] == [
-        True,
-        *[False] * 7,
-        True,
-    ]
+    outer = [study.is_outer(TRACK, 12 * 60 + x) for x in TRACK.data.droppers.positions]
+    assert outer == [True, *[False] * 7, True]
     assert not study.is_outer(TRACK, 12 * 60)
 
 

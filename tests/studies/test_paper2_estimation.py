@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from panto_env import simulate
 from panto_env.analysis.plots import save
 from panto_env.estimation.motion import measure
 from panto_env.studies.paper2 import estimation
@@ -13,7 +14,9 @@ BOTH, ONE = OBSERVATIONS
 
 @pytest.fixture(scope="module")
 def trajectory():
-    return estimation.run(250.0)
+    """The part of a pass that figures show."""
+    given = {"time_step": estimation.TIME_STEP, "record_droppers": False, "distance": 500.0}
+    return simulate(estimation.CATENARY, estimation.PANTOGRAPH, 250.0, **given)
 
 
 @pytest.mark.slow
@@ -41,8 +44,8 @@ def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
-    told = estimation.parameter_information(trajectory)
+def test_a_pass_tells_the_frame_but_not_head_nor_scale():
+    told = estimation.parameter_information(estimation.run(250.0))
     true = {"masses.2": 13.0, "stiffnesses.1": 7000.0, "dampings.2": 100.0}
     found = dict(zip(told.found.names, told.found.values, strict=True))
     for name, value in true.items():
@@ -52,12 +55,8 @@ def test_a_pass_tells_the_frame_but_not_head_nor_scale(trajectory):
 
 
 def test_figures_are_drawn(trajectory, tmp_path):
-    motion = measure(trajectory, seed=0)
-    method = METHODS["filter, random-walk"]
-    forces = {
-        observation: method(motion, estimation.known_pantograph(0), observation)
-        for observation in OBSERVATIONS
-    }
+    motion, known = measure(trajectory, seed=0), estimation.known_pantograph(0)
+    forces = {each: METHODS["filter, random-walk"](motion, known, each) for each in OBSERVATIONS}
     for number, observation in ((11, BOTH), (12, ONE)):
         figure = estimation.figure_11_12(motion, forces[observation], observation)
         assert f"as Fig. {number} of paper 2" in figure.get_suptitle()

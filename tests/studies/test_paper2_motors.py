@@ -1,14 +1,27 @@
 """What motors on frame and head buy (paper 2, section 4.3), and one collector on a bench (Figs 14, 15)."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
-from panto_env import InputError
+from panto_env import InputError, simulate
 from panto_env.plant.actuators import actuator_settings
 from panto_env.plant.actuators.motor.schema import motor_power
 from panto_env.studies.paper2 import motors
 
 SPEED = 250.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short():
+    """Passes of twelve spans, of which four count."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(motors, "SPANS", (8, 11))
+        patch.setattr(motors, "simulate", partial(simulate, distance=720.0))
+        motors.without_motors.cache_clear()
+        yield
+    motors.without_motors.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -17,8 +30,8 @@ def passive():
 
 
 @pytest.fixture(scope="module")
-def at_15_watts():
-    return {place: motors.at_power(SPEED, place, 15.0) for place in motors.PLACES}
+def by_place(passive):
+    return {place: motors.motor_pass(SPEED, place, 2.0, passive.figures.mean) for place in motors.PLACES}
 
 
 def recorded_power(one, place):
@@ -35,32 +48,20 @@ def changes(one, passive):
 
 
 @pytest.mark.slow
-def test_the_frame_is_for_low_frequencies_and_the_head_for_medium_ones(passive, at_15_watts):
-    """The paper's words, at equal electrical power."""
-    frame, head, both = (changes(at_15_watts[place], passive) for place in motors.PLACES)
+def test_at_equal_power_the_head_lowers_sigma_more_than_the_frame_and_both_most(passive):
+    """In medium frequencies; by how much, the study's statements say."""
+    at_15_watts = {place: motors.at_power(SPEED, place, 15.0) for place in motors.PLACES}
     assert [one.power for one in at_15_watts.values()] == pytest.approx([15.0] * 3, rel=0.01)
-    assert frame[0] < -0.3
-    assert head[0] > -0.05  # a pair of forces within the pantograph lifts nothing for long
-    assert (head[1:] < frame[1:] - 0.15).all()
-    assert (head[2:] < -0.2).all()
-    assert (np.abs(frame[2:]) < 0.1).all()
-    assert both[0] < -0.3
-    assert both[1] < -0.45
-    sigma = {place: one.figures.std for place, one in at_15_watts.items()}
-    assert sigma["both"] < sigma["head"] < sigma["frame"] < passive.figures.std
-    # No smaller sigma by a smaller mean.
-    for one in at_15_watts.values():
-        assert one.figures.mean == pytest.approx(passive.figures.mean, rel=0.01)
+    frame, head, both = at_15_watts["frame"], at_15_watts["head"], at_15_watts["both"]
+    assert both.figures.std < head.figures.std < frame.figures.std < passive.figures.std
+    assert (changes(head, passive)[1:] < changes(frame, passive)[1:] - 0.15).all()
 
 
-def test_so_they_are_at_an_equal_limit_of_force(passive):
-    best = {place: motors.at_force_limit(SPEED, place, 50.0, (1.0, 4.0)) for place in motors.PLACES}
-    assert all(one.largest_force < 50.0 * 1.25 for one in best.values())  # a driven gearbox adds friction
-    frame, head, both = (changes(best[place], passive) for place in motors.PLACES)
-    assert frame[0] < head[0] - 0.3
-    assert (head[1:] < frame[1:] - 0.15).all()
-    assert best["both"].figures.std < best["head"].figures.std < best["frame"].figures.std
-    assert (both < 0.02).all()
+def test_at_a_limit_of_force_the_gain_of_the_least_sigma_is_taken(passive):
+    best = motors.at_force_limit(SPEED, "head", 50.0, (0.25, 2.0))
+    assert best.gain == 2.0
+    assert best.figures.std < passive.figures.std
+    assert 10.0 < best.largest_force < 50.0 * 1.25  # a driven gearbox adds friction
 
 
 def test_motors_that_are_off_hardly_change_the_force(passive):
@@ -72,27 +73,27 @@ def test_motors_that_are_off_hardly_change_the_force(passive):
     assert abs(off.power) < 1e-9
 
 
-def test_power_is_what_the_record_tells_the_mechanical_a_fraction_of_the_electrical(at_15_watts):
+def test_power_is_what_the_record_tells_the_mechanical_a_fraction_of_the_electrical(by_place):
     for place in ("frame", "head"):
-        one = at_15_watts[place]
+        one = by_place[place]
         inside, told = one.record.inside(motors.SPANS), recorded_power(one, place)
         assert told.electrical[inside].mean() == pytest.approx(one.power, rel=0.05)
         assert told.copper[inside].mean() == pytest.approx(one.copper, rel=0.05)
         mechanical, arms = one.record.mechanical_power(motors.SPANS), np.abs(told.mechanical[inside]).mean()
         assert mechanical == pytest.approx(arms, rel=0.1)  # but for the rotors
         assert 0.1 < mechanical / one.power < 0.3
-    both = at_15_watts["both"].record
+    both = by_place["both"].record
     frame = np.abs(both.frame_force * both.frame_velocity)
     head = np.abs(both.head_force * (both.head_velocity - both.frame_velocity))
     mean = (frame + head)[both.inside(motors.SPANS)].mean()
     assert both.mechanical_power(motors.SPANS) == pytest.approx(mean)
 
 
-def test_heat_is_that_of_the_current_over_the_nominal_one(at_15_watts):
+def test_heat_is_that_of_the_current_over_the_nominal_one(by_place):
     """Of two motors at 6 A: 21.5 W."""
-    head = at_15_watts["head"]
+    head = by_place["head"]
     assert head.heat == pytest.approx(head.copper / (2 * 0.299 * (0.181 / 30.2e-3) ** 2))
-    both = at_15_watts["both"]
+    both = by_place["both"]
     assert both.heat < 0.7 * head.heat
 
 

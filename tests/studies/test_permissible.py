@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from itertools import product
 
 import pytest
 from typer.testing import CliRunner
@@ -13,8 +14,7 @@ from panto_env.cli.sweep import parse_speeds
 from panto_env.studies import write
 from panto_env.studies.permissible import PASSIVE, Scan, scan, study, verified
 from panto_env.studies.permissible.scan import WAVES, Broken, Pass
-from panto_env.studies.permissible.shown import answers_table
-from panto_env.studies.permissible.study import Case
+from panto_env.studies.permissible.study import Case, answers_table
 
 from ..pages import DOCS, tables_of
 
@@ -27,20 +27,13 @@ KEPT = Pass(PASSIVE, 200.0, 0, False, "", (), "σ", 20.0, 0.2, 250.0, 40.0, 0.05
 
 def made(broken_at: dict[str, dict[float, tuple]], speeds=(200.0, 210.0, 220.0, 230.0)) -> Scan:
     """A scan under two seeds; broken_at: requirements broken under the second one, by policy and speed."""
-    passes = [
-        replace(
-            KEPT,
-            policy=policy,
-            speed_kmh=speed,
-            seed=seed,
-            failing=failing,
-            broken=broken.get(speed, ()) if seed else (),
-        )
-        for policy, broken in broken_at.items()
-        for speed in speeds
-        for seed in range(2)
-        for failing in ([False] if policy == PASSIVE else [False, True])
-    ]
+    passes = []
+    for policy, broken in broken_at.items():
+        for speed, seed, failing in product(
+            speeds, range(2), [False] if policy == PASSIVE else [False, True]
+        ):
+            own = {"policy": policy, "speed_kmh": speed, "seed": seed, "failing": bool(failing)}
+            passes.append(replace(KEPT, **own, broken=broken.get(speed, ()) if seed else ()))
     return Scan(speeds, tuple(broken_at), tuple(passes))
 
 
@@ -132,12 +125,8 @@ def test_other_speeds_are_refused(text):
 @pytest.mark.slow
 def test_the_study_of_the_catalogue_tells_gains_bands_and_what_fell(monkeypatch, tmp_path):
     short = Case("en50318-2002", "dsa380", (220.0, 240.0, 260.0, 280.0))
-    for name, value in {
-        "CASES": (short,),
-        "DISTANCES": (200.0,),
-        "SEEDS": 1,
-        "POLICIES": ("repetitive",),
-    }.items():
+    changed = {"CASES": (short,), "DISTANCES": (200.0,), "SEEDS": 1, "POLICIES": ("repetitive",)}
+    for name, value in changed.items():
         monkeypatch.setattr(study, name, value)
     outcome = study.run(lambda what, share: None)
     limits, gains, _ = outcome.tables

@@ -36,12 +36,9 @@ Objective = Literal["std_ratio", "tension", "copper"]
 FEW_SPEEDS = 5
 """Number of speeds below which a design fits them rather than the line: on benchmark-2015 others were 39 %
 worse after a search with three, 8 % after one with seven."""
-REFUSED = 10.0
-"""Excess over limits of a design that cannot be."""
-TRIED = "tried.log"
-"""File of all designs that were tried, in the folder of a search."""
-POPULATION = {1: 12, 2: 40}
-"""Designs in a generation, by the number of objectives."""
+REFUSED = 10.0  # excess over limits of a design that cannot be
+TRIED = "tried.log"  # file of all designs that were tried, in the folder of a search
+POPULATION = {1: 12, 2: 40}  # designs in a generation, by the number of objectives
 
 
 class Design(Settings):
@@ -121,14 +118,9 @@ def read_design(path: str | Path) -> Design:
     try:
         design = parse(Design, read_toml(path), "the design")
         checked = run_settings(design.settings)
-        start = _start(design)
-        entries = entries_of(checked)
-        prepare(
-            start,
-            None if design.policy == PASSIVE else design.policy,
-            entries,
-            {**design.settings, "seed": 0},
-        )
+        middle = {name: 0.5 * (low + high) for name, (low, high) in design.variables.items()}
+        policy = None if design.policy == PASSIVE else design.policy
+        prepare(middle, policy, entries_of(checked), {**design.settings, "seed": 0})
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     if len(design.speeds_kmh) < FEW_SPEEDS:
@@ -139,11 +131,6 @@ def read_design(path: str | Path) -> Design:
             stacklevel=2,
         )
     return design
-
-
-def _start(design: Design) -> dict[str, float]:
-    """The middle of all ranges."""
-    return {name: 0.5 * (low + high) for name, (low, high) in design.variables.items()}
 
 
 def arguments_of(design: Design, values: Mapping[str, float], policy: str) -> dict[str, Any]:
@@ -252,20 +239,18 @@ def search(
         name: optuna.distributions.FloatDistribution(low, high)
         for name, (low, high) in design.variables.items()
     }
-    size = POPULATION[len(design.objectives)]
-    while (
-        done := len(study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,)))
-    ) < design.designs:
-        trials = [study.ask(ranges) for _ in range(min(size, design.designs - done))]
-        for trial, (values, found) in zip(
-            trials, tried(design, [t.params for t in trials], workers), strict=True
-        ):
-            if len(design.objectives) > 1:  # CMA-ES takes no constraints, but a penalty, below
+    several, complete = len(design.objectives) > 1, (optuna.trial.TrialState.COMPLETE,)
+    while (done := len(study.get_trials(deepcopy=False, states=complete))) < design.designs:
+        count = min(POPULATION[len(design.objectives)], design.designs - done)
+        trials = [study.ask(ranges) for _ in range(count)]
+        outcomes = tried(design, [trial.params for trial in trials], workers)
+        for trial, (values, found) in zip(trials, outcomes, strict=True):
+            if several:  # CMA-ES takes no constraints, but a penalty, below
                 trial.set_constraint("excess", found.excess)
             trial.set_user_attr("excess", found.excess)
             trial.set_user_attr("std_ratio", found.std_ratio if not math.isnan(found.std_ratio) else None)
             trial.set_user_attr("refused", found.refused)
-            penalty = 0.0 if len(design.objectives) > 1 else REFUSED * found.excess
+            penalty = 0.0 if several else REFUSED * found.excess
             study.tell(trial, [value + penalty for value in values])
         if progress is not None:
             progress(done + len(trials), design.designs, in_words(design, study))
@@ -277,7 +262,7 @@ def tried(
 ) -> list[tuple[list[float], Found]]:
     """Objectives and figures of designs under the search's policy, at its speeds and seeds."""
     jobs: list[Callable[[], Found]] = []
-    parts: list[tuple[dict[str, Any], int, int] | str] = []
+    parts: list[tuple[dict[str, Any], slice] | str] = []
     for values in candidates:
         try:
             arguments = arguments_of(design, values, design.policy)
@@ -285,17 +270,16 @@ def tried(
             parts.append(str(error))
             continue
         own = passes(arguments, design.speeds_kmh, range(design.seeds))
-        parts.append((arguments, len(jobs), len(jobs) + len(own)))
+        parts.append((arguments, slice(len(jobs), len(jobs) + len(own))))
         jobs += own
     done = in_threads(jobs, workers=workers) if jobs else []
     found: list[tuple[list[float], Found]] = []
     for part in parts:
         if isinstance(part, str):
             found.append(([REFUSED] * len(design.objectives), Found(math.nan, REFUSED, (), part)))
-            continue
-        arguments, first, end = part
-        own_worst = worst(done[first:end])
-        found.append((objectives_of(design, arguments, own_worst), own_worst))
+        else:
+            own_worst = worst(done[part[1]])
+            found.append((objectives_of(design, part[0], own_worst), own_worst))
     return found
 
 

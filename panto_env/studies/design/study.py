@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ...base.arrays import to_kmh
 from ...base.files import finite
 from ...base.plotting import LIMIT, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary, load_pantograph
-from ...metrics.compliance import STD_OF_MEAN, WAVE_SHARE
+from ...metrics.compliance import STD_OF_MEAN
 from ...plant.catenary.flexible import FlexibleCatenaryData
 from ..permissible.scan import PASSIVE
-from ..study import Outcome, Report
-from .check import Checked, candidates_of, check
-from .retrofit import CONTACT, MESSENGER, SPACING, Replaced, replaced
+from ..permissible.study import wave_limit
+from ..study import Figure, Outcome, Report
+from .check import CONTACT, MESSENGER, SPACING, Checked, Replaced, candidates_of, check, replaced
 from .search import Design, best_of, read_design, search
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CASES = ("benchmark-2015", "re250", "en50318-2002", "controlled")
 """Files of searches, beside this one; the last one searches the first one's line under control."""
 RETROFITTED = CASES[:3]
 FRONT = "front"
 FRONT_SEEDS = (0, 1)
-AGENT = "agent-any-pantograph"
-"""Policy that replaces tension and droppers."""
-PARTS = ("searched", "held_out", "as_built")
-"""Where a design is checked."""
-REPLACED = {
-    CONTACT: "contact (kN)",
-    MESSENGER: "messenger (kN)",
-    SPACING: "droppers",
-}
+AGENT = "agent-any-pantograph"  # policy that replaces tension and droppers
+PARTS = ("searched", "held_out", "as_built")  # where a design is checked
+REPLACED = {CONTACT: "contact (kN)", MESSENGER: "messenger (kN)", SPACING: "droppers"}
 NAMES = {"start": "as it is", "best": "found"}
 Numbers = Mapping[str, Any]
 
@@ -69,6 +59,7 @@ def of_case(name: str, folder: str | Path) -> Numbers:
     study = search(design, folder)
     candidates = candidates_of(design, study)
     done = [trial for trial in study.get_trials(deepcopy=False) if trial.values is not None]
+    control_replaces = replaced(design, AGENT) if name in RETROFITTED else []
     found: Numbers = finite(
         {
             "name": name,
@@ -82,9 +73,7 @@ def of_case(name: str, folder: str | Path) -> Numbers:
                 for key, ends in design.variables.items()
             },
             "checked": [_plain(one) for one in check(design, candidates)],
-            "replaced": [
-                _plain_replaced(one) for one in (replaced(design, AGENT) if name in RETROFITTED else ())
-            ],
+            "replaced": [_plain_replaced(one) for one in control_replaces],
         }
     )
     return found
@@ -104,23 +93,16 @@ def of_front(seed: int, folder: str | Path) -> Numbers:
 
 def start_of(design: Design, name: str) -> float:
     """Value that the line or the pantograph of a search has by itself."""
-    entry: Any = _line(design.settings["catenary"])
+    line = load_catenary(design.settings["catenary"])
+    assert isinstance(line, FlexibleCatenaryData)
+    places, sag = line.droppers.positions, line.droppers.sag
     family, *path = name.split(".")
-    if family == "pantograph":
-        entry = load_pantograph(design.settings["pantographs"][0])
-    elif path[0] == "droppers":
-        places, sag = entry.droppers.positions, entry.droppers.sag
-        entry = (places[-1] - places[0]) / (len(places) - 1) if name == SPACING else max(sag) - sag[0]
-        path = []
+    if path[0] == "droppers":
+        return (places[-1] - places[0]) / (len(places) - 1) if name == SPACING else max(sag) - sag[0]
+    entry: Any = line if family == "catenary" else load_pantograph(design.settings["pantographs"][0])
     for key in path:
         entry = entry[int(key) - 1] if key.isdigit() else getattr(entry, key)
     return float(entry)
-
-
-def _line(name: str) -> FlexibleCatenaryData:
-    line = load_catenary(name)
-    assert isinstance(line, FlexibleCatenaryData)
-    return line
 
 
 def _plain_replaced(one: Replaced) -> dict[str, Any]:
@@ -138,12 +120,7 @@ def outcome_of(numbers: Numbers) -> Outcome:
     return Outcome(
         title="What design with control buys",
         comparisons=(),
-        tables=(
-            bought_table(numbers["cases"]),
-            fell_table(numbers["cases"]),
-            values_table(numbers["cases"]),
-            replaced_table(numbers["cases"]),
-        ),
+        tables=tuple(table(numbers["cases"]) for table in TABLES),
         plots={"design": plot(numbers)},
         numbers=numbers,
         verdict=verdict(numbers["cases"]),
@@ -163,15 +140,11 @@ def _four(case: Numbers, policy: str, part: str) -> tuple[float, ...]:
     return tuple(_ratio(case, *pair, part) for pair in pairs)
 
 
-def _policies(case: Numbers) -> Iterator[str]:
-    yield from dict.fromkeys(each["policy"] for each in case["checked"] if each["policy"] != PASSIVE)
-
-
 def bought_table(cases: Sequence[Numbers]) -> Table:
     """σ/F_m without design and control, with either, and with both; a row for each line and policy."""
     rows = []
     for case in cases:
-        for policy in _policies(case):
+        for policy in dict.fromkeys(each["policy"] for each in case["checked"] if each["policy"] != PASSIVE):
             ratios = (*_four(case, policy, "held_out"), *_four(case, policy, "as_built"))
             rows.append((case["name"], policy, *(f"{ratio:.2f}" for ratio in ratios)))
     names = ("as it is", "control", "design", "both")
@@ -198,16 +171,10 @@ def fell_table(cases: Sequence[Numbers]) -> Table:
 
 def values_table(cases: Sequence[Numbers]) -> Table:
     """What was searched, from what to what."""
-    rows = [
-        (
-            name,
-            *(
-                " → ".join(_short(case["variables"][name][which]) for which in ("start", "best"))
-                for case in cases
-            ),
-        )
-        for name in cases[0]["variables"]
-    ]
+    rows = []
+    for name in cases[0]["variables"]:
+        both = ([_short(case["variables"][name][key]) for key in ("start", "best")] for case in cases)
+        rows.append((name, *map(" → ".join, both)))
     return Table("Values, as they are and found", ("variable", *(case["name"] for case in cases)), rows)
 
 
@@ -218,29 +185,19 @@ def _short(value: float) -> str:
 def replaced_table(cases: Sequence[Numbers]) -> Table:
     """How far tension and droppers of a line as it is may go under control, and why no farther."""
     rows = []
-    for case in cases:
-        for one in case["replaced"]:
-            first, std, equal = one["steps"][0], one["equal_std"], one["equal"]
-            beyond = one["steps"][one["steps"].index(equal) + 1 :] if equal else one["steps"]
-            rows.append(
-                (
-                    case["line"],
-                    REPLACED[one["parameter"]],
-                    *(_amount(one, step) for step in (first, std, equal)),
-                    ", ".join(beyond[0]["more_broken"]) if beyond else "",
-                    _wave_limit(case["line"], std["value"]) if std and one["parameter"] == CONTACT else "",
-                )
-            )
-    headings = (
-        "line",
-        "what",
-        "as it is",
-        "equal σ/F_m",
-        "equal requirements",
-        "broken first",
-        "0.7 c (km/h)",
-    )
-    return Table("Tension of the wires and droppers in a span", headings, rows, text_columns=2)
+    for line, one in ((case["line"], one) for case in cases for one in case["replaced"]):
+        first, std, equal = one["steps"][0], one["equal_std"], one["equal"]
+        beyond = one["steps"][one["steps"].index(equal) + 1 :] if equal else one["steps"]
+        amounts = (_amount(one, step) for step in (first, std, equal))
+        broken, waves = ", ".join(beyond[0]["more_broken"]) if beyond else "", ""
+        if std and one["parameter"] == CONTACT:
+            waves = f"{wave_limit(line, std['value']):.0f}"
+        rows.append((line, REPLACED[one["parameter"]], *amounts, broken, waves))
+    first = ("line", "what", "as it is", "equal σ/F_m", "equal requirements", "broken first", "0.7 c (km/h)")
+    return Table("Tension of the wires and droppers in a span", first, rows, text_columns=2)
+
+
+TABLES = (bought_table, fell_table, values_table, replaced_table)
 
 
 def _amount(one: Numbers, step: Numbers | None) -> str:
@@ -248,12 +205,6 @@ def _amount(one: Numbers, step: Numbers | None) -> str:
         return "none"
     amount = f"{step['droppers']}" if one["parameter"] == SPACING else f"{step['value'] / 1e3:.4g}"
     return f"≤ {amount}" if step == one["steps"][-1] and len(one["steps"]) > 1 else amount
-
-
-def _wave_limit(line: str, tension: float) -> str:
-    """0.7 of the wave speed of a line's contact wire with this tension (N)."""
-    wire = _line(line).contact_wire.model_copy(update={"tension": tension})
-    return f"{WAVE_SHARE * to_kmh(wire.wave_speed):.0f}"
 
 
 def plot(numbers: Numbers) -> Figure:
@@ -264,13 +215,12 @@ def plot(numbers: Numbers) -> Figure:
     for axis, case in zip(of_lines, cases, strict=False):
         shown = [each for each in case["checked"] if each["policy"] in (PASSIVE, AGENT)]
         for k, each in enumerate(shown):
-            speeds, ratios = zip(*((float(v), ratio) for v, ratio in each["by_speed"].items()), strict=True)
+            by_speed = {float(v): math.nan if r is None else r for v, r in each["by_speed"].items()}
+            held = {v: r for v, r in by_speed.items() if v not in case["speeds_kmh"]}
+            style: dict[str, Any] = {"color": series_colour(k)}
             label = f"{NAMES[each['design']]}, {each['policy']}"
-            axis.plot(
-                speeds, [math.nan if r is None else r for r in ratios], color=series_colour(k), label=label
-            )
-            held = [(v, r) for v, r in zip(speeds, ratios, strict=True) if v not in case["speeds_kmh"]]
-            axis.plot(*zip(*held, strict=True), "o", color=series_colour(k), markerfacecolor="white")
+            axis.plot(list(by_speed), list(by_speed.values()), label=label, **style)
+            axis.plot(list(held), list(held.values()), "o", markerfacecolor="white", **style)
         axis.axhline(STD_OF_MEAN, color=LIMIT, linestyle=(0, (5, 3)), linewidth=0.9)
         axis.set(title=case["line"], xlabel="speed (km/h); circles: held out", ylabel="σ / F_m (-)")
         axis.set_ylim(bottom=0)

@@ -74,10 +74,10 @@ def check(runs: list[Trajectory]) -> list[Check]:
     """Every figure of the standard's table for the runs of ``reference_runs``."""
     checks = []
     for place, run in enumerate(runs):
-        figures = run.summary(SPANS).as_dict()
+        figures = run.summary(SPANS)
         for name, ranges in ACCEPTED.items():
-            label, (low, high) = LABELS[name], ranges[place]
-            checks.append(Check(name, label.unit, run.speed_kmh, label.scale * figures[name], low, high))
+            value = LABELS[name].scale * getattr(figures, name)
+            checks.append(Check(name, LABELS[name].unit, run.speed_kmh, value, *ranges[place]))
     return checks
 
 
@@ -88,10 +88,8 @@ def plot_reference(runs: Sequence[Trajectory]) -> Figure:
 
 
 NEW = LINE_CONDITIONS["new"]
-WHOLE_LINE = 0
-"""The window that computes all spans."""
-CONVERGENCE_KMH = (*SPEEDS_KMH, 350.0)
-"""350 km/h lies beyond the standard's table, at 80 % of the wave speed."""
+WHOLE_LINE = 0  # the window that computes all spans
+CONVERGENCE_KMH = (*SPEEDS_KMH, 350.0)  # 350 km/h lies beyond the standard's table, at 80 % of the wave speed
 DISCRETISATIONS = (
     Numerics(spacing=0.125, time_step=2.5e-4, window=WHOLE_LINE, precision="double"),
     Numerics(spacing=0.25, time_step=5e-4, window=WHOLE_LINE, precision="double"),
@@ -138,24 +136,9 @@ KINDS = (
 """Kind, line, pantograph and speeds (km/h)."""
 
 
-@dataclass(frozen=True)
-class KindCheck:
-    """Figures of one passive run over the default spans; forces low-passed at 20 Hz, but for losses."""
-
-    line_kind: str
-    catenary: str
-    pantograph: str
-    speed_kmh: float
-    mean: float  # N
-    std: float  # N
-    max: float  # N
-    min: float  # N
-    max_uplift: float  # at a support (m)
-    contact_loss: float  # %
-
-
-def check_kind(kind: str, catenary: str, pantograph: str, speed_kmh: float) -> KindCheck:
-    """A passive run on a line of a kind."""
+def check_kind(kind: str, catenary: str, pantograph: str, speed_kmh: float) -> dict[str, Any]:
+    """SI figures of a passive run over the default spans; forces low-passed at 20 Hz, but for losses."""
     found = simulate(catenary, pantograph, speed_kmh, record_droppers=False).summary()
-    figures = (found.mean, found.std, found.max, found.min, found.max_uplift, found.contact_loss)
-    return KindCheck(kind, catenary, pantograph, speed_kmh, *figures)
+    which = {"line_kind": kind, "catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
+    names = ("mean", "std", "max", "min", "max_uplift", "contact_loss")
+    return which | {name: getattr(found, name) for name in names}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import cmath
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,25 +31,18 @@ OTHER_LINE = "en50318-2002"
 PANTOGRAPH = "identified-2dof"
 SPANS = (6, 15)
 """Spans that figures cover: the start has died out, the far anchor's reflection has not come yet."""
-RUN_SPANS = SPANS[1] + 2
-"""Spans that a run covers."""
+RUN_SPANS = SPANS[1] + 2  # spans that a run covers
 
-SPEEDS = tuple(range(100, 401, 25))
-"""km/h, Figs 17 and 18: the paper's range; the step is an own choice."""
-ANGLE_SPEEDS = tuple(range(100, 401, 50))
-"""km/h, Fig. 13."""
-SHOWN_SPEEDS = (300, 350, 400)
-"""km/h, Figs 14 to 16."""
+SPEEDS = tuple(range(100, 401, 25))  # km/h, Figs 17 and 18: the paper's range; the step is an own choice
+ANGLE_SPEEDS = tuple(range(100, 401, 50))  # km/h, Fig. 13
+SHOWN_SPEEDS = (300, 350, 400)  # km/h, Figs 14 to 16
 
 OFTEN = 0.002
 """Control interval (s): the paper names no sampling, so the control acts as often as makes a difference."""
-SAMPLED = 0.01
-"""Control interval (s) of published active pantographs, and of ``Pantograph-v0``."""
+SAMPLED = 0.01  # control interval (s) of published active pantographs, and of ``Pantograph-v0``
 
-DEFAULT_GAIN = 1.0
-"""The gain of the policy as shipped (N/N): the paper prints none."""
-GAIN = 1.75
-"""Calibrated: the minimum of ``GAINS`` that leaves no contact loss at 300, 350 and 400 km/h."""
+DEFAULT_GAIN = 1.0  # the gain of the policy as shipped (N/N): the paper prints none
+GAIN = 1.75  # calibrated: the minimum of ``GAINS`` that leaves no contact loss at 300, 350 and 400 km/h
 REAL_GAIN = 0.5
 """The one of ``GAINS`` with the minimum of the maximum losses at 300 to 400 km/h, realistic actuator."""
 GAINS = tuple(0.25 * k for k in range(1, 13))
@@ -97,8 +91,7 @@ DAMPING = {
 
 USUAL: dict[str, float] = {"time_step": 1.25e-4, "spacing": 0.1}
 """Time step (s) and grid (m), finer than the default: a loss of contact of some 0.1 % decides here."""
-FINE: dict[str, float] = {"time_step": 1e-4, "spacing": 0.08}
-"""Finer still, to see what depends on them."""
+FINE: dict[str, float] = {"time_step": 1e-4, "spacing": 0.08}  # finer still, to see what depends on them
 
 
 @dataclass(frozen=True)
@@ -152,12 +145,8 @@ LOOPS = (("ideal", OFTEN), ("ideal", SAMPLED), ("realistic", SAMPLED))
 """Actuators and control intervals under which the gain is varied."""
 
 
-def all_cases() -> list[Case]:
-    """Every pass of the study, each once, but those with another static force."""
-    return list(dict.fromkeys(_cases()))
-
-
-def _cases() -> Iterator[Case]:
+def all_cases() -> Iterator[Case]:
+    """Every pass of the study, some of them several times, but those with another static force."""
     for fine, speed in product((False, True), SPEEDS):  # Figs 17, 18
         for policy in OVER_SPEED.values():
             yield Case(speed, policy, fine=fine)
@@ -182,8 +171,7 @@ def _cases() -> Iterator[Case]:
 
 BANDS = ((0.0, 7.0), (7.0, 15.0), (15.0, 30.0))
 """Bands of frequency (Hz) into which the contact force is split; the mean belongs to none."""
-LANES = 12
-"""Passes made together in one process; from 16 on a task would take threads beside the processes."""
+LANES = 12  # passes made together in one process; from 16 on a task would take threads beside the processes
 
 
 @dataclass(frozen=True)
@@ -203,10 +191,10 @@ class Result:
         return self.figures.cost_function / self.figures.distance
 
 
-def run_all(cases: Sequence[Case], progress: Progress) -> dict[Case, Result]:
+def run_all(cases: Collection[Case], progress: Progress) -> dict[Case, Result]:
     """Results of all cases, from all cores. Raises InputError if a worker process dies."""
-    batches = [partial(run, batch) for batch in _batches(cases)]
-    results = {result.case: result for batch in in_processes(batches, progress=progress) for result in batch}
+    found = in_processes([partial(run, batch) for batch in _batches(cases)], progress=progress)
+    results = {result.case: result for batch in found for result in batch}
     return {case: results[case] for case in cases}
 
 
@@ -217,19 +205,16 @@ def run(cases: Sequence[Case]) -> list[Result]:
 
 def records(cases: Sequence[Case], pantograph: str | PantographData = PANTOGRAPH) -> list[Trajectory]:
     """Whole records of cases that differ in their policy alone: lanes of one task."""
-    first = cases[0]
-    line = load_catenary(first.line)
-    settings: RunSettings = run_settings(
-        {
-            "catenary": line,
-            "pantograph": pantograph,
-            "speed_kmh": first.speed_kmh,
-            "actuator": ACTUATORS[first.actuator],
-            "control_interval": first.control_interval,
-            "distance": line.alignment().support(RUN_SPANS),
-        }
-        | (FINE if first.fine else USUAL)
-    )
+    first, line = cases[0], load_catenary(cases[0].line)
+    given: dict[str, Any] = {
+        "catenary": line,
+        "pantograph": pantograph,
+        "speed_kmh": first.speed_kmh,
+        "actuator": ACTUATORS[first.actuator],
+        "control_interval": first.control_interval,
+        "distance": line.alignment().support(RUN_SPANS),
+    }
+    settings: RunSettings = run_settings(given | (FINE if first.fine else USUAL))
     task = Task(settings, lanes=len(cases))
     policies = [find_policy(case.policy) for case in cases]
     for lane, policy in enumerate(policies):
@@ -278,7 +263,7 @@ def result_of(case: Case, record: Trajectory) -> Result:
     )
 
 
-def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
+def _batches(cases: Collection[Case]) -> Iterator[list[Case]]:
     """Cases that differ in their policy alone, LANES at a time, slow trains first: theirs take longest."""
 
     def plant(case: Case) -> tuple[Any, ...]:
@@ -287,28 +272,17 @@ def _batches(cases: Sequence[Case]) -> Iterator[tuple[Case, ...]]:
     for _, group in groupby(sorted(cases, key=plant), key=plant):
         same_plant = list(group)
         for first in range(0, len(same_plant), LANES):
-            yield tuple(same_plant[first : first + LANES])
+            yield same_plant[first : first + LANES]
 
 
 def _mean(record: Trajectory) -> float:
     return float(record.contact_force[record.inside(SPANS)].mean())
 
 
-@dataclass(frozen=True)
-class CostOverAngle:
-    """Cost function over the phase angle at one speed."""
-
-    cost: tuple[float, ...]  # CF at THETAS (N m)
-    best: float  # theta of the minimum CF (rad)
-    without: float  # CF of the feedback alone (N m)
-    at_paper: float  # CF at the paper's pi/6 (N m)
-    cancelling: float  # theta that cancels the once-per-span part of the contact force (rad)
-
-
 def cost_over_angle(
     results: Mapping[Case, Result], speed: int, gain: float, reading: str, fine: bool = False
-) -> CostOverAngle:
-    """At one speed (km/h).
+) -> SimpleNamespace:
+    """Cost function (N m) over the phase angle (rad) at one speed (km/h).
 
     The feed-forward, once per span, opposes the force's part once per span at an angle by what is measured:
     that part with feedback alone, and what the feed-forward at angle 0 adds to it. Shifting A sin(kx) by
@@ -318,22 +292,18 @@ def cost_over_angle(
     def at(theta: float, reading: str, amplitude: float = AMPLITUDE) -> Result:
         return results[Case(speed, control(gain, amplitude, theta, reading), fine=fine)]
 
-    costs = tuple(at(theta, reading).figures.cost_function for theta in THETAS)
+    costs = [at(theta, reading).figures.cost_function for theta in THETAS]
     alone = at(THETA, SPAN, 0.0)
     zero, paper = (min(THETAS, key=lambda theta: abs(theta - angle)) for angle in (0.0, THETA))
     added = at(zero, SPAN).once_per_span - alone.once_per_span
-    return CostOverAngle(
-        cost=costs,
-        best=THETAS[costs.index(min(costs))],
-        without=alone.figures.cost_function,
-        at_paper=costs[THETAS.index(paper)],
-        cancelling=wrap(cmath.phase(added) - cmath.phase(-alone.once_per_span)),
+    turn = cmath.phase(added) - cmath.phase(-alone.once_per_span)
+    return SimpleNamespace(
+        cost=costs,  # at THETAS
+        best=THETAS[costs.index(min(costs))],  # theta of the minimum
+        without=alone.figures.cost_function,  # cost of the feedback alone
+        at_paper=costs[THETAS.index(paper)],  # cost at the paper's pi/6
+        cancelling=math.remainder(turn, 2 * math.pi),  # theta that cancels the force's part once per span
     )
-
-
-def wrap(angle: float) -> float:
-    """The same angle within -pi..pi."""
-    return math.remainder(angle, 2 * math.pi)
 
 
 def amplification(frequency: float, gain: float, damping: float = 0.0) -> float:

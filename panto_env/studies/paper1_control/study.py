@@ -6,56 +6,24 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...analysis.plots import mark_supports_of_run, say_what_is_hidden
-from ...base.plotting import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    POSITION,
-    PURPLE,
-    SKY,
-    VERMILION,
-    legend_above,
-    panels,
-    series_colour,
-)  # fmt: skip
+from ...base.plotting import POSITION, SERIES, legend_above, panels, series_colour
 from ...base.table import Table
-from ...metrics.figures import LABELS
-from ..study import Columns, Comparison, Outcome, Report, row, said, tabled
+from ...metrics.figures import LABELS, Label
+from ..study import Columns, Comparison, Figure, Outcome, Report, legend_below, over, said, tabled
 from . import passes
-from .passes import (
-    ANGLE_SPEEDS,
-    GAIN,
-    LINE,
-    ON_A_TRAIN,
-    OTHER_LINE,
-    PARTS,
-    SHOWN_SPEEDS,
-    SPAN,
-    SPANS,
-    SPEEDS,
-    THETA,
-    Case,
-    Result,
-    control,
-    cost_over_angle,
-    sampled,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .passes import GAIN, LINE, SHOWN_SPEEDS, SPAN, SPEEDS, Case, Result, control, cost_over_angle, sampled
 
 CALIBRATED = f"gain {GAIN}: calibrated to this claim, at 300, 350 and 400 km/h"
 UNCALIBRATED = "gain 1: the shipped policy's; the paper prints none"
 STIFF = "force feedback acts as a spring, not a damper: 7 to 15 Hz grows, see the bands"
-SHOWN_SPANS = (10, 11)
-"""Spans of Figs 14 to 16."""
-COVERED = f"spans {SPANS[0]} to {SPANS[1]} (500 m)"
-WITHOUT, WITH, FORCE = VERMILION, BLUE, GREEN
+SHOWN_SPANS = (10, 11)  # spans of Figs 14 to 16
+COVERED = f"spans {passes.SPANS[0]} to {passes.SPANS[1]} (500 m)"
+WITH, WITHOUT, FORCE, PURPLE, ORANGE, SKY, _ = SERIES
 """The paper's colours: without control red, with control blue, control force green."""
 Results = Mapping[Case, Result]
 
@@ -63,7 +31,7 @@ Results = Mapping[Case, Result]
 def run(report: Report) -> Outcome:
     """Run all passes, and put ours beside the paper's. Raises InputError where a worker dies."""
     results = passes.run_all(
-        passes.all_cases(), lambda done, total: report("passes along the line", 0.9 * (done / total))
+        dict.fromkeys(passes.all_cases()), over(report, "passes along the line", 0.0, 0.9)
     )
     report("passive passes at the same mean force", 0.9)
     at_same_mean = {
@@ -105,12 +73,10 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
             yield said("control-loss", loss(speed, control(gain)), gain=gain, speed=speed, note=note)
     most = max(loss(speed, control()) for speed in SPEEDS)
     yield said("control-most", most, gain=GAIN, note=CALIBRATED)
-    worst = {
-        gain: max(
-            results[sampled(speed, control(gain), "realistic")].figures.contact_loss for speed in SHOWN_SPEEDS
-        )
-        for gain in passes.GAINS
-    }
+    worst = {}
+    for gain in passes.GAINS:
+        own = [results[sampled(speed, control(gain), "realistic")] for speed in SHOWN_SPEEDS]
+        worst[gain] = max(result.figures.contact_loss for result in own)
     best = min(worst, key=worst.__getitem__)
     for gain, gains in ((GAIN, f"gain {GAIN}"), (best, f"best gain {best:g}")):
         yield said("control-real", worst[gain], gains=gains)
@@ -121,36 +87,32 @@ def _comparisons(results: Results) -> Iterator[Comparison]:
             yield said(key, ratio[speed], speed=speed, note=STIFF if speed == 300 else "")
     highest = max(ratio, key=ratio.__getitem__)
     yield said("control-costs", ratio[highest], speed=highest)
-    paper, low, high = map(math.degrees, (THETA, THETA - passes.THETA_STEP, THETA + passes.THETA_STEP))
-    for speed in ANGLE_SPEEDS:
+    paper, low, high = map(
+        math.degrees, (passes.THETA, passes.THETA - passes.THETA_STEP, passes.THETA + passes.THETA_STEP)
+    )
+    for speed in passes.ANGLE_SPEEDS:
         theta = math.degrees(cost_over_angle(results, speed, GAIN, SPAN).best)
         yield said("control-angle", theta, speed=speed, paper=paper, low=low, high=high)
 
 
-def _figure(name: str, decimals: int) -> tuple[str, Callable[[Result], str]]:
-    """The column of one of ``Figures``."""
-    label = LABELS[name]
-    return label.short_heading, lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
+def _figures(*places: tuple[str, int]) -> list[tuple[str, Callable[[Result], str]]]:
+    """Columns of ``Figures``, by name and number of decimals."""
+
+    def cell(label: Label, name: str, decimals: int) -> Callable[[Result], str]:
+        return lambda result: f"{label.scale * getattr(result.figures, name):.{decimals}f}"
+
+    return [(LABELS[name].short_heading, cell(LABELS[name], name, decimals)) for name, decimals in places]
 
 
 COLUMNS: Columns = (
-    ("km/h", "{.case.speed_kmh}"),
-    _figure("mean", 1),
-    _figure("std", 1),
-    ("raw σ (N)", "{.raw_std:.1f}"),
-    _figure("max", 0),
-    _figure("min", 0),
-    _figure("contact_loss", 2),
+    "km/h: {.case.speed_kmh}",
+    *_figures(("mean", 1), ("std", 1)),
+    "raw σ (N): {.raw_std:.1f}",
+    *_figures(("max", 0), ("min", 0), ("contact_loss", 2)),
     ("longest loss (ms)", lambda result: f"{1e3 * result.longest_loss:.0f}"),
-    _figure("cost_function", 0),
-    ("mean |F − F_N| (N)", "{.mean_deviation:.1f}"),
-    _figure("max_uplift", 0),
-    _figure("effort", 1),
-    _figure("effort_rate", 0),
-)
-GRID_COLUMNS = tuple(
-    _figure(name, decimals)
-    for name, decimals in (("contact_loss", 2), ("mean", 1), ("std", 1), ("cost_function", 0))
+    *_figures(("cost_function", 0)),
+    "mean |F − F_N| (N): {.mean_deviation:.1f}",
+    *_figures(("max_uplift", 0), ("effort", 1), ("effort_rate", 0)),
 )
 
 
@@ -166,10 +128,12 @@ GRIDS = {_numerics(fine): fine for fine in (False, True)}
 def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Table]:
     """All of them. at_same_mean: the passive pantograph at the controlled one's mean force, by speed."""
 
-    def listed(title: str, named: Iterable[tuple[str, Result]], heading: str = "control") -> Table:
+    def listed(title: str, named: Iterable[tuple[str, Case | Result]], heading: str = "control") -> Table:
         """Passes, each in a row."""
-        headings = (heading, *(each for each, _ in COLUMNS))
-        return Table(title, headings, [(name, *row(COLUMNS, result)) for name, result in named])
+        found = [(name, each if isinstance(each, Result) else results[each]) for name, each in named]
+        shown = tabled(title, COLUMNS, [result for _, result in found])
+        rows = [(name, *cells) for (name, _), cells in zip(found, shown.rows, strict=True)]
+        return Table(title, (heading, *shown.headings), rows)
 
     def losses(
         title: str,
@@ -179,26 +143,30 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         cases: Callable[[Any, Any], Iterable[Case]],
     ) -> Table:
         """Maximum contact loss of the cases of a row and a column, both by their headings."""
-        cells = [
-            (
-                *heading,
-                *(
-                    f"{max(results[case].figures.contact_loss for case in cases(each, other)):.2f}"
-                    for other in columns.values()
-                ),
-            )
-            for heading, each in rows.items()
-        ]
+
+        def loss(each: Any, other: Any) -> str:
+            return f"{max(results[case].figures.contact_loss for case in cases(each, other)):.2f}"
+
+        cells = [(*name, *(loss(each, other) for other in columns.values())) for name, each in rows.items()]
         return Table(title, (*corner, *columns), cells)
 
-    def real(speed: int, policy: str, line: str = LINE) -> Result:
-        return results[sampled(speed, policy, "realistic", line=line)]
+    def ideal(policies: Mapping[str, str], speed: int, line: str = LINE) -> list[tuple[str, Case]]:
+        return [(name, Case(speed, policy, line)) for name, policy in policies.items()]
 
-    named = []
+    def real(policies: Mapping[str, str], speed: int, line: str = LINE) -> list[tuple[str, Case]]:
+        return [
+            (f"{name}, realistic actuator", sampled(speed, policy, "realistic", line=line))
+            for name, policy in policies.items()
+        ]
+
+    named: list[tuple[str, Case | Result]] = []
     for speed in SHOWN_SPEEDS:
-        passive, *others = ((name, results[Case(speed, policy)]) for name, policy in PARTS.items())
+        passive, *others = ideal(passes.PARTS, speed)
         named += [passive, ("passive, pressed to that mean", at_same_mean[speed]), *others]
-    yield listed(f"Control and its parts: ideal actuator, every 2 ms, spans {SPANS[0]} to {SPANS[1]}", named)
+    yield listed(
+        f"Control and its parts: ideal actuator, every 2 ms, spans {passes.SPANS[0]} to {passes.SPANS[1]}",
+        named,
+    )
     yield losses(
         "CL (%) of FB+FF over the gain",
         ("gain (N/N)",),
@@ -209,18 +177,13 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         },
         lambda gain, loop: [Case(loop[0], control(gain), actuator=loop[1], control_interval=loop[2])],
     )
-    yield listed(
-        "Actuators, control every 10 ms",
-        [
-            (f"{actuator}: {name}", results[sampled(speed, policy, actuator)])
-            for actuator, (name, policy), speed in product(passes.ACTUATORS, ON_A_TRAIN.items(), SHOWN_SPEEDS)
-        ],
-        "actuator: control",
-    )
+    each_actuator = product(passes.ACTUATORS, passes.ON_A_TRAIN.items(), SHOWN_SPEEDS)
+    named = [(f"{how}: {name}", sampled(speed, policy, how)) for how, (name, policy), speed in each_actuator]
+    yield listed("Actuators, control every 10 ms", named, "actuator: control")
     yield losses(
         "Maximum CL (%) of 300, 350 and 400 km/h, control every 10 ms",
         ("control",),
-        {("passive",): "passive"} | {(name,): policy for name, policy in ON_A_TRAIN.items()},
+        {(name,): policy for name, policy in {"passive": "passive", **passes.ON_A_TRAIN}.items()},
         {name: name for name in passes.ACTUATORS},
         lambda policy, actuator: [
             Case(speed) if policy == "passive" else sampled(speed, policy, actuator) for speed in SHOWN_SPEEDS
@@ -236,35 +199,30 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
         ],
     )
     rows = []
-    for (gain, reading, fine), speed in product(passes.ANGLE_CONTROLS, ANGLE_SPEEDS):
+    for (gain, reading, fine), speed in product(passes.ANGLE_CONTROLS, passes.ANGLE_SPEEDS):
         curve = cost_over_angle(results, speed, gain, reading, fine)
         costs = (min(curve.cost), curve.at_paper, max(curve.cost), curve.without)
-        rows.append(
-            (
-                f"{reading}, gain {gain:g}, {_numerics(fine)}",
-                str(speed),
-                f"{math.degrees(curve.best):.0f}",
-                *(f"{cost:.0f}" for cost in costs),
-                f"{math.degrees(curve.cancelling):.0f}" if reading == SPAN else "–",
-            )
-        )
+        name = f"{reading}, gain {gain:g}, {_numerics(fine)}"
+        cancelling = f"{math.degrees(curve.cancelling):.0f}" if reading == SPAN else "–"
+        shown = (f"{cost:.0f}" for cost in costs)
+        rows.append((name, str(speed), f"{math.degrees(curve.best):.0f}", *shown, cancelling))
     first = ("reading", "km/h", "best θ (°)", "minimum CF (N m)", "CF at π/6", "maximum CF")
     headings = (*first, "CF of FB alone", "θ that cancels once per span (°)")
     yield Table("Phase angle of the feed-forward (Fig. 13)", headings, rows)
-    shown = ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")
+    names = ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")
+    bands = (f"{low:g}-{high:g} Hz: {{[1].bands[{k}]:.1f}}" for k, (low, high) in enumerate(passes.BANDS))
     yield tabled(
         "What the contact force is made of: rms (N)",
         [
-            ("control", "{[0]}"),
-            ("km/h", "{[1].case.speed_kmh}"),
+            "control: {[0]} | km/h: {[1].case.speed_kmh}",
             ("once per span", lambda each: f"{abs(each[1].once_per_span) / math.sqrt(2):.1f}"),
-            *(
-                (f"{low:g}-{high:g} Hz", f"{{[1].bands[{k}]:.1f}}")
-                for k, (low, high) in enumerate(passes.BANDS)
-            ),
-            ("all", "{[1].raw_std:.1f}"),
+            *bands,
+            "all: {[1].raw_std:.1f}",
         ],
-        [(name, results[Case(speed, PARTS[name])]) for speed, name in product(ANGLE_SPEEDS, shown)],
+        [
+            (name, results[Case(speed, passes.PARTS[name])])
+            for speed, name in product(passes.ANGLE_SPEEDS, names)
+        ],
     )
     laws = {"FB, gain 1": (1.0, 0.0), f"FB, gain {GAIN}": (GAIN, 0.0), "damping 150 N s/m": (0.0, 150.0)}
     laws["both: gain 1, 150 N s/m"] = (1.0, 150.0)
@@ -278,55 +236,27 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
     )
     named = []
     for speed in SPEEDS:
-        named += [(name, results[Case(speed, policy)]) for name, policy in passes.OVER_SPEED.items()]
-        named += [
-            (f"{name}, realistic actuator", real(speed, policy))
-            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
-        ]
+        named += ideal(passes.OVER_SPEED, speed) + real(passes.OVER_SPEED_ON_A_TRAIN, speed)
     yield listed("Over speed (Figs 17 and 18)", named)
-    named = [
-        (name, results[Case(speed, policy, OTHER_LINE)])
-        for speed, (name, policy) in product(SHOWN_SPEEDS, PARTS.items())
-    ]
-    named += [
-        (f"{name}, realistic actuator", real(speed, policy, OTHER_LINE))
-        for speed, (name, policy) in product(SHOWN_SPEEDS, ON_A_TRAIN.items())
-    ]
-    yield listed(f"The same on the line {OTHER_LINE}", named)
-    on_lines = [
-        (f"{line}, ideal: {name}", Case(speed, policy, line))
-        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, PARTS.items())
-    ]
-    on_lines += [
-        (f"{line}, realistic: {name}", sampled(speed, policy, "realistic", line=line))
-        for line, speed, (name, policy) in product((LINE, OTHER_LINE), SHOWN_SPEEDS, ON_A_TRAIN.items())
-    ]
-    both = [(*each, results[each[1]], results[dataclasses.replace(each[1], fine=True)]) for each in on_lines]
-    yield Table(
-        "Time step and grid",
-        (
-            *("line, actuator: control", "km/h"),
-            *(f"{heading}, {grid}" for heading, _ in GRID_COLUMNS for grid in GRIDS),
-        ),
-        [
-            (name, str(case.speed_kmh), *(cell(each) for _, cell in GRID_COLUMNS for each in on_both))
-            for name, case, *on_both in both
-        ],
-    )
+    named = [each for speed in SHOWN_SPEEDS for each in ideal(passes.PARTS, speed, passes.OTHER_LINE)]
+    named += [each for speed in SHOWN_SPEEDS for each in real(passes.ON_A_TRAIN, speed, passes.OTHER_LINE)]
+    yield listed(f"The same on the line {passes.OTHER_LINE}", named)
+    rows = []
+    columns = _figures(("contact_loss", 2), ("mean", 1), ("std", 1), ("cost_function", 0))
+    for how, cases in (("ideal", ideal(passes.PARTS, 0)), ("realistic", real(passes.ON_A_TRAIN, 0))):
+        for line, speed, (name, case) in product((LINE, passes.OTHER_LINE), SHOWN_SPEEDS, cases):
+            own = dataclasses.replace(case, line=line, speed_kmh=speed)
+            both = [results[dataclasses.replace(own, fine=fine)] for fine in GRIDS.values()]
+            label = f"{line}, {how}: {name.removesuffix(', realistic actuator')}"
+            rows.append((label, str(speed), *(cell(each) for _, cell in columns for each in both)))
+    of_grids = (f"{heading}, {grid}" for heading, _ in columns for grid in GRIDS)
+    yield Table("Time step and grid", ("line, actuator: control", "km/h", *of_grids), rows)
     yield losses(
         "CL (%) over speed on both grids",
         ("km/h", "time step, grid"),
         {(str(speed), grid): (speed, GRIDS[grid]) for speed, grid in product(SPEEDS, GRIDS)},
-        {name: (policy, False) for name, policy in passes.OVER_SPEED.items()}
-        | {
-            f"{name}, realistic actuator": (policy, True)
-            for name, policy in passes.OVER_SPEED_ON_A_TRAIN.items()
-        },
-        lambda each, column: [
-            sampled(each[0], column[0], "realistic", each[1])
-            if column[1]
-            else Case(each[0], column[0], fine=each[1])
-        ],
+        dict(ideal(passes.OVER_SPEED, 0) + real(passes.OVER_SPEED_ON_A_TRAIN, 0)),
+        lambda each, case: [dataclasses.replace(case, speed_kmh=each[0], fine=each[1])],
     )
 
 
@@ -334,16 +264,15 @@ def phase_angle(results: Results) -> Figure:
     """Fig. 13: cost function over the phase angle, both readings of the feed-forward."""
     figure, axes = panels((10, 5.2), 1, 2, sharey=True)
     for axis, reading in zip(axes, (SPAN, passes.KMH), strict=True):
-        for k, speed in enumerate(ANGLE_SPEEDS):
+        for k, speed in enumerate(passes.ANGLE_SPEEDS):
             curve = cost_over_angle(results, speed, GAIN, reading)
             colour = series_colour(k)
             axis.plot(np.degrees(passes.THETAS), curve.cost, color=colour, label=f"{speed} km/h")
             axis.plot(math.degrees(curve.best), min(curve.cost), "o", color=colour)
-        axis.axvline(math.degrees(THETA), color="0.4", linestyle=":", label="the paper's π/6")
+        axis.axvline(math.degrees(passes.THETA), color="0.4", linestyle=":", label="the paper's π/6")
         axis.set(xlabel="phase angle θ (°)", xticks=range(-180, 181, 60), title=f"feed-forward: {reading}")
     figure.axes[0].set(ylabel=f"cost function CF (N m), {COVERED}", ylim=(0, None))
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=8, fontsize="small")
+    legend_below(figure, 8)
     figure.suptitle(f"Fig. 13: cost function for phase angle (dots: minimum), gain {GAIN}")
     return figure
 

@@ -9,30 +9,16 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.plotting import BLUE, GREEN, LIMIT, ORANGE, VERMILION, panels, series_colour
-from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Match, Record
+from ...identification import FILTERED, FREQUENCY_SWEEP, IDENTIFIED, METHODS, Identification, Record
 from ...identification.methods import equations
-from ...identification.performance import plot_matches, plot_record
+from ..study import legend_below
 from .published import PUBLISHED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SECONDS = 4.0
-"""Shown of a record. Own choice: the paper's figures are not at hand, only their captions."""
-
 COLOURS = (BLUE, VERMILION, GREEN)
-
-
-def record(shown: Record, name: str) -> Figure:
-    """Figs 6 to 8."""
-    return plot_record(shown, f"Experiment {name}: contact force and displacements (synthetic)", SECONDS)
-
-
-def match(shown: Record, matches: Sequence[Match], name: str) -> Figure:
-    """Figs 9 to 11."""
-    title = f"Experiment {name}: synthetic record and model identified from it by output error"
-    return plot_matches(shown.time, matches, title, 0.0, SECONDS)
 
 
 def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[float]]) -> Figure:
@@ -46,14 +32,13 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
     left.set(ylabel="condition number of A", title="Condition number, offset kept")
     _legend_below(left, 2)
     place = np.arange(5)
-    for k, printed in enumerate(PUBLISHED):
-        label = f"paper, {printed.name}"
-        right.bar(place + 0.13 * (k - 2.5), printed.rsd, 0.13, color=COLOURS[k], alpha=0.4, label=label)
-    for k, printed in enumerate(PUBLISHED):
-        label = f"ours, {printed.name}"
-        right.bar(place + 0.13 * (k + 0.5), medians[printed.name], 0.13, color=COLOURS[k], label=label)
+    for whose, first, shade in (("paper", -2.5, {"alpha": 0.4}), ("ours", 0.5, {})):
+        for k, printed in enumerate(PUBLISHED):
+            rsd = printed.rsd if whose == "paper" else medians[printed.name]
+            style: dict[str, Any] = {"color": COLOURS[k], "label": f"{whose}, {printed.name}"} | shade
+            right.bar(place + 0.13 * (k + first), rsd, 0.13, **style)
     right.axhline(100, color=LIMIT, linestyle=":", linewidth=1, label="100 %: as large as the value")
-    right.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
+    _name_parameters(right)
     title = "Relative standard deviation; ours with free offset, low-passed, median of 100"
     right.set(yscale="log", ylabel="RSD (%)", title=title)
     _legend_below(right, 4)
@@ -61,7 +46,7 @@ def ranking(kept: Mapping[str, Identification], medians: Mapping[str, Sequence[f
 
 
 def stiffness(
-    clean: Mapping[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
+    clean: dict[str, Record], last: Sequence[float], sweeps: Mapping[bool, Sequence[float]]
 ) -> Figure:
     """Why k3 is unsure: its column beside m3's; and what a frequency sweep does.
 
@@ -70,9 +55,8 @@ def stiffness(
     figure, (left, right) = panels((11, 4.2), 1, 2)
     known = dict.fromkeys(("k1T", "m2", "k2"), 0.0)  # the columns of A do not depend on them
     m3, k3 = IDENTIFIED.index("m3"), IDENTIFIED.index("k3")
-    for (name, shown), colour, width in zip(
-        list(clean.items())[::-1], (ORANGE, BLUE), (0.6, 2.5), strict=True
-    ):
+    lines = zip(reversed(clean.items()), (ORANGE, BLUE), (0.6, 2.5), strict=True)
+    for (name, shown), colour, width in lines:
         (_, columns), _ = equations(shown, known)  # of the frame's equation
         label = "sweep 0.3 to 4 Hz" if name == FREQUENCY_SWEEP.name else f"Experiment {name}, 1.42 Hz"
         displacement = 1e3 * (columns[:, k3] - columns[:, k3].mean())
@@ -141,21 +125,19 @@ def coverage(shares: Mapping[str, Mapping[str, Array]], trials: int) -> Figure:
                 if share < 1:  # a bar that cannot be seen
                     axis.annotate("0" if share == 0 else "<1", (x, 1), ha="center", color=colour)
         axis.axhline(95, color=LIMIT, linestyle=":", linewidth=1, label="95 %: what an interval promises")
-        axis.set_xticks(place, [f"${_symbol(name)}$" for name in IDENTIFIED])
+        _name_parameters(axis)
         axis.set_title(record_name)
     axes[0].set(ylabel=f"truth inside its 95 % interval\n(% of {trials} records)")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
+    legend_below(figure, 4)
     figure.suptitle("How often a 95 % interval holds the true parameter")
     return figure
 
 
 def _legend_below(axis: Axes, columns: int) -> None:
     """A legend that covers no data."""
-    axis.legend(
-        fontsize="small", ncols=columns, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14)
-    )
+    below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
+    axis.legend(fontsize="small", ncols=columns, frameon=False, **below)
 
 
-def _symbol(name: str) -> str:
-    return f"{name[0]}_{{{name[1:]}}}"
+def _name_parameters(axis: Axes) -> None:
+    axis.set_xticks(np.arange(5), [f"${name[0]}_{{{name[1:]}}}$" for name in IDENTIFIED])

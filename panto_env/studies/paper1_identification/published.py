@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +10,7 @@ from ...catalog import load_pantograph
 from ...identification import parameters_of
 from ...identification.model import matrices
 
-TRUTH = parameters_of(load_pantograph("identified-2dof"))
-"""Table 2's parameters."""
+TRUTH = parameters_of(load_pantograph("identified-2dof"))  # Table 2's parameters
 
 
 @dataclass(frozen=True)
@@ -58,34 +56,19 @@ def per_plate(frequency: float) -> tuple[complex, complex, complex]:
     return complex((TRUTH["k1T"] + s * TRUTH["c1T"]) * (1 - head)), complex(head), complex(support)
 
 
-class Motion(NamedTuple):
-    """Of one series under the printed motion of the plate: the model's, then the printed one (N or mm)."""
+def expected(printed: Published) -> list[tuple[str, str, float, float, float, float]]:
+    """The contact force f_1, then y_p2 and y_p3, under the printed motion of the plate.
 
-    name: str
-    unit: str
-    amplitude: float
-    printed_amplitude: float
-    offset: float
-    printed_offset: float
-
-
-def expected(printed: Published) -> list[Motion]:
-    """The contact force f_1, then y_p2 and y_p3."""
+    Name and unit, then the model's amplitude and the printed one, the model's offset and the printed one.
+    """
     moving, still = per_plate(printed.frequency), per_plate(0.0)
-    series = ("f_1", "N", 1e-3), ("y_p2", "mm", 1.0), ("y_p3", "mm", 1.0)
-    amplitudes = printed.force[0], *printed.amplitudes[1:]
-    offsets = printed.force[1], *printed.offsets[1:]
-    return [
-        Motion(
-            name,
-            unit,
-            scale * abs(moving[k]) * printed.amplitudes[0],
-            amplitudes[k],
-            scale * still[k].real * printed.offsets[0],
-            offsets[k],
-        )
-        for k, (name, unit, scale) in enumerate(series)
-    ]
+    theirs = printed.force, *zip(printed.amplitudes[1:], printed.offsets[1:], strict=True)
+    found = []
+    for k, (name, unit, scale) in enumerate((("f_1", "N", 1e-3), ("y_p2", "mm", 1.0), ("y_p3", "mm", 1.0))):
+        amplitude = scale * abs(moving[k]) * printed.amplitudes[0]
+        offset = scale * still[k].real * printed.offsets[0]
+        found.append((name, unit, amplitude, theirs[k][0], offset, theirs[k][1]))
+    return found
 
 
 def best_performance(printed: Published) -> float:

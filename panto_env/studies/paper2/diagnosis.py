@@ -6,11 +6,11 @@ classifier has seen other speeds, another pantograph and other lines.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,23 +24,16 @@ from ...diagnosis.healthy import Healthy
 from ...diagnosis.passes import Passes, side_by_side
 from ...diagnosis.training import SEVERITIES, Defect, Track, draw_defect, drive, every_defect
 from ...metrics.trajectory import Trajectory
-from ..study import Comparison, Outcome, Report, said
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..study import Comparison, Figure, Outcome, Report, over, said
 
 LINES = ("en50318-2002", "benchmark-2015", "ln2")
 """The first was trained on, at other speeds; the others were not."""
-PANTOGRAPH = "dsa250"
-"""Training has ``dsa380``."""
-SPEEDS_KMH = (220.0, 260.0)
-"""Training has 160, 200, 240 and 280 km/h."""
-SEEDS = (21, 22, 23)
-"""Of tracks of one line and speed."""
+PANTOGRAPH = "dsa250"  # training has ``dsa380``
+SPEEDS_KMH = (220.0, 260.0)  # training has 160, 200, 240 and 280 km/h
+SEEDS = (21, 22, 23)  # of tracks of one line and speed
 HEALTHY, CONTROLS, BROKEN_EACH = 12, 4, 8
 """Of each track: healthy passes to compare with, healthy passes to be judged, broken droppers."""
-MEANS = (1, 3)
-"""Passes over a defect of which the mean is judged."""
+MEANS = (1, 3)  # passes over a defect of which the mean is judged
 RATES = (0.01, 0.03, 0.1, 0.3, 1.0)
 """False alarms per km for which thresholds are set, to draw what each costs."""
 NEAR = ECHOES[0][0]
@@ -101,22 +94,12 @@ def judge_defects(
 
 def _case(track: Track, defect: Defect | None, own: Passes, healthy: Healthy, rate: float) -> Case:
     found = judge(own, healthy, rate)
-    case = Case(
-        track=track,
-        kind="" if defect is None else defect.kind,
-        severity=0.0 if defect is None else defect.severity,
-        passes=len(own.force),
-        false_alarms=rate,
-        detected=False,
-        located=False,
-        error=float("nan"),
-        named="",
-        others=len(found.findings) + found.changed,
-        distance=(found.end - found.begin) / 1e3,
-        outer=defect is not None and is_outer(track, defect.position),
-    )
+    others, distance = len(found.findings) + found.changed, (found.end - found.begin) / 1e3
+    case = Case(track, "", 0.0, len(own.force), rate, False, False, float("nan"), "", others, distance)
     if defect is None:
         return case
+    outer = is_outer(track, defect.position)
+    case = replace(case, kind=defect.kind, severity=defect.severity, outer=outer)
     if defect.kind == TENSION:
         named = TENSION if found.changed else ""
         return replace(case, detected=found.changed, located=found.changed, named=named, others=0)
@@ -131,7 +114,7 @@ def _case(track: Track, defect: Defect | None, own: Passes, healthy: Healthy, ra
         located=within_interval(best.position, defect.position, found.evidence.droppers),
         error=best.position - defect.position,
         named=best.kind,
-        others=case.others - len(near),
+        others=others - len(near),
     )
 
 
@@ -144,10 +127,9 @@ def is_outer(track: Track, position: float) -> bool:
 
 def within_interval(place: float, defect: float, droppers: Sequence[float] | np.ndarray) -> bool:
     """Whether a place lies no further from a defect than the next dropper on that side (m)."""
-    at = np.asarray(droppers)
-    before, after = at[at < defect - 1e-6], at[at > defect + 1e-6]
-    low = before[-1] if len(before) else -np.inf
-    high = after[0] if len(after) else np.inf
+    at = np.asarray(droppers, dtype=float)
+    low = at[at < defect - 1e-6].max(initial=-np.inf)
+    high = at[at > defect + 1e-6].min(initial=np.inf)
     return bool(low - 1e-6 <= place <= high + 1e-6)
 
 
@@ -166,8 +148,7 @@ def broken_only(count: int, scatter: float | None, track: Track) -> list[Case]:
     return judge_defects(track, [*broken, *[None] * CONTROLS], (1,), (FALSE_ALARMS,), healthy)
 
 
-SURE = 0.9
-"""Share of defects of a severity from which on it counts as found."""
+SURE = 0.9  # share of defects of a severity from which on it counts as found
 
 
 def chosen(cases: Sequence[Case], **wanted: Any) -> list[Case]:
@@ -176,15 +157,19 @@ def chosen(cases: Sequence[Case], **wanted: Any) -> list[Case]:
     return [case for case in cases if usual.items() <= (vars(case.track) | vars(case)).items()]
 
 
-def share(cases: Sequence[Case], of: Callable[[Case], bool]) -> tuple[float, float, float]:
-    """Share of cases, with its 95 % interval after Wilson; nan where there are no cases."""
+def share(cases: Sequence[Case], **wanted: Any) -> tuple[float, float, float]:
+    """Share of cases that have these values, with its 95 % interval after Wilson; nan without cases."""
     from scipy.stats import binomtest  # slow to import
 
     if not cases:
         return float("nan"), float("nan"), float("nan")
-    hits = sum(map(of, cases))
+    hits = sum(wanted.items() <= vars(case).items() for case in cases)
     interval = binomtest(hits, len(cases)).proportion_ci(method="wilson")
     return hits / len(cases), float(interval.low), float(interval.high)
+
+
+def _percent(cases: Sequence[Case], digits: int = 0, **wanted: Any) -> str:
+    return f"{100 * share(cases, **wanted)[0]:.{digits}f}"
 
 
 def alarms_per_10_km(cases: Sequence[Case]) -> tuple[float, float]:
@@ -213,28 +198,27 @@ BROKEN_HEADINGS = (
 def broken_row(cases: Sequence[Case]) -> tuple[str, ...]:
     """Cells under ``BROKEN_HEADINGS``."""
     broken = [case for case in cases if case.kind == BROKEN]
-    located, low, high = share(broken, lambda case: case.located)
-    noticed, _, _ = share(broken, lambda case: case.detected)
-    named, _, _ = share([case for case in broken if case.detected], lambda case: case.named == BROKEN)
-    alarms, bound = alarms_per_10_km(cases)
+    noticed = [case for case in broken if case.detected]
+    _, low, high = share(broken, located=True)
     distance = sum(case.distance for case in cases if not case.kind)
-    found = f"{100 * noticed:.1f}", f"{100 * located:.1f}", f"{100 * low:.0f}–{100 * high:.0f}"
-    return f"{len(broken)}", *found, f"{100 * named:.0f}", f"{distance:.0f}", f"{alarms:.2f}", f"{bound:.2f}"
+    found = _percent(broken, 1, detected=True), _percent(broken, 1, located=True)
+    alarms = (f"{each:.2f}" for each in alarms_per_10_km(cases))
+    interval, named = f"{100 * low:.0f}–{100 * high:.0f}", _percent(noticed, named=BROKEN)
+    return f"{len(broken)}", *found, interval, named, f"{distance:.0f}", *alarms
 
 
 def broken_table(cases: Sequence[Case]) -> Table:
     """Broken droppers by line, speed and passes, and false alarms on healthy lines."""
-    rows, ends = [], []
+    rows: list[tuple[str, ...]] = []
+    ends = []
     for count in MEANS:
         words, own = _passes(count), chosen(cases, passes=count)
         for line, speed in product(LINES, SPEEDS_KMH):
             here = chosen(own, catenary=line, speed_kmh=speed)
             rows.append((f"{words}, {line}", f"{speed:g}", *broken_row(here)))
-        for where, some in (
-            ("next to a support", [case for case in own if case.outer or not case.kind]),
-            ("other droppers", [case for case in own if not case.outer]),
-            ("all", own),
-        ):
+        outer = [case for case in own if case.outer or not case.kind]
+        others = [case for case in own if not case.outer]
+        for where, some in (("next to a support", outer), ("other droppers", others), ("all", own)):
             rows.append((f"{words}, {where}", "", *broken_row(some)))
         ends.append(len(rows) - 1)
     headings = ("mean of", "km/h", *BROKEN_HEADINGS)
@@ -248,26 +232,24 @@ def _passes(count: int) -> str:
 def severity_table(cases: Sequence[Case]) -> Table:
     """What of each kind and severity is noticed, and how far off its place is."""
     rows = []
-    for kind, severities in SEVERITIES.items():
-        for severity in severities:
-            cells = []
-            for count in MEANS:
-                own = chosen(cases, kind=kind, severity=severity, passes=count)
-                found = [abs(case.error) for case in own if case.detected]
-                noticed, _, _ = share(own, lambda case: case.detected)
-                located, _, _ = share(own, lambda case: case.located)
-                median = f"{np.median(found):.1f}" if found and kind != TENSION else "–"
-                cells += [f"{100 * noticed:.0f}", f"{100 * located:.0f}", median]
-            rows.append((kind, _size(kind, severity), *cells))
+    for kind, severity in ((kind, each) for kind, every in SEVERITIES.items() for each in every):
+        cells = []
+        for count in MEANS:
+            own = chosen(cases, kind=kind, severity=severity, passes=count)
+            found = [abs(case.error) for case in own if case.detected]
+            median = f"{np.median(found):.1f}" if found and kind != TENSION else "–"
+            cells += [_percent(own, detected=True), _percent(own, located=True), median]
+        rows.append((kind, _size(kind, severity), *cells))
     each = product(map(_passes, MEANS), ("noticed (%)", "located (%)", "off (m)"))
     headings = ("kind", "severity", *(f"{what}, {passes}" for passes, what in each))
     return Table("Noticed, and within a dropper interval, by severity", headings, rows)
 
 
 def _size(kind: str, severity: float) -> str:
-    unit = {"broken dropper": "", "hard spot": f"{severity:g} kg"}
-    if kind in unit:
-        return unit[kind]
+    if kind == BROKEN:
+        return ""
+    if kind == SPOT:
+        return f"{severity:g} kg"
     return f"{100 * severity:g} %" if kind in ("worn wire", TENSION) else f"{1e3 * severity:g} mm"
 
 
@@ -275,8 +257,7 @@ def smallest(cases: Sequence[Case], kind: str, passes: int) -> float:
     """Smallest severity of which, and of all worse ones, ``SURE`` are noticed; nan where there is none."""
     found = float("nan")
     for severity in sorted(SEVERITIES[kind], reverse=True):
-        own = chosen(cases, kind=kind, severity=severity, passes=passes)
-        if share(own, lambda case: case.detected)[0] < SURE:
+        if share(chosen(cases, kind=kind, severity=severity, passes=passes), detected=True)[0] < SURE:
             break
         found = severity
     return found
@@ -294,35 +275,28 @@ def smallest_table(cases: Sequence[Case]) -> Table:
 
 def confusion_table(cases: Sequence[Case], passes: int) -> Table:
     """Kinds that were, in rows, and what they were taken for (%); of those noticed."""
-    named = (*KINDS, TENSION)
-    rows = []
+    named, rows = (*KINDS, TENSION), []
     for kind in SEVERITIES:
         own = chosen(cases, kind=kind, passes=passes, detected=True)
-        shares = (share(own, lambda case, name=name: case.named == name)[0] for name in named)  # type: ignore[misc]
-        rows.append((f"{kind} ({len(own)})", *(f"{100 * each:.0f}" for each in shares)))
+        rows.append((f"{kind} ({len(own)})", *(_percent(own, named=name) for name in named)))
     return Table(f"Taken for (%), mean of {passes}", ("kind (noticed)", *named), rows)
 
 
 WANTED = 0.95
 """Share of broken droppers to be found within a dropper interval, at one false alarm per 10 km or fewer."""
-COUNTS = (3, 5, 8, 12)
-"""Healthy passes to compare with."""
+COUNTS = (3, 5, 8, 12)  # healthy passes to compare with
 SCATTERS = (0.0, 1e-3, 2e-3, 5e-3)
 """Of droppers' lengths (m), where healthy passes are over other lines of the design."""
-REFERENCE_SEEDS = SEEDS[:2]
-"""Of the lines on which these are tried."""
-SHARE = 0.8
-"""Of the study's time that the cases take; the rest is for what healthy passes are worth."""
-EXAMPLE = Track("ln2", PANTOGRAPH, 260.0, seed=41)
-"""Of the picture."""
+REFERENCE_SEEDS = SEEDS[:2]  # of the lines on which these are tried
+SHARE = 0.8  # of the study's time that the cases take; the rest is for what healthy passes are worth
+EXAMPLE = Track("ln2", PANTOGRAPH, 260.0, seed=41)  # of the picture
 
 
 def tracks(seeds: Sequence[int] = SEEDS, lines: Sequence[str] = LINES) -> list[Track]:
     """All tracks that are judged, each with pantographs of its own: those of one seed would be the same."""
-    kinds = [(line, speed) for line in lines for speed in SPEEDS_KMH]
     return [
         Track(line, PANTOGRAPH, speed, 100 * (k + 1) + seed)
-        for k, (line, speed) in enumerate(kinds)
+        for k, (line, speed) in enumerate(product(lines, SPEEDS_KMH))
         for seed in seeds
     ]
 
@@ -332,9 +306,8 @@ def rate_rows(cases: Sequence[Case]) -> list[dict[str, float]]:
     rows = []
     for count, rate in product(MEANS, RATES):
         own = [c for c in cases if c.passes == count and c.false_alarms == rate]
-        located, low, high = share([c for c in own if c.kind == BROKEN], lambda case: case.located)
-        measured, _ = alarms_per_10_km(own)
-        found = {"located": located, "low": low, "high": high, "measured": measured / 10}
+        located, low, high = share([c for c in own if c.kind == BROKEN], located=True)
+        found = {"located": located, "low": low, "high": high, "measured": alarms_per_10_km(own)[0] / 10}
         rows.append({"passes": count, "rate": rate} | found)
     return rows
 
@@ -349,11 +322,8 @@ def reference_table(progress: Progress | None = None) -> Table:
         words = f"{HEALTHY} over other lines, droppers within {1e3 * scatter:g} mm rms"
         references[words] = HEALTHY, scatter
     jobs = [partial(broken_only, *how, track) for how in references.values() for track in here]
-    found = in_processes(jobs, progress=progress)
-    rows = []
-    for k, name in enumerate(references):
-        own = [case for cases in found[k * len(here) : (k + 1) * len(here)] for case in cases]
-        rows.append((name, *broken_row(own)))
+    found = iter(in_processes(jobs, progress=progress))
+    rows = [(name, *broken_row([case for _ in here for case in next(found)])) for name in references]
     return Table(f"What healthy passes are worth, {LINES[0]}", ("healthy passes", *BROKEN_HEADINGS), rows)
 
 
@@ -375,18 +345,14 @@ def plot_rates(rows: Sequence[dict[str, float]]) -> Figure:
     return figure
 
 
-def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
+def comparisons(cases: Sequence[Case]) -> Iterator[Comparison]:
     """The paper's claim and our bars."""
-    found = []
     for count in MEANS:
         for speed in SPEEDS_KMH:
             own = chosen(cases, passes=count, speed_kmh=speed, kind=BROKEN)
-            located, _, _ = share(own, lambda case: case.located)
             names = {"speed": speed, "count": count, "wanted": 100 * WANTED}
-            found.append(said("diagnosis-broken", 100 * located, **names))
-        alarms, _ = alarms_per_10_km(chosen(cases, passes=count))
-        found.append(said("diagnosis-alarms", alarms, count=count))
-    return tuple(found)
+            yield said("diagnosis-broken", 100 * share(own, located=True)[0], **names)
+        yield said("diagnosis-alarms", alarms_per_10_km(chosen(cases, passes=count))[0], count=count)
 
 
 def example() -> Figure:
@@ -396,9 +362,8 @@ def example() -> Figure:
     defects = tuple(draw_defect(EXAMPLE, *each, random) for each in three)
     healthy = [drive(EXAMPLE, k) for k in range(HEALTHY)]
     found = diagnose([drive(EXAMPLE, HEALTHY, defects)], healthy)
-    figure = plot_diagnosis(
-        found, f"{EXAMPLE.catenary} at {EXAMPLE.speed_kmh:g} km/h, one pass; dotted: the true defects"
-    )
+    title = f"{EXAMPLE.catenary} at {EXAMPLE.speed_kmh:g} km/h, one pass; dotted: the true defects"
+    figure = plot_diagnosis(found, title)
     for axis in figure.axes:
         for defect in defects:
             axis.axvline(defect.position, color="black", linestyle=":", linewidth=1.0)
@@ -409,24 +374,17 @@ def outcome(report: Report) -> Outcome:
     """Tables, curves and comparisons of the diagnosis: every kind of defect on every track."""
     report("diagnosis", 0.0)
     jobs = [partial(judge_track, track, MEANS, RATES) for track in tracks()]
-    found = in_processes(jobs, progress=lambda done, every: report("diagnosis", SHARE * done / every))
+    found = in_processes(jobs, progress=over(report, "diagnosis", 0.0, SHARE))
     cases = [case for own in found for case in own]
-    worth = reference_table(
-        progress=lambda done, every: report("healthy passes", SHARE + (1 - SHARE) * done / every)
-    )
+    worth = reference_table(over(report, "healthy passes", SHARE, 1.0))
     rates = rate_rows(cases)
     plain = [vars(case.track) | dict([*vars(case).items()][1:]) for case in chosen(cases)]  # less the track
     far = {count: elsewhere_per_10_km(chosen(cases, passes=count)) for count in MEANS}
+    tables = broken_table(cases), severity_table(cases), smallest_table(cases)
     return Outcome(
         "Paper 2, section 4.2: diagnosis of the overhead line",
-        comparisons(cases),
-        (
-            broken_table(cases),
-            severity_table(cases),
-            smallest_table(cases),
-            *(confusion_table(cases, count) for count in MEANS),
-            worth,
-        ),
+        tuple(comparisons(cases)),
+        (*tables, *(confusion_table(cases, count) for count in MEANS), worth),
         {"diagnosis": example(), "diagnosis-false-alarms": plot_rates(rates)},
         {"diagnosis": {"cases": plain, "rates": rates, "findings_far_from_the_defect_in_10_km": far}},
     )

@@ -7,11 +7,12 @@ noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from itertools import product
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from ...estimation.model import PAPER2, EstimatorSettings
 from ...estimation.motion import DISPLACEMENT_NOISE, VELOCITY_NOISE, Motion, measure
 from ...estimation.parameters import (
     LIFT,
-    Parameters,
     estimate_parameters,
     frame_parameters,
     information,
@@ -37,35 +37,23 @@ from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData, with_scatter
 from ...terminal import number
-from ..study import Cell, Comparison, Outcome, Report, said, tabled
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..study import Cell, Comparison, Figure, Outcome, Report, over, said, tabled
 
 CATENARY, PANTOGRAPH = "en50318-2002", "own-two-mass"
 """The paper's line with both wires and droppers, and its rig's pantograph, static load 120 N."""
 SPEEDS_KMH = (150.0, 200.0, 250.0, 300.0, 350.0)
-SPEED_KMH = 250.0
-"""That of the paper's Figs 11 and 12."""
+SPEED_KMH = 250.0  # that of the paper's Figs 11 and 12
 MISMATCH = 0.05
 SEEDS = 3
-TIME_STEP = 5e-4
-"""Of the simulation (s): two steps to a sample."""
-START = 2.0
-"""Time (s) in which pass and filters forget their start."""
+TIME_STEP = 5e-4  # of the simulation (s): two steps to a sample
+START = 2.0  # time (s) in which pass and filters forget their start
 OBSERVATIONS = ("displacements and velocities", "displacements")
 CUTOFFS = {OBSERVATIONS[0]: 80.0, OBSERVATIONS[1]: 50.0}
 """Low-pass of what has no filter's model (Hz): about the minimum error at all frequencies over all speeds."""
-LAG = 0.1
-"""Of the smoother (s)."""
-FREE = 1e5
-"""Intensity of a random walk (N/s^0.5) of which next to nothing is believed."""
-NOISES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
-"""Of displacements, rms (m)."""
-SHOWN = 4.0
-"""Seconds drawn: about five spans at 250 km/h. Own choice."""
-HIGHEST = 20.0
-"""Of the frequencies shown (Hz)."""
+LAG = 0.1  # of the smoother (s)
+FREE = 1e5  # intensity of a random walk (N/s^0.5) of which next to nothing is believed
+NOISES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)  # of displacements, rms (m)
+SHOWN = 4.0  # seconds drawn: about five spans at 250 km/h. Own choice
 
 
 @dataclass(frozen=True)
@@ -83,9 +71,8 @@ class Case:
 @cache
 def run(speed_kmh: float, condition: str = "new") -> Trajectory:
     """A passive pass along the line."""
-    return simulate(
-        CATENARY, PANTOGRAPH, speed_kmh, time_step=TIME_STEP, line_condition=condition, record_droppers=False
-    )
+    given: dict[str, Any] = {"time_step": TIME_STEP, "line_condition": condition, "record_droppers": False}
+    return simulate(CATENARY, PANTOGRAPH, speed_kmh, **given)
 
 
 def known_pantograph(seed: int) -> PantographData:
@@ -124,7 +111,7 @@ def cases(
 ) -> list[Case]:
     """Every method, with both sets of observations, at every speed, on all cores."""
     runs = {speed: run(speed, condition) for speed in speeds_kmh}
-    keys = [(speed, seed) for speed in speeds_kmh for seed in range(SEEDS)]
+    keys = list(product(speeds_kmh, range(SEEDS)))
     jobs = [partial(_assess, measure(runs[speed], seed=seed), seed) for speed, seed in keys]
     found = dict(zip(keys, in_processes(jobs, progress=progress), strict=True))
     return [
@@ -136,9 +123,8 @@ def cases(
 def _assess(motion: Motion, seed: int) -> dict[tuple[str, str], tuple[Score, ...]]:
     known = known_pantograph(seed)
     return {
-        (observation, method): settled_scores(motion, find(motion, known, observation))
-        for observation in OBSERVATIONS
-        for method, find in METHODS.items()
+        (observation, method): settled_scores(motion, METHODS[method](motion, known, observation))
+        for observation, method in product(OBSERVATIONS, METHODS)
     }
 
 
@@ -153,44 +139,35 @@ def _median(which: tuple[float, str, str, str], seeds: Sequence[tuple[Score, ...
 
 def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
     """Scores in 0 to 20 Hz by observation and noise of displacements (m), velocities' in proportion."""
-    found = {}
+    found, known = {}, known_pantograph(0)
     for noise in NOISES:
-        velocity = noise / DISPLACEMENT_NOISE * VELOCITY_NOISE
-        motion = measure(trajectory, displacement_noise=noise, velocity_noise=velocity)
+        noises: dict[str, Any] = {
+            "displacement_noise": noise,
+            "velocity_noise": noise / DISPLACEMENT_NOISE * VELOCITY_NOISE,
+        }
+        motion = measure(trajectory, **noises)
         for observation in OBSERVATIONS:
-            settings = EstimatorSettings(
-                observation=observation, displacement_noise=noise, velocity_noise=velocity
-            )
-            force = estimate(motion, known_pantograph(0), settings).force
+            force = estimate(motion, known, EstimatorSettings(observation=observation, **noises)).force
             found[observation, noise] = settled_scores(motion, force)[-1]
     return found
 
 
-@dataclass(frozen=True)
-class ParameterInformation:
-    """Parameters as the extended filter found them, and how well a pass can determine them at all."""
+def parameter_information(trajectory: Trajectory) -> SimpleNamespace:
+    """Parameters as known, as found by the extended filter, and how well the pass can determine them.
 
-    known: PantographData
-    found: Parameters
-    bounds: Mapping[str, float]  # minimum relative standard deviation of each alone, by name
-    scale: float  # minimum relative standard deviation of all frame parameters and the lift by one factor
-
-
-def parameter_information(trajectory: Trajectory) -> ParameterInformation:
-    """Parameters by the extended filter, and how well the pass can determine each."""
-    motion, true = measure(trajectory), load_pantograph(PANTOGRAPH)
+    bounds: minimum relative standard deviation of each alone, by name; scale: that of all frame parameters
+    and the lift by one factor.
+    """
+    motion, true, known = measure(trajectory), load_pantograph(PANTOGRAPH), known_pantograph(0)
     settings = EstimatorSettings(observation=OBSERVATIONS[1])
-    found = estimate_parameters(motion, known_pantograph(0), settings)
+    found = estimate_parameters(motion, known, settings)
     free = settings.model_copy(update={**PAPER2, "force_model": RandomWalk(intensity=FREE)})
     names = (*parameter_names(true), LIFT)
     single = np.diag(information(motion, true, free, names)) ** -0.5
     together = information(motion, true, free, (*frame_parameters(true), LIFT))
-    return ParameterInformation(
-        known=known_pantograph(0),
-        found=found,
-        bounds=dict(zip(names, single.tolist(), strict=True)),
-        scale=float(np.linalg.eigvalsh(together)[0] ** -0.5),
-    )
+    bounds = dict(zip(names, single.tolist(), strict=True))
+    scale = float(np.linalg.eigvalsh(together)[0] ** -0.5)
+    return SimpleNamespace(known=known, found=found, bounds=bounds, scale=scale)
 
 
 def ways_table(cases: Sequence[Case]) -> Table:
@@ -205,8 +182,7 @@ def ways_table(cases: Sequence[Case]) -> Table:
     return tabled(
         f"The estimated force at {SPEED_KMH:g} km/h, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds",
         [
-            ("observations", "{.observation}"),
-            ("method", "{.method}"),
+            "observations: {.observation} | method: {.method}",
             *by_band("correlation", lambda score: number(score.correlation, 4)),
             *by_band("rms error (N)", lambda score: number(score.rms, 2)),
             ("all", lambda case: number(case.scores[-1].whole_rms, 2)),
@@ -219,25 +195,22 @@ def ways_table(cases: Sequence[Case]) -> Table:
     )
 
 
-def over_speed_tables(cases: Sequence[Case]) -> tuple[Table, ...]:
+def over_speed_tables(cases: Sequence[Case]) -> Iterator[Table]:
     """One table a quantity, in 0 to 20 Hz: methods and observations down, speeds across."""
     found = {(case.observation, case.method, case.speed_kmh): case.scores[-1] for case in cases}
     speeds = sorted({speed for *_, speed in found})
     methods = list(dict.fromkeys((observation, method) for observation, method, _ in found))
-    quantities: dict[str, Callable[[Score], str]] = {
-        "correlation with the true force": lambda score: number(score.correlation, 4),
-        "rms error without its mean (N)": lambda score: number(score.rms, 2),
-        "delay by cross-correlation (ms)": lambda score: number(1e3 * score.delay, 2),
-    }
-    return tuple(
-        Table(
-            f"Estimated force, {title}, 0 to {BANDS[-1]:g} Hz",
-            ("observations", "method", *(f"{speed:g} km/h" for speed in speeds)),
-            [(*method, *(cell(found[*method, speed]) for speed in speeds)) for method in methods],
-            text_columns=2,
-        )
-        for title, cell in quantities.items()
-    )
+    headings = ("observations", "method", *(f"{speed:g} km/h" for speed in speeds))
+    for words, name, scale, digits in (
+        ("correlation with the true force", "correlation", 1.0, 4),
+        ("rms error without its mean (N)", "rms", 1.0, 2),
+        ("delay by cross-correlation (ms)", "delay", 1e3, 2),
+    ):
+        rows = [
+            (*each, *(number(scale * getattr(found[*each, speed], name), digits) for speed in speeds))
+            for each in methods
+        ]
+        yield Table(f"Estimated force, {words}, 0 to {BANDS[-1]:g} Hz", headings, rows, text_columns=2)
 
 
 def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
@@ -252,7 +225,7 @@ def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
     return Table(title, (*delays, "correlation, both", "correlation, displacements"), rows)
 
 
-def parameters_table(estimated: ParameterInformation) -> Table:
+def parameters_table(estimated: SimpleNamespace) -> Table:
     """True, known and found values, and the minimum uncertainty of each."""
     true, parameters = load_pantograph(PANTOGRAPH), estimated.found
     pairs = zip(parameters.values.tolist(), parameters.deviation.tolist(), strict=True)
@@ -270,9 +243,8 @@ def parameters_table(estimated: ParameterInformation) -> Table:
         rows.append((name, *cells, f"{100 * bound:.3g}"))
     rows.append(("frame and lift by one factor", "–", "–", "–", "–", f"{100 * estimated.scale:.3g}"))
     headings = ("parameter", "true", "known, error (%)", "found, error (%)", "± (%)", "alone, minimum ± (%)")
-    return Table(
-        "Parameters from one pass by the extended filter; ± is one standard deviation", headings, rows
-    )
+    title = "Parameters from one pass by the extended filter; ± is one standard deviation"
+    return Table(title, headings, rows)
 
 
 def comparisons(cases: Sequence[Case]) -> tuple[Comparison, ...]:
@@ -294,9 +266,9 @@ def figure_11_12(motion: Motion, force: Array, observation: str) -> Figure:
     """True and estimated contact force (N), (n,): Fig. 11 with velocities, Fig. 12 without."""
     assert motion.contact_force is not None
     shown = (motion.time >= START) & (motion.time <= START + SHOWN)
-    figure, axis = panels((9, 4))
-    axis.plot(motion.time[shown], motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
-    axis.plot(motion.time[shown], force[shown], color="black", linewidth=0.8, label="estimated")
+    time, (figure, axis) = motion.time[shown], panels((9, 4))
+    axis.plot(time, motion.contact_force[shown], color=ORANGE, linewidth=2, label="true")
+    axis.plot(time, force[shown], color="black", linewidth=0.8, label="estimated")
     axis.set(xlabel="time (s)", ylabel="contact force (N)", xlim=(START, START + SHOWN))
     words = f"as Fig. {11 + OBSERVATIONS.index(observation)} of paper 2, from {observation}"
     figure.suptitle(f"{words}, {SPEED_KMH:g} km/h, 120 N, mismatch {100 * MISMATCH:g} %", fontsize="medium")
@@ -315,9 +287,8 @@ def delay_plot(motion: Motion, forces: Mapping[str, Array]) -> Figure:
         late = np.where(found.coherence >= COHERENT, 1e3 * found.delay, np.nan)
         axis.plot(found.frequency, late, "o-", markersize=3, color=series_colour(k), label=name)
     axis.axhline(0, color="0.4", linewidth=0.8)
-    axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, HIGHEST))
-    words = f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent"
-    figure.suptitle(words, fontsize="medium")
+    axis.set(xlabel="frequency (Hz)", ylabel="late by (ms)", xlim=(0, 20))
+    figure.suptitle(f"Delay by phase, {SPEED_KMH:g} km/h; gaps: less than half coherent", fontsize="medium")
     legend_above(axis, 3)
     axis.grid(color="0.9")
     return figure
@@ -327,7 +298,7 @@ def outcome(report: Report) -> Outcome:
     """Every method at every speed, over noise, which parameters a pass determines, and the figures."""
     report("estimator: a pass over the line", 0.0)
     trajectory = run(SPEED_KMH)
-    every = cases(progress=lambda done, all_: report("estimator: every way", 0.05 + 0.75 * done / all_))
+    every = cases(progress=over(report, "estimator: every way", 0.05, 0.8))
     report("estimator: noise", 0.8)
     scores = over_noise(trajectory)
     report("estimator: parameters", 0.9)
@@ -335,9 +306,8 @@ def outcome(report: Report) -> Outcome:
     motion, known = measure(trajectory), known_pantograph(0)
     by_filter = {kind: filtered("random-walk", 0.0, motion, known, kind) for kind in OBSERVATIONS}
     late = {f"filter, {kind}": force for kind, force in by_filter.items()}
-    late[f"smoother of {1e3 * LAG:g} ms, {OBSERVATIONS[1]}"] = filtered(
-        "random-walk", LAG, motion, known, OBSERVATIONS[1]
-    )
+    smoothed = filtered("random-walk", LAG, motion, known, OBSERVATIONS[1])
+    late[f"smoother of {1e3 * LAG:g} ms, {OBSERVATIONS[1]}"] = smoothed
     names = ("fig11-displacements-and-velocities", "fig12-displacements")
     drawn = [figure_11_12(motion, force, kind) for kind, force in by_filter.items()]
     return Outcome(

@@ -17,7 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,7 @@ from ...plant.numerics import Numerics, Runs
 from ...plant.plant import Plant
 from ...plant.state import Place, Row
 from ...plant.train import Train
-from ..study import Comparison, Outcome, Report, said
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..study import Comparison, Figure, Outcome, Report, said
 
 PANTOGRAPH, CATENARY, MOTOR = "own-motor-head", "en50318-2002", "head-motor"
 PLACES = ("frame", "head", "both")
@@ -54,12 +51,9 @@ BANDS = ((0.0, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0))
 """Bands of frequency (Hz) of the contact force, the mean in none."""
 GAINS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Gains (N/N) among which that of the minimum sigma is taken under a limit of force."""
-GAIN_RANGE = (0.05, 8.0)
-"""Gains (N/N) among which one of a given power is looked for."""
-MEAN_SHIFT = 0.015
-"""Own choice, of the mean force: beyond it a smaller sigma is that of another mean."""
-SPANS = (10, 19)
-"""Spans that the figures cover: the start has died out before."""
+GAIN_RANGE = (0.05, 8.0)  # gains (N/N) among which one of a given power is looked for
+MEAN_SHIFT = 0.015  # own choice, of the mean force: beyond it a smaller sigma is that of another mean
+SPANS = (10, 19)  # spans that the figures cover: the start has died out before
 
 
 class ForceFeedback:
@@ -121,6 +115,7 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
     Raises InputError where the pass leaves the plant's valid range.
     """
     actuator = cast(MotorActuator, actuator_settings(motor)).model_copy(update={"place": place})
+    policy = ForceFeedback(gain, mean)
     taken: list[tuple[float, Array]] = []  # time (s) and energy (J) at each of the two ends of SPANS
 
     def watch(task: Task) -> None:
@@ -131,7 +126,6 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
             taken[1:] = [(plant.of(0, Row.STEP) * plant.time_step, motors.energy(0))]
 
     given: dict[str, Any] = {"actuator": actuator, "control_interval": CONTROL_INTERVAL, "watch": watch}
-    policy = ForceFeedback(gain, mean)
     record = simulate(CATENARY, PANTOGRAPH, speed_kmh, policy, record_droppers=False, **given)
     if record.terminated:
         reason = record.ending.removesuffix(".")
@@ -144,8 +138,8 @@ def motor_pass(speed_kmh: float, place: str, gain: float, mean: float, motor: st
 
 def _kept(record: Trajectory, place: str, gain: float, *watts_and_heat: float) -> MotorPass:
     bands = rms_by_band(record.contact_force[record.inside(SPANS)], record.time_step)
-    kept = map(float, watts_and_heat)
-    return MotorPass(record.speed_kmh, place, gain, record, record.summary(SPANS), bands, *kept)
+    figures, kept = record.summary(SPANS), map(float, watts_and_heat)
+    return MotorPass(record.speed_kmh, place, gain, record, figures, bands, *kept)
 
 
 def at_power(speed_kmh: float, place: str, watts: float) -> MotorPass:
@@ -201,12 +195,11 @@ def places_table(title: str, passive: MotorPass, passes: Sequence[MotorPass]) ->
     """
     taken = ("motors on", "gain", "electrical (W)", "mechanical (W)", "heat (%)", "rms (N)")
     headings = (*taken, "F_m (N)", "σ (N)", *(f"{low:g}–{high:g} Hz (%)" for low, high in BANDS))
-    first: list[Any] = ["none", *"–––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"]
-    rows = [(*first, *(f"{rms:.2f} N" for rms in passive.bands))]
+    first = "none", *"–––––", f"{passive.figures.mean:.1f}", f"{passive.figures.std:.2f}"
+    rows: list[tuple[str, ...]] = [(*first, *(f"{rms:.2f} N" for rms in passive.bands))]
     for one in passes:
-        figures = one.figures
         watts = f"{one.power:.1f}", f"{one.record.mechanical_power(SPANS):.1f}", f"{100 * one.heat:.0f}"
-        forces = f"{figures.effort:.1f}", f"{figures.mean:.1f}", f"{figures.std:.2f}"
+        forces = f"{one.figures.effort:.1f}", f"{one.figures.mean:.1f}", f"{one.figures.std:.2f}"
         changes = (f"{change:+.0f}" for change in _changes(passive, one))
         rows.append((one.place, f"{one.gain:.2f}", *watts, *forces, *changes))
     return Table(title, headings, rows)
@@ -217,10 +210,8 @@ def _changes(passive: MotorPass, one: MotorPass) -> list[float]:
     return [100 * (after / before - 1) for after, before in zip(one.bands, passive.bands, strict=True)]
 
 
-HARMONICS = 4
-"""Of the span, in the motion: as many cosines as a line can have."""
-HIGHEST = 17
-"""Harmonic up to which they are looked for: 20 Hz at 250 km/h."""
+HARMONICS = 4  # of the span, in the motion: as many cosines as a line can have
+HIGHEST = 17  # harmonic up to which they are looked for: 20 Hz at 250 km/h
 PAD_STIFFNESS, PAD_DAMPING = 25e3, 165.0
 """Own choice, of a pad between collector and contact point (N/m, N s/m): half of a strip's spring, and half
 of the damper 2 sqrt(T m) that the contact wire is to fast motion, since half of a head is tested."""
@@ -235,7 +226,6 @@ class BenchRun:
 
     gain: float  # N/N; nan without a motor
     time: Array  # (n,): s
-    motion: Array  # (n,): of the contact point (m)
     force: Array  # (n,): N
     motor_force: Array  # (n,): N
     bands: tuple[float, ...]  # rms of the contact force in BANDS (N)
@@ -270,7 +260,7 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
     None: without a motor. The target force is half of the mean of the pass.
     """
     target = 0.5 * float(record.contact_force[record.inside(SPANS)].mean())
-    plant, waves = _bench(record, target, gain is not None)
+    plant = _bench(record, target, gain is not None)
     span_time, steps = record.alignment.mean_length / record.speed, round(CONTROL_INTERVAL / TIME_STEP)
     controls, command = round(RUN_SPANS * span_time / CONTROL_INTERVAL), np.zeros((1, 1, 2))
     samples = plant.samples(steps * controls + 1)
@@ -279,66 +269,48 @@ def bench_run(record: Trajectory, gain: float | None) -> BenchRun:
         plant.advance(command, steps, samples)
     time = TIME_STEP * (np.arange(steps * controls) + 0.5)
     shown = time > time[-1] - SHOWN_SPANS * span_time
-    rows = samples.rows[0, 1:, 0][shown]
-    turns = np.outer(time[shown] * record.speed, waves[:, 1]) + waves[:, 2]
-    motors = plant.actuators
+    rows, motors = samples.rows[0, 1:, 0][shown], plant.actuators
+    force, motor_force = rows[:, Row.CONTACT_FORCE], rows[:, Row.HEAD_FORCE]
     supplied = motors.energy(0)[Place.HEAD, 0] if isinstance(motors, MotorArrays) else 0.0
-    return BenchRun(
-        gain=float("nan") if gain is None else gain,
-        time=time[shown],
-        motion=np.cos(2 * np.pi * turns) @ waves[:, 0],
-        force=rows[:, Row.CONTACT_FORCE],
-        motor_force=rows[:, Row.HEAD_FORCE],
-        bands=rms_by_band(rows[:, Row.CONTACT_FORCE], TIME_STEP),
-        power=float(supplied) / (TIME_STEP * steps * controls),
-    )
+    power = float(supplied) / (TIME_STEP * steps * controls)
+    given = float("nan") if gain is None else gain
+    return BenchRun(given, time[shown], force, motor_force, rms_by_band(force, TIME_STEP), power)
 
 
-def _bench(record: Trajectory, target: float, driven: bool) -> tuple[Plant, Array]:
-    """The bench at rest under a mean force (N), and the waves that the contact point goes through."""
+def _bench(record: Trajectory, target: float, driven: bool) -> Plant:
+    """The bench at rest under a mean force (N), its contact point about to move as the line of a pass."""
     whole = load_pantograph(PANTOGRAPH)
     suspension = 0.5 * whole.stiffnesses[0]
-    collector = whole.model_copy(
-        update={
-            "masses": (0.5 * whole.masses[0],),
-            "stiffnesses": (suspension,),
-            "dampings": (0.5 * whole.dampings[0],),
-            # The suspension pulls back by what the pad gives way.
-            "static_force": target * (PAD_STIFFNESS + suspension) / PAD_STIFFNESS,
-            "aerodynamic_coefficient": 0.0,
-            "contact_stiffness": PAD_STIFFNESS,
-            "contact_damping": PAD_DAMPING,
-        }
-    )
-    point = load_catenary("periodic-stiffness").model_copy(
-        update={"mean_stiffness": 1e8, "stiffness_variation": 0.0}
-    )
+    half = {
+        "masses": (0.5 * whole.masses[0],),
+        "stiffnesses": (suspension,),
+        "dampings": (0.5 * whole.dampings[0],),
+        # The suspension pulls back by what the pad gives way.
+        "static_force": target * (PAD_STIFFNESS + suspension) / PAD_STIFFNESS,
+        "aerodynamic_coefficient": 0.0,
+        "contact_stiffness": PAD_STIFFNESS,
+        "contact_damping": PAD_DAMPING,
+    }
+    even = {"mean_stiffness": 1e8, "stiffness_variation": 0.0}
+    point = load_catenary("periodic-stiffness").model_copy(update=even)
     # A condition with room for as many waves; theirs are replaced by those of the motion.
     room = LineCondition(irregularity=1.0, wear_depth=1e-3, wear_wavelength=100.0)
     motor = actuator_settings(f"{MOTOR}:motors=1,force_limit=50" if driven else "ideal:place=head")
-    plant = Plant(
-        point,
-        Train.of(collector, actuator=motor),
-        numerics=Numerics(time_step=TIME_STEP),
-        runs=Runs(conditions=(room,)),
-    )
-    waves = motion_of_line(record)
-    plant.start(0, record.speed, [DrawnLine(room, waves)])
-    return plant, waves
+    train = Train.of(whole.model_copy(update=half), actuator=motor)
+    plant = Plant(point, train, numerics=Numerics(time_step=TIME_STEP), runs=Runs(conditions=(room,)))
+    plant.start(0, record.speed, [DrawnLine(room, motion_of_line(record))])
+    return plant
 
 
 SPEEDS_KMH = (250.0, 300.0)
 WATTS, NEWTONS = 15.0, 50.0
 """Electrical power of all motors, and maximum force at each place, at which places are compared."""
 BENCH_KMH, BENCH_GAINS = 250.0, (1.0, 2.0, 4.0)
-HEAD_GAIN = 2.0
-"""Of the proportional control on the whole pantograph, beside that of the bench (N/N)."""
+HEAD_GAIN = 2.0  # of the proportional control on the whole pantograph, beside that of the bench (N/N)
 LOW, MEDIUM = 0, (2, 3)
 """Bands, by their places in BANDS: what "low" and "medium" frequencies are taken to be."""
-LARGE = 0.1
-"""Share of the maximum harmonic from which on a harmonic counts as large."""
-SHOWN = 3.0
-"""Seconds of Fig. 14."""
+LARGE = 0.1  # share of the maximum harmonic from which on a harmonic counts as large
+SHOWN = 3.0  # seconds of Fig. 14
 
 
 def outcome(report: Report) -> Outcome:
@@ -415,7 +387,6 @@ def _plot(bench: Sequence[BenchRun]) -> Figure:
     legend_above(over_time, 4)
     for axis in (over_time, over_frequency):
         axis.grid(color="0.92")
-    figure.suptitle(
-        f"One collector on a bench, line's motion at {BENCH_KMH:g} km/h, as Figs 14 and 15 of paper 2"
-    )
+    words = f"line's motion at {BENCH_KMH:g} km/h, as Figs 14 and 15 of paper 2"
+    figure.suptitle(f"One collector on a bench, {words}")
     return figure

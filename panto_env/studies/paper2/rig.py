@@ -45,10 +45,8 @@ VARIANTS: Mapping[str, dict[str, dict[str, Any]]] = {
     "inertia of 1.5 kg not compensated for": {"load_cell": {"compensated_mass": 0.0}},
 }
 """The rig with the flexible line, one part of it changed."""
-HARMONICS = 12
-"""Of the span, whose amplitudes a table shows."""
-BELOW, ABOVE = (0.0, 5.0), (10.0, 20.0)
-"""Bands (Hz) of the paper's statement on the spectrum."""
+HARMONICS = 12  # of the span, whose amplitudes a table shows
+BELOW, ABOVE = (0.0, 5.0), (10.0, 20.0)  # bands (Hz) of the paper's statement on the spectrum
 
 
 def pairs_at(speed_kmh: float = SPEED_KMH) -> dict[str, Pair]:
@@ -60,13 +58,20 @@ def statements(pairs: Mapping[str, Pair]) -> tuple[Comparison, ...]:
     """The paper's words on Figs 5 to 8, of its own rig; then what its last sentence expects of droppers."""
     own, flexible = pairs["rig"], pairs["rig-flexible"]
     below, above = own.bands(edges=(BELOW, ABOVE))
-    force, _ = own.signals("contact_force")
-    frequency, amplitude = amplitudes(force, own.reference.time_step)
+    frequency, amplitude = amplitudes(own.signals("contact_force")[0], own.reference.time_step)
     inside = (frequency >= ABOVE[0]) & (frequency < ABOVE[1])
+
+    def correlation(name: str) -> float:
+        return float(np.corrcoef(*own.signals(name))[0, 1])
+
+    def difference(name: str) -> float:
+        true, ours = own.signals(name)
+        return rms(ours - true) / rms(true)
+
     return (
-        said("rig-head", _correlation(own, "head")),
-        said("rig-frame", _correlation(own, "frame")),
-        said("rig-force", _difference(own, "contact_force") / _difference(own, "head")),
+        said("rig-head", correlation("head")),
+        said("rig-frame", correlation("frame")),
+        said("rig-force", difference("contact_force") / difference("head")),
         said("rig-below", below.rig / below.reference),
         said("rig-above", above.error),
         said("rig-passing", float(frequency[inside][np.argmax(amplitude[inside])])),
@@ -74,15 +79,17 @@ def statements(pairs: Mapping[str, Pair]) -> tuple[Comparison, ...]:
     )
 
 
+def _followed(pair: Pair, **edges: Any) -> tuple[str, ...]:
+    """Difference of the force by band (% of its rms), and up to which frequency (Hz) the rig follows it."""
+    return *(f"{100 * band.error:.1f}" for band in pair.bands(**edges)), f"{pair.followed():g}"
+
+
 def speeds_table(by_speed: Mapping[float, Mapping[str, Pair]]) -> Table:
     """What each rig follows over speed."""
     named = [(f"{speed:g}", name, pair) for speed, pairs in by_speed.items() for name, pair in pairs.items()]
-    rows = [
-        (speed, name, *(f"{100 * band.error:.1f}" for band in pair.bands()), f"{pair.followed():g}")
-        for speed, name, pair in named
-    ]
     bands = (f"{band.low:g}-{band.high:g} Hz" for band in named[0][-1].bands())
     title = "Contact force on the rig: difference from the line itself, % of its rms by band"
+    rows = [(speed, name, *_followed(pair)) for speed, name, pair in named]
     return Table(title, ("km/h", "rig", *bands, "followed to (Hz)"), rows, 2)
 
 
@@ -92,11 +99,9 @@ def variants_table() -> Table:
     for words, tables in VARIANTS.items():
         try:
             pair = compare(with_values(load_rig("rig-flexible"), tables), LINE, PANTOGRAPH, SPEED_KMH)
+            rows.append((words, *_followed(pair, edges=((0.0, 10.0), (10.0, 20.0), (20.0, 40.0)))))
         except InputError:
             rows.append((words, "–", "–", "–", "the rig stops"))
-            continue
-        bands = pair.bands(edges=((0.0, 10.0), (10.0, 20.0), (20.0, 40.0)))
-        rows.append((words, *(f"{100 * band.error:.1f}" for band in bands), f"{pair.followed():g}"))
     title = f"rig-flexible, one part changed, {SPEED_KMH:g} km/h: difference of the force, % of its rms"
     return Table(title, ("", "0-10 Hz", "10-20 Hz", "20-40 Hz", "followed to (Hz)"), rows)
 
@@ -105,13 +110,12 @@ def harmonics_table(pairs: Mapping[str, Pair]) -> Table:
     """Amplitudes of the first harmonics of the span, as Fig. 8 shows them."""
     first = next(iter(pairs.values())).reference
     once = from_kmh(SPEED_KMH) / first.alignment.mean_length
-    found = {LINE: _harmonics(first, once)}
-    found |= {name: _harmonics(pair.rig, once) for name, pair in pairs.items()}
+    runs = {LINE: first} | {name: pair.rig for name, pair in pairs.items()}
+    found = np.column_stack([_harmonics(run, once) for run in runs.values()])
     rows = [
-        (f"{(k + 1) * once:.2f}", *(f"{amplitude[k]:.1f}" for amplitude in found.values()))
-        for k in range(HARMONICS)
+        (f"{(k + 1) * once:.2f}", *(f"{amplitude:.1f}" for amplitude in own)) for k, own in enumerate(found)
     ]
-    return Table("Amplitude of the contact force's harmonics (N)", ("Hz", *found), rows)
+    return Table("Amplitude of the contact force's harmonics (N)", ("Hz", *runs), rows)
 
 
 def _harmonics(run: Any, once: float) -> Any:
@@ -121,15 +125,6 @@ def _harmonics(run: Any, once: float) -> Any:
     time = run.time_step * np.arange(whole)
     turns = np.exp(-2j * np.pi * np.outer(once * np.arange(1, HARMONICS + 1), time))
     return 2 / whole * np.abs(turns @ force[:whole])
-
-
-def _correlation(pair: Pair, name: str) -> float:
-    return float(np.corrcoef(*pair.signals(name))[0, 1])
-
-
-def _difference(pair: Pair, name: str) -> float:
-    true, ours = pair.signals(name)
-    return rms(ours - true) / rms(true)
 
 
 def outcome(report: Report) -> Outcome:
@@ -143,27 +138,19 @@ def outcome(report: Report) -> Outcome:
     report("stability of the rig", 0.5)
     pantograph = load_pantograph(PANTOGRAPH)
     found = {name: stability(load_rig(name), pantograph, SPEED_KMH) for name in RIGS}
+    # The delay that the loop bears by its frequency response over that which the simulation bears.
+    margins = (
+        said("rig-margin", each.linear.delay / each.delay, name=name, delay=1e3 * each.delay)
+        for name, each in found.items()
+    )
+    of_stability = (stability_table(load_rig(name), each) for name, each in found.items())
+    facts = {
+        f"{speed:g} km/h": [pair_facts(pair) for pair in each.values()] for speed, each in by_speed.items()
+    }
     return Outcome(
         title="Paper 2, section 3: the rig beside the line itself",
-        comparisons=(
-            *statements(pairs),
-            *(  # the delay that the loop bears by its frequency response over that which the simulation bears
-                said("rig-margin", each.linear.delay / each.delay, name=name, delay=1e3 * each.delay)
-                for name, each in found.items()
-            ),
-        ),
-        tables=(
-            harmonics_table(pairs),
-            speeds_table(by_speed),
-            limits,
-            *(stability_table(load_rig(name), each) for name, each in found.items()),
-        ),
+        comparisons=(*statements(pairs), *margins),
+        tables=(harmonics_table(pairs), speeds_table(by_speed), limits, *of_stability),
         plots={"fig05-08-rig": plot_pairs(list(pairs.values()))},
-        numbers={
-            "rig": {
-                f"{speed:g} km/h": [pair_facts(pair) for pair in each.values()]
-                for speed, each in by_speed.items()
-            },
-            "stability": {name: stability_facts(each) for name, each in found.items()},
-        },
+        numbers={"rig": facts, "stability": {name: stability_facts(each) for name, each in found.items()}},
     )

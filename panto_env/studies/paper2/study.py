@@ -9,18 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...analysis.simulation import simulate
 from ...base.plotting import BLUE, ORANGE, panels
 from ...base.table import Table
 from ...catalog import load_pantograph
 from ...metrics.figures import Figures
-from ..study import Outcome, Report, said
+from ..study import Figure, Outcome, Report, said, tabled
 from . import diagnosis, estimation, motors, rig
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LINE = "en50318-2002"
 SPEEDS_KMH = (250.0, 300.0, 350.0)
@@ -48,25 +45,28 @@ def on_estimated_force(report: Report) -> Outcome:
     found: dict[str, dict[str, list[float]]] = {}
     for k, policy in enumerate(POLICIES):
         report(f"{policy} on an estimated force", k / len(POLICIES))
-        found[policy] = {
-            words: [_sigma(speed, policy, given) for speed in SPEEDS_KMH] for words, given in FORCES.items()
-        }
-    passive = [_sigma(speed, None, {}) for speed in SPEEDS_KMH]
+        found[policy] = {words: _sigmas(policy, given) for words, given in FORCES.items()}
+    passive = _sigmas(None, {})
     named = [("passive", "–", passive)]
     named += [(policy, words, sigmas) for policy, each in found.items() for words, sigmas in each.items()]
-    table = Table(
+    table = tabled(
         f"{TWO_MASS} on {LINE}, ideal actuator on the frame: σ by how the force is known",
-        ("policy", "contact force", *(f"σ at {speed:g} km/h (N)" for speed in SPEEDS_KMH)),
-        [(policy, words, *(f"{sigma:.2f}" for sigma in sigmas)) for policy, words, sigmas in named],
+        [
+            "policy: {[0]} | contact force: {[1]}",
+            *(f"σ at {v:g} km/h (N): {{0[2][{k}]:.2f}}" for k, v in enumerate(SPEEDS_KMH)),
+        ],
+        named,
         2,
-        tuple(len(FORCES) * k for k in range(len(found) + 1)),
+        lambda each: each[0],
     )
     numbers = {"speeds_kmh": SPEEDS_KMH, "passive": passive, "sigma": found}
     return Outcome("Control on the estimated contact force", (), (table,), {}, {"estimated_force": numbers})
 
 
-def _sigma(speed_kmh: float, policy: str | None, given: dict[str, Any]) -> float:
-    return simulate(LINE, TWO_MASS, speed_kmh, policy, record_droppers=False, **given).summary().std
+def _sigmas(policy: str | None, given: dict[str, Any]) -> list[float]:
+    """σ (N) at each speed."""
+    runs = (simulate(LINE, TWO_MASS, v, policy, record_droppers=False, **given) for v in SPEEDS_KMH)
+    return [run.summary().std for run in runs]
 
 
 PANTOGRAPH, RIG = "own-motor-head", "rig-flexible"
@@ -74,8 +74,7 @@ POLICY, CONTROL_INTERVAL = "p:gain=1", 5e-3
 FORCE_LIMIT = 50.0
 MISTAKEN = 0.05
 """Share by which the pantograph on the rig is heavier and softer than the one that the filter knows."""
-FRICTION = 3.0
-"""In the frame of the pantograph on the rig (N)."""
+FRICTION = 3.0  # in the frame of the pantograph on the rig (N)
 Links = Mapping[float, Mapping[str, Figures]]
 """Figures by speed (km/h) and by what is real in the run beside what was before."""
 
@@ -90,14 +89,9 @@ def links() -> dict[str, dict[str, Any]]:
             "frame_friction": FRICTION,
         }
     )
-    limit = f"force_limit={FORCE_LIMIT:g}"
-    settings: dict[str, Any] = {
-        "catenary": LINE,
-        "pantograph": known,
-        "control_interval": CONTROL_INTERVAL,
-        "policy": None,
-    }
-    chain = {}
+    limit, chain = f"force_limit={FORCE_LIMIT:g}", {}
+    settings: dict[str, Any] = {"catenary": LINE, "pantograph": known, "policy": None}
+    settings["control_interval"] = CONTROL_INTERVAL
     for words, changed in (
         ("passive", {}),
         ("control, all ideal", {"policy": POLICY, "actuator": f"ideal:place=head,{limit}"}),
@@ -121,25 +115,23 @@ def closed_loop(report: Report) -> Outcome:
             for words, settings in links().items()
         }
     last = list(links())[-1]
+    plain = {
+        f"{speed:g} km/h": {words: figures.as_dict() for words, figures in each.items()}
+        for speed, each in found.items()
+    }
     return Outcome(
         "The controlled pantograph on the rig",
         tuple(
-            said("closed-loop", each[last].std / each["passive"].std, speed=speed)
-            for speed, each in found.items()
+            said("closed-loop", each[last].std / each["passive"].std, speed=v) for v, each in found.items()
         ),
         (_table(found),),
         {"closed-loop": _plot(found)},
-        {
-            "closed_loop": {
-                f"{speed:g} km/h": {words: figures.as_dict() for words, figures in each.items()}
-                for speed, each in found.items()
-            }
-        },
+        {"closed_loop": plain},
     )
 
 
 def _table(found: Links) -> Table:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for speed, each in found.items():
         before = inf
         for words, figures in each.items():
@@ -150,7 +142,7 @@ def _table(found: Links) -> Table:
             before = figures.std
     headings = ("km/h", "made real", "F_m (N)", "σ (N)", "this link (N)", "to passive (%)", "CL (%)")
     title = f"{PANTOGRAPH} on {LINE}, {POLICY} in the head: what each link costs, one after another"
-    ends = tuple(len(links()) * (k + 1) - 1 for k in range(len(found)))
+    ends = tuple(len(rows) // len(found) * (k + 1) - 1 for k in range(len(found)))
     return Table(title, (*headings, "effort (N)"), rows, 2, ends)
 
 
@@ -173,14 +165,7 @@ def _plot(found: Links) -> Figure:
     return figure
 
 
-PARTS = (
-    rig.outcome,
-    estimation.outcome,
-    on_estimated_force,
-    diagnosis.outcome,
-    motors.outcome,
-    closed_loop,
-)
+PARTS = (rig.outcome, estimation.outcome, on_estimated_force, diagnosis.outcome, motors.outcome, closed_loop)
 
 
 def run(report: Report) -> Outcome:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,14 +19,10 @@ from ...metrics.figures import Figures, arcing, contact_loss
 from ...plant.catenary.schema import PowerSystem
 
 CATENARY, PANTOGRAPH = "periodic-stiffness", "three-mass"
-SYSTEM: PowerSystem = "AC"
-"""Power supply for the limits of EN 50367; the paper names none."""
-SPEED_KMH = 300.0
-"""Train speed of every figure but those over speed (section 3)."""
-SPANS = (11, 12)
-"""What the figures show: 500 to 600 m (section 3)."""
-SPEEDS_KMH = (200.0, 250.0, 300.0, 350.0)
-"""Own choice: the text gives no speed but 300 km/h."""
+SYSTEM: PowerSystem = "AC"  # power supply for the limits of EN 50367; the paper names none
+SPEED_KMH = 300.0  # train speed of every figure but those over speed (section 3)
+SPANS = (11, 12)  # what the figures show: 500 to 600 m (section 3)
+SPEEDS_KMH = (200.0, 250.0, 300.0, 350.0)  # own choice: the text gives no speed but 300 km/h
 TIME_STEP = 2e-3
 """s. Means over 500 to 600 m and places of maxima are taken from whole steps: the default, 5 ms, is 0.5 m
 of way at 350 km/h, which is too coarse for them."""
@@ -47,9 +44,7 @@ class Influence:
     @property
     def base(self) -> float:
         """The paper's basic value."""
-        if self.parameter == "speed_kmh":
-            return SPEED_KMH
-        return self.values[FACTORS.index(1.0)]
+        return SPEED_KMH if self.parameter == "speed_kmh" else self.values[FACTORS.index(1.0)]
 
 
 @dataclass(frozen=True)
@@ -88,8 +83,7 @@ class Pass:
         }
 
 
-Passes = Mapping[str, Sequence[Pass]]
-"""Passes of every influence, by its key, in the order of its values."""
+Passes = Mapping[str, Sequence[Pass]]  # passes of every influence, by its key, in the order of its values
 
 
 def influences() -> tuple[Influence, ...]:
@@ -115,16 +109,15 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
     bilateral: the contact may pull, as Eqs 7 and 8 have it.
     """
     line, pantograph = load_catenary(CATENARY), load_pantograph(PANTOGRAPH)
-    speed_kmh = SPEED_KMH
-    if parameter == "speed_kmh":
-        speed_kmh = value
-    elif parameter.startswith("catenary."):
+    speed_kmh = value if parameter == "speed_kmh" else SPEED_KMH
+    if parameter.startswith("catenary."):
         line = change(line, parameter, value)
-    else:
+    elif parameter != "speed_kmh":
         pantograph = change(pantograph, parameter, value)
     run = simulate(line, pantograph, speed_kmh, bilateral=bilateral, time_step=TIME_STEP)
     shown, figures = run.inside(SPANS), run.summary(SPANS)
-    nq = arcing(run.contact_force[shown], run.time_step)
+    nq, speed = arcing(run.contact_force[shown], run.time_step), from_kmh(speed_kmh)
+    judged = en50367.criteria(figures, nq, speed, SYSTEM, "own choice")
     return Pass(
         speed_kmh=speed_kmh,
         span=run.alignment.mean_length,
@@ -133,10 +126,7 @@ def run_pass(parameter: str, value: float, *, bilateral: bool) -> Pass:
         displacement=run.head[shown],
         nominal_force=run.nominal_force,
         figures=figures,
-        within_en50367={
-            each.key: bool(each.kept)
-            for each in en50367.criteria(figures, nq, from_kmh(speed_kmh), SYSTEM, "own choice")
-        },
+        within_en50367={each.key: bool(each.kept) for each in judged},
     )
 
 
@@ -156,8 +146,7 @@ def statistics(values: Array) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-RUN_TIME = 12.0
-"""How long the paper's simulation runs (s), section 3."""
+RUN_TIME = 12.0  # how long the paper's simulation runs (s), section 3
 POINTS = 601
 
 
@@ -188,15 +177,16 @@ class Equations:
 
     def matrix(self, time: float) -> Array:
         """A at a time (s), (6, 6)."""
+        return self._on(self.stiffness(time))
+
+    def _on(self, stiffness: Array | float) -> Array:
         matrix = self._matrix.copy()
-        matrix[3, 0] -= self.stiffness(time) / self._inertia[0, 0]
+        matrix[3, 0] -= stiffness / self._inertia[0, 0]
         return matrix
 
     def natural_frequency(self) -> float:
         """Lowest natural frequency (Hz) of the pantograph on the mean stiffness."""
-        matrix = self._matrix.copy()
-        matrix[3, 0] -= self._mean / self._inertia[0, 0]
-        swings = np.linalg.eigvals(matrix)
+        swings = np.linalg.eigvals(self._on(self._mean))
         return float(np.abs(swings[swings.imag > 0]).min() / (2 * np.pi))
 
     def contact_force(self, start: Literal["rest", "flat"]) -> Array:
@@ -204,34 +194,29 @@ class Equations:
 
         start: "rest" under F(v) on the spring at the mast, or "flat", all displacements and velocities 0.
         """
-        from scipy.integrate import solve_ivp  # slow to import
-
         begin = np.zeros(6) if start == "flat" else np.linalg.solve(self.matrix(0.0), -self._push)
-        solution = solve_ivp(
-            lambda t, y: self.matrix(t) @ y + self._push,
-            (0.0, self.shown[-1]),
-            begin,
-            t_eval=self.shown,
-            rtol=1e-8,
-            atol=1e-11,
+        moving = _solved(
+            lambda t, y: self.matrix(t) @ y + self._push, begin, self.shown[-1], t_eval=self.shown
         )
-        return np.asarray(self.stiffness(solution.t) * solution.y[0])
+        return np.asarray(self.stiffness(self.shown) * moving[0])
 
     def growth(self) -> float:
         """What is left of a disturbance after one span, at most (-): the largest Floquet multiplier.
 
         Below 1 the motion forgets how it began.
         """
-        from scipy.integrate import solve_ivp
-
-        solution = solve_ivp(
-            lambda t, y: (self.matrix(t) @ y.reshape(6, 6)).ravel(),
-            (0.0, self.span_time),
-            np.eye(6).ravel(),
-            rtol=1e-8,
-            atol=1e-11,
+        moving = _solved(
+            lambda t, y: (self.matrix(t) @ y.reshape(6, 6)).ravel(), np.eye(6).ravel(), self.span_time
         )
-        return float(np.abs(np.linalg.eigvals(solution.y[:, -1].reshape(6, 6))).max())
+        return float(np.abs(np.linalg.eigvals(moving[:, -1].reshape(6, 6))).max())
+
+
+def _solved(equations: Callable[[float, Array], Array], begin: Array, end: float, **others: Any) -> Array:
+    """The solution of ordinary differential equations from 0 s to an end, (equations, times)."""
+    from scipy.integrate import solve_ivp  # slow to import
+
+    solution = solve_ivp(equations, (0.0, end), begin, rtol=1e-8, atol=1e-11, **others)
+    return np.asarray(solution.y)
 
 
 def _chain(values: tuple[float, ...]) -> Array:
@@ -240,35 +225,21 @@ def _chain(values: tuple[float, ...]) -> Array:
     return np.array([[first, -first, 0], [-first, first + second, -second], [0, -second, second + third]])
 
 
-SHARES = (0.10, 0.25, 0.50)
-"""Each parameter is varied by plus and minus so much of its basic value."""
-SHARE = 0.25
-"""The share that the ranking is made with."""
+SHARES = (0.10, 0.25, 0.50)  # each parameter is varied by plus and minus so much of its basic value
+SHARE = 0.25  # the share that the ranking is made with
 
 
-@dataclass(frozen=True)
-class Sensitivity:
-    """Change from (1 - share) to (1 + share) times the basic value, over the basic figure (-)."""
-
-    influence: str  # its key
-    symbol: str
-    share: float
-    std: float  # of the contact force's σ
-    swing: float  # of the contact force's maximum less minimum
-    travel: float  # of the head displacement's maximum less minimum
-
-
-def measure(influence: Influence, share: float, *, bilateral: bool) -> Sensitivity:
-    """Central difference of one parameter's effect at 300 km/h."""
+def measure(influence: Influence, share: float, *, bilateral: bool) -> SimpleNamespace:
+    """Change (-) from 1 - share to 1 + share times the basic value, over the basic figure, at 300 km/h."""
     low, base, high = (
         run_pass(influence.parameter, factor * influence.base, bilateral=bilateral)
         for factor in (1 - share, 1.0, 1 + share)
     )
-    return Sensitivity(
+    return SimpleNamespace(
         influence=influence.key,
         symbol=influence.symbol,
         share=share,
-        std=float((np.std(high.force) - np.std(low.force)) / np.std(base.force)),
+        std=float((np.std(high.force) - np.std(low.force)) / np.std(base.force)),  # of the contact force
         swing=(high.swing - low.swing) / base.swing,
         travel=(high.travel - low.travel) / base.travel,
     )

@@ -37,13 +37,11 @@ USUAL: dict[str, Any] = {
 PASSIVE = "passive"
 WAVES = "speed"
 """Key of the criterion that limits the speed to a share of the wave speed, whatever the force does."""
-SET = (WAVES, "mean", "static_force")
-"""Keys of criteria whose margin says nothing of control: these are set."""
+SET = (WAVES, "mean", "static_force")  # keys of criteria whose margin says nothing of control: these are set
 SHIFT = 0.015
 """Share of the mean force by which control may move it beyond its limit, as in the benchmark: the static
 force is trimmed to the limit without control."""
-VERIFIED_FROM = 1000
-"""First seed of the verification."""
+VERIFIED_FROM = 1000  # first seed of the verification
 
 
 @dataclass(frozen=True)
@@ -151,9 +149,8 @@ class Scan:
         passes = self.at(policy, speed_kmh)
         if endings := [each.ending for each in passes if each.ending]:
             return endings[0]
-        first = [
-            next(one for one in each.broken if one.key != WAVES) for each in passes if not each.kept(False)
-        ]
+        broken = [each.broken for each in passes if not each.kept(False)]
+        first = [next(one for one in each if one.key != WAVES) for each in broken]
         names = [each.name for each in first]
         most = next(each for each in first if each.name == max(names, key=names.count))
         whose = f" of pantograph {most.pantograph}" if any(each.pantograph > 1 for each in first) else ""
@@ -162,13 +159,8 @@ class Scan:
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: nan becomes None."""
         answers = {policy: self.answer(policy)._asdict() for policy in self.policies}
-        table: dict[str, Any] = finite(
-            {
-                "speeds_kmh": self.speeds_kmh,
-                "answers": answers,
-                "passes": [asdict(each) for each in self.passes],
-            }
-        )
+        passes = [asdict(each) for each in self.passes]
+        table: dict[str, Any] = finite({"speeds_kmh": self.speeds_kmh, "answers": answers, "passes": passes})
         return table
 
 
@@ -210,8 +202,7 @@ def scan(
 def _passes(policies: tuple[str, ...], settings: Mapping[str, Any], speed: float, seed: int) -> list[Pass]:
     """Passes of all policies at a speed under a seed, and those with a failing actuator."""
     given = dict(settings) | {"speed_kmh": speed, "seed": seed, "record_droppers": False}
-    found = []
-    half = math.nan
+    found, half = [], math.nan
     for policy in policies:
         for failing in (False, True) if policy != PASSIVE else (False,):
             more: dict[str, Any] = {}
@@ -221,10 +212,10 @@ def _passes(policies: tuple[str, ...], settings: Mapping[str, Any], speed: float
             try:
                 run = simulate(policy=None if policy == PASSIVE else policy, **(given | more))
                 ending = run.ending
+                if policy == PASSIVE:
+                    half = 0.5 * float(run.time[-1])
             except InputError as error:  # such as gains that are for other speeds
                 run, ending = None, str(error)
-            if run is not None and policy == PASSIVE:
-                half = 0.5 * float(run.time[-1])
             found.append(_judged(run, ending, policy, speed, seed, failing))
     return found
 
@@ -234,11 +225,10 @@ def _judged(run: Trajectory | None, ending: str, policy: str, speed: float, seed
     if run is None or run.terminated:
         none: Any = [math.nan] * 9
         return Pass(*identity, ending, (), "", *none)
-    each = [own.summary(run.common_spans()) for own in run.train]
-    requirements = run.requirements()
+    covered, requirements, acting = run.common_spans(), run.requirements(), policy != PASSIVE
+    each = [own.summary(covered) for own in run.train]
     judged = [(share_of(one, run), one) for one in requirements if one.criterion.kept is not None]
     judged.sort(key=lambda pair: pair[0])
-    acting = policy != PASSIVE
     moved = SHIFT if acting else 0.0
     broken = tuple(
         _broken(one)
@@ -248,8 +238,12 @@ def _judged(run: Trajectory | None, ending: str, policy: str, speed: float, seed
     kept = [(share, one) for share, one in judged if one.criterion.kept and one.criterion.key not in SET]
     share, tight = kept[0] if kept else (math.nan, None)
     arcing = next((one.criterion.value for one in requirements if one.criterion.key == "arcing"), math.nan)
-    covered = run.common_spans()
-    forces = [(np.abs(own.frame_force) + np.abs(own.head_force))[own.inside(covered)] for own in run.train]
+    given = [math.nan] * 3
+    if acting:
+        forces = [np.abs(own.frame_force) + np.abs(own.head_force) for own in run.train]
+        peaks = (force[own.inside(covered)].max() for force, own in zip(forces, run.train, strict=True))
+        watts = max(own.mechanical_power(covered) for own in run.train)
+        given = [max(figures.effort for figures in each), float(max(peaks)), watts]
     return Pass(
         *identity,
         "",
@@ -261,9 +255,7 @@ def _judged(run: Trajectory | None, ending: str, policy: str, speed: float, seed
         min(figures.min for figures in each),
         max(figures.max_uplift for figures in each),
         arcing,
-        max(figures.effort for figures in each) if acting else math.nan,
-        max(float(own.max()) for own in forces) if acting else math.nan,
-        max(own.mechanical_power(covered) for own in run.train) if acting else math.nan,
+        *given,
     )
 
 

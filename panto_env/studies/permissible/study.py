@@ -1,25 +1,30 @@
-"""Permissible speeds on lines of the catalogue, alone and in trains: what control is worth in km/h."""
+"""Permissible speeds on lines of the catalogue, alone and in trains: what control is worth in km/h.
+
+And what any scan of speeds says, as a table, a picture and a page.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.arrays import to_kmh
-from ...base.plotting import LIMIT, panels, series_colour
-from ...base.table import Table
+from ...base.arrays import from_kmh, to_kmh
+from ...base.plotting import LIMIT, panels, series_colour, stacked
+from ...base.table import Alarm, Table
 from ...catalog import load_catenary
-from ...metrics.compliance import WAVE_SHARE
+from ...metrics.compliance import STD_OF_MEAN, WAVE_SHARE, arcing_limit, maximum_limit, uplift_factor
 from ...plant.catenary.flexible import FlexibleCatenaryData
-from ..study import Outcome, Report
+from ...plant.catenary.schema import CatenaryData
+from ...records.plots import save_page
+from ...report.charts import svg_of
+from ...terminal import number
+from ..study import Figure, Outcome, Report, legend_below
 from .scan import PASSIVE, VERIFIED_FROM, Scan, bands_of, scan, verified
-from .shown import in_words
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Case(NamedTuple):
@@ -31,24 +36,25 @@ class Case(NamedTuple):
 
 
 STEP = 20.0
-CASES = (
-    Case("en50318-2002", "dsa380", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("benchmark-2015", "dsa380", np.arange(180.0, 341.0, STEP).tolist()),
-    Case("ln2", "dsa250", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("re250", "dsa380", np.arange(180.0, 321.0, STEP).tolist()),
-    Case("re330", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
-    Case("shinkansen-simple", "dsa380", np.arange(220.0, 381.0, STEP).tolist()),
-    Case("beijing-shanghai", "dsa380", np.arange(220.0, 401.0, STEP).tolist()),
-    Case("beijing-tianjin", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
-    Case("re330-stitched", "dsa380", np.arange(220.0, 421.0, STEP).tolist()),
+CASES = tuple(
+    Case(line, pantograph, np.arange(first, last + 1, STEP).tolist())
+    for line, pantograph, first, last in (
+        ("en50318-2002", "dsa380", 180.0, 320.0),
+        ("benchmark-2015", "dsa380", 180.0, 340.0),
+        ("ln2", "dsa250", 180.0, 320.0),
+        ("re250", "dsa380", 180.0, 320.0),
+        ("re330", "dsa380", 220.0, 420.0),
+        ("shinkansen-simple", "dsa380", 220.0, 380.0),
+        ("beijing-shanghai", "dsa380", 220.0, 400.0),
+        ("beijing-tianjin", "dsa380", 220.0, 420.0),
+        ("re330-stitched", "dsa380", 220.0, 420.0),
+    )
 )
 DISTANCES: tuple[float | None, ...] = (None, 100.0, 200.0, 300.0)
 """Distances of two pantographs (m); none for one alone."""
 POLICIES = ("pd:washout=1", "fb+ff:gain=0.3,washout=1", "repetitive", "agent-any-pantograph")
-SEEDS = 3
-"""Lines as built for each speed, and as many others for the verification."""
-SHOWN = 200.0
-"""Distance of the picture (m)."""
+SEEDS = 3  # lines as built for each speed, and as many others for the verification
+SHOWN = 200.0  # distance of the picture (m)
 
 
 class Found(NamedTuple):
@@ -105,11 +111,7 @@ def outcome_of(found: Sequence[Found]) -> Outcome:
     return Outcome(
         title="Permissible speeds with control and without",
         comparisons=(),
-        tables=(
-            *(limits_table(found, distance) for distance in DISTANCES),
-            gains_table(found),
-            fell_table(found),
-        ),
+        tables=(*(limits_table(found, each) for each in DISTANCES), gains_table(found), fell_table(found)),
         plots={"permissible-speeds": plot_bands([one for one in found if one.distance == SHOWN])},
         numbers={"cases": [as_dict(one) for one in found]},
         rows={"permissible-speeds": [row for one in found for row in rows_of(one)]},
@@ -122,13 +124,7 @@ def scanned(case: Case, distance: float | None) -> Found:
     train = {"pantographs": [case.pantograph] * 2, "distances": [distance]}
     riding: dict[str, Any] = {"pantograph": case.pantograph} if distance is None else train
     first, again = (
-        scan(
-            case.speeds_kmh,
-            POLICIES,
-            seeds=range(begin, begin + SEEDS),
-            catenary=case.line,
-            **riding,
-        )
+        scan(case.speeds_kmh, POLICIES, seeds=range(begin, begin + SEEDS), catenary=case.line, **riding)
         for begin in (0, VERIFIED_FROM)
     )
     return Found(case, distance, first, again)
@@ -171,30 +167,22 @@ def rows_of(one: Found) -> list[dict[str, Any]]:
 def limits_table(found: Sequence[Found], distance: float | None) -> Table:
     """Permissible speed on each line, without control, if control fails, and with each policy."""
     rows = []
-    for one in found:
-        if one.distance != distance:
-            continue
-        waves = _wave_limit(one.case.line)
+    for one in [one for one in found if one.distance == distance]:
         best = max(POLICIES, key=lambda policy: (_or_zero(one.limit(policy)), policy))
         fallback = verified(one.first, one.again, best, failing=True)
-        rows.append(
-            (
-                one.case.line,
-                one.case.pantograph,
-                f"{waves:.0f}",
-                *(_speed(one, policy) for policy in (PASSIVE, *POLICIES)),
-                "none" if math.isnan(fallback) else f"{fallback:g}",
-            )
-        )
+        limits = [_speed(one, policy) for policy in (PASSIVE, *POLICIES)]
+        limits.append("none" if math.isnan(fallback) else f"{fallback:g}")
+        rows.append((one.case.line, one.case.pantograph, f"{wave_limit(one.case.line):.0f}", *limits))
     headings = ("line", "pantograph", "0.7 c", PASSIVE, *POLICIES, "if the best fails")
     return Table(f"Permissible speeds (km/h): {where(distance)}", headings, rows, text_columns=2)
 
 
-def _wave_limit(name: str) -> float:
-    """Speed at ``WAVE_SHARE`` of the wave speed (km/h)."""
+def wave_limit(name: str, tension: float | None = None) -> float:
+    """Speed (km/h) at ``WAVE_SHARE`` of a contact wire's wave speed; tension: another than its own (N)."""
     line = load_catenary(name)
     assert isinstance(line, FlexibleCatenaryData)
-    return WAVE_SHARE * to_kmh(line.contact_wire.wave_speed)
+    wire = line.contact_wire if tension is None else line.contact_wire.model_copy(update={"tension": tension})
+    return WAVE_SHARE * to_kmh(wire.wave_speed)
 
 
 def _or_zero(value: float) -> float:
@@ -215,21 +203,12 @@ def gains_table(found: Sequence[Found]) -> Table:
     Gains are lower bounds where a policy keeps all up to the last speed of the scan.
     """
     rows = []
-    for distance in DISTANCES:
+    for distance, policy in product(DISTANCES, POLICIES):
         own = [one for one in found if one.distance == distance]
-        for policy in POLICIES:
-            gains = [one.gain(policy) for one in own]
-            std = [one.reduction(policy) for one in own]
-            rows.append(
-                (
-                    where(distance),
-                    policy,
-                    f"{np.median(gains):+.0f}",
-                    f"{min(gains):+.0f} to {max(gains):+.0f}",
-                    f"{-np.median(std):+.0f}",
-                    f"{-max(std):+.0f} to {-min(std):+.0f}",
-                )
-            )
+        gains, std = [one.gain(policy) for one in own], [one.reduction(policy) for one in own]
+        medians = f"{np.median(gains):+.0f}", f"{-np.median(std):+.0f}"
+        ranges = f"{min(gains):+.0f} to {max(gains):+.0f}", f"{-max(std):+.0f} to {-min(std):+.0f}"
+        rows.append((where(distance), policy, medians[0], ranges[0], medians[1], ranges[1]))
     ends = tuple(len(POLICIES) * (k + 1) - 1 for k in range(len(DISTANCES)))
     headings = ("train", "policy", "gain, median (km/h)", "range", "σ/F_m, median (%)", "range of lines")
     return Table("Gain over passive, over the lines", headings, rows, text_columns=2, section_ends=ends)
@@ -256,23 +235,17 @@ def plot_bands(found: Sequence[Found]) -> Figure:
         for j, policy in enumerate(names):
             place = k + 0.8 * (j + 0.5) / len(names) - 0.4
             kept = speeds[one.kept(policy)]
-            axis.barh(
-                np.full(kept.size, place),
-                np.full(kept.size, STEP),
-                0.7 / len(names),
-                kept - STEP / 2,
-                color="0.45" if policy == PASSIVE else series_colour(j - 1),
-                label=policy if k == 0 else None,
-            )
-        waves = _wave_limit(one.case.line)
-        axis.plot([waves] * 2, [k - 0.42, k + 0.42], color=LIMIT, linewidth=0.9)
+            colour = "0.45" if policy == PASSIVE else series_colour(j - 1)
+            bars = np.full(kept.size, place), np.full(kept.size, STEP), 0.7 / len(names), kept - STEP / 2
+            axis.barh(*bars, color=colour, label=policy if k == 0 else None)
+        axis.plot([wave_limit(one.case.line)] * 2, [k - 0.42, k + 0.42], color=LIMIT, linewidth=0.9)
     axis.set(xlabel="speed (km/h); black: 0.7 of the wave speed", ylim=(len(found) - 0.5, -0.5))
     axis.set_yticks(range(len(found)), [one.case.line for one in found])
     axis.set_xlim(min(one.first.speeds_kmh[0] for one in found) - STEP)
     axis.grid(axis="x", color="0.92")
     axis.set_axisbelow(True)
     figure.suptitle(f"Speeds at which all requirements are kept: {where(found[0].distance)}")
-    figure.legend(loc="outside lower center", ncols=3, fontsize="small")
+    legend_below(figure, 3)
     return figure
 
 
@@ -287,3 +260,102 @@ def verdict(found: Sequence[Found]) -> str:
         f"{max(gains):.0f} km/h, median {np.median(gains):.0f}, over {len(gains)} lines."
     )
     return f"{words} Without control speeds are kept in bands: {'; '.join(gaps)}." if gaps else words
+
+
+NOTES = (
+    "A speed is permissible where all passes at it, and at all lower speeds of the scan, keep every "
+    "requirement but that of the wave speed; the table has the limit with that rule too.",
+    "The mean force is trimmed to the standard's target without control; control may move it by 1.5 % beyond "
+    "its limit, as in the benchmark.",
+    "If control fails: the actuator gives no force any more from the middle of each pass on.",
+)
+"""What the table's columns mean."""
+
+
+def answers_table(scan: Scan, again: Scan | None = None) -> Table:
+    """A row for each policy: its permissible speed, and what the actuator gives there."""
+    rows: list[tuple[str | float, ...]] = []
+    for policy in scan.policies:
+        found, acts = scan.answer(policy), policy != PASSIVE
+        limits = [_in_kmh(found.limit)]
+        if again is not None:
+            both = " and ".join(_in_kmh(each) for each in (found.limit, again.limit(policy)))
+            limits = [_in_kmh(verified(scan, again, policy)), both]
+        limits += [_in_kmh(found.with_waves), _in_kmh(found.fallback) if acts else ""]
+        force = f"{number(found.rms)} / {number(found.peak, 0)}" if acts else ""
+        rows.append((policy, *limits, force, number(found.watts) if acts else ""))
+    headings = ("policy", "permissible (km/h)", *(() if again is None else ("of both scans",)))
+    others = ("with v/c ≤ 0.7", "if control fails", "rms / peak (N)", "W")
+    return Table("Permissible speeds", (*headings, *others), rows)
+
+
+def reasons(scan: Scan) -> list[str]:
+    """A sentence for each policy: which speeds it keeps, what forbids the first one that it does not."""
+    sentences = []
+    for policy in scan.policies:
+        found = scan.answer(policy)
+        words = f"{policy}: kept at {in_words(found.bands)} km/h"
+        if not math.isnan(found.beyond):
+            words += f"; forbidden at {found.beyond:g} by {found.reason}"
+        if found.tightest:
+            near = f"; nearest to its limit at {found.limit:g}: {found.tightest}"
+            words += f"{near}, by {number(found.margin)} %"
+        sentences.append(f"{words}.")
+    return sentences
+
+
+def _in_kmh(value: float) -> str:
+    return Alarm("none") if math.isnan(value) else f"{value:g}"
+
+
+def in_words(bands: Sequence[tuple[float, float]]) -> str:
+    """Bands of speeds (km/h)."""
+    return ", ".join(f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in bands) or "none"
+
+
+def plot_scan(scan: Scan, line: CatenaryData) -> Figure:
+    """σ over F_m, maximum, minimum, uplift and NQ over speed, with their limits, for each policy.
+
+    Lines are medians over the seeds, bands reach from the smallest to the largest.
+    """
+    rows = {
+        "σ / F_m (-)": ("std_ratio", 1.0, lambda v: STD_OF_MEAN),
+        "maximum (N)": ("max", 1.0, lambda v: maximum_limit(from_kmh(v), line.system)),
+        "minimum (N)": ("min", 1.0, lambda v: 0.0),
+        "uplift (mm)": ("uplift", 1e3, lambda v: 1e3 * line.free_uplift / uplift_factor(line.uplift_stop)),
+        "NQ (%)": ("arcing", 1.0, lambda v: arcing_limit(from_kmh(v), line.system)),
+    }
+    figure, axes = stacked((8, 11), len(rows))
+    speeds = np.array(scan.speeds_kmh)
+    for axis, (label, (key, scale, limit)) in zip(axes, rows.items(), strict=True):
+        for k, policy in enumerate(scan.policies):
+            values = [[scale * getattr(each, key) for each in scan.at(policy, v)] for v in scan.speeds_kmh]
+            known = [np.array([x for x in own if not math.isnan(x)] or [math.nan]) for own in values]
+            colour = series_colour(k)
+            axis.plot(speeds, [np.median(own) for own in known], color=colour, marker=".", label=policy)
+            lowest, highest = ([edge(own) for own in known] for edge in (np.min, np.max))
+            axis.fill_between(speeds, lowest, highest, color=colour, alpha=0.15, linewidth=0)
+        limits = [limit(v) for v in scan.speeds_kmh]
+        axis.plot(speeds, limits, color=LIMIT, linestyle=(0, (5, 3)), linewidth=0.9, drawstyle="steps-pre")
+        axis.set(ylabel=label)
+        axis.grid(color="0.92")
+    axes[-1].set(xlabel="speed (km/h)")
+    seeds = len({each.seed for each in scan.passes})
+    figure.suptitle(f"{line.name}: the worst pantograph of each pass, median and range of {seeds} seeds")
+    legend_below(figure, 3)
+    return figure
+
+
+def write_page(
+    scan: Scan, again: Scan | None, line: CatenaryData, settings: Mapping[str, Any], path: str | Path
+) -> None:
+    """Write the page of a scan, whole or not at all. Raises InputError for a name with another suffix."""
+    save_page(
+        f"Permissible speeds on {line.name}",
+        f"Settings: {', '.join(f'{name} {value}' for name, value in settings.items())}.",
+        [],
+        [("Over speed, with the limits of EN 50367 and EN 50119 (dashed)", svg_of(plot_scan(scan, line)))],
+        [answers_table(scan, again)],
+        [*reasons(scan), *NOTES],
+        path,
+    )

@@ -1,69 +1,232 @@
-"""The study's tables, plots, comparisons with others, and verdict."""
+"""Distances between two pantographs: which are bad, and which theory says so.
+
+Passes of two pantographs over their distance, and what the wire does after one alone has passed; frequencies
+at which theories expect the second pantograph to be good and bad by turns, and how they fit.
+
+All say that σ goes up and down with the distance L as cos(2π f L / v − φ), with the frequency at which the
+train passes spans, v / l, or with that of a span's own swing.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.arrays import from_kmh
+from ...analysis.simulation import simulate
+from ...analysis.sweep import Row, sweep
+from ...base.arrays import Array, from_kmh
 from ...base.plotting import BLUE, GREEN, LIMIT, VERMILION, panels, series_colour
 from ...base.table import Table
 from ...catalog import load_catenary
+from ...control import Task
 from ...metrics.compliance import STD_OF_MEAN
-from ..study import Cell, Comparison, Outcome, Report, said, tabled
-from . import passes
-from .passes import BEST, THEORIES, Case, Curve, at_arrival, curves, fits
+from ...metrics.figures import NUMBER
+from ...plant.state import Row as StateRow
+from ..study import Comparison, Figure, Outcome, Report, legend_below, said, tabled
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-EVERY = 10.0
-"""Distance (m) between two rows that are printed; the CSV has all."""
-FAR = 100.0
-"""Distance (m) from which the second is said to hardly touch the first."""
-CLOSE = 0.05
-"""Relative difference within which a finite-element model's σ over spans 4 to 11 should lie."""
+class Case(NamedTuple):
+    """A line, and the pantograph that runs along it twice."""
+
+    line: str
+    pantograph: str
+
+
+CASES = Case("en50318-2002", "en50318-2002"), Case("beijing-tianjin", "dsa380")
+SPEEDS_KMH = (200.0, 250.0, 300.0)
+DISTANCES = tuple(np.arange(35.0, 400.1, 2.5).tolist())
+"""Distances (m): droppers are 6 to 7 m apart, and steps of 5 m would not show what they do."""
+FIGURES = ("mean", "std", "max", "min", "contact_loss", "max_uplift")  # figures that the study keeps
+WATCHED = range(10, 16)  # spans in whose middle the wire is watched after a pantograph alone has passed
+AFTERWARDS = 7.0
+"""Time (s) for which it is watched: a second one, 400 m behind at 200 km/h, comes after this time."""
+INTERVAL = 0.01  # time (s) between two looks at it
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Figures of both pantographs over their distance, on one line at one speed."""
+
+    case: Case
+    speed_kmh: float
+    distances: Array  # (n,): m
+    first: dict[str, Array]  # (n,) each: figures of the one in front, by name; SI
+    second: dict[str, Array]  # (n,) each: of the one behind
+
+
+class Wake(NamedTuple):
+    """The contact wire in the middle of spans after a pantograph alone, mean over spans."""
+
+    time: Array  # (n,): since it passed (s)
+    height: Array  # (n,): m
+    velocity: Array  # (n,): m/s
+
+
+def curves(case: Case, distances: Sequence[float] = DISTANCES) -> tuple[list[Curve], list[Row]]:
+    """Curves of a line at all speeds, and all rows of the sweep behind them."""
+    swept = {"speed_kmh": SPEEDS_KMH, "distances": distances}
+    rows = sweep(swept, catenary=case.line, pantographs=[case.pantograph] * 2)
+    found = []
+    for speed in SPEEDS_KMH:
+        both = [[row for row in rows if (row["speed_kmh"], row[NUMBER]) == (speed, k)] for k in (1, 2)]
+        first, second = ({key: np.array([row[key] for row in own]) for key in FIGURES} for own in both)
+        found.append(Curve(case, speed, np.array(distances, dtype=float), first, second))
+    return found, rows
+
+
+def wake(case: Case, speed_kmh: float) -> Wake:
+    """What the contact wire does after one pantograph has passed alone."""
+    line, speed = load_catenary(case.line), from_kmh(speed_kmh)
+    alignment = line.alignment(WATCHED.stop + 20)
+    middles = np.array([np.mean(alignment.limits((span, span))) for span in WATCHED])
+    times: list[float] = []
+    heights: list[Array] = []
+
+    def watch(task: Task) -> None:
+        view = task.plant.model.view(0, middles[0] - 1, middles[-1] + 1)
+        if view.x.size:
+            times.append(task.plant.of(0, StateRow.STEP) * task.plant.time_step)
+            heights.append(np.interp(middles, view.x, view.contact))
+
+    # The passive policy, so that there is a look at it after each control step; the whole line, since it is
+    # watched far behind the pantograph. The line goes on until the last place has been watched.
+    end = float(middles[-1]) + AFTERWARDS * speed
+    spans = int(np.ceil(line.alignment().in_spans(end))) + 3
+    given: dict[str, Any] = {"spans": spans, "distance": end, "window": 0.0, "record_droppers": False}
+    simulate(case.line, case.pantograph, speed_kmh, policy="passive", watch=watch, **given)
+    time = np.arange(0.0, AFTERWARDS - INTERVAL, INTERVAL)
+    pairs = zip(middles, np.array(heights).T, strict=True)
+    height = np.mean([np.interp(middle / speed + time, times, own) for middle, own in pairs], axis=0)
+    return Wake(time, height, np.gradient(height, INTERVAL))
+
+
+THEORIES = {
+    "span": "whole spans, f = v / l",
+    "half_span": "half spans, f = 2 v / l",
+    "contact_wire": "contact wire as a string, f = c / (2 l)",
+    "both_wires": "both wires as one string, f = c / (2 l)",
+    "measured": "wire after one pantograph, its strongest frequency",
+}
+"""Where a frequency is from, by key."""
+BEST = "best"  # key of the frequency that fits a curve best
+SCANNED = np.linspace(0.4, 3.0, 1301)  # frequencies (Hz) among which the best one is looked for
+BEGIN = 0.3  # time (s) after a pantograph from which the wire swings freely
+PADDED = 16
+"""Factor by which a motion is padded with zeros, to find its strongest frequency between two of its own."""
+
+
+class Fit(NamedTuple):
+    """How a frequency fits a curve of σ over the distance."""
+
+    frequency: float  # Hz
+    correlation: float  # of σ with the cosine in its best phase, 0..1
+    phase: float  # of that: worst distances are (n + phase) v / f, 0..1
+    in_phase: float  # correlation of σ with the cosine in phase, phase 0: whole multiples are worst
+
+
+def frequencies(case: Case, speed_kmh: float, after: Wake) -> dict[str, float]:
+    """Frequencies of ``THEORIES`` (Hz)."""
+    line = load_catenary(case.line)
+    length = line.alignment().mean_length
+    per_span = from_kmh(speed_kmh) / length
+    wires = [getattr(line, name) for name in ("contact_wire", "messenger_wire")]
+    together = math.sqrt(sum(wire.tension for wire in wires) / sum(wire.mass for wire in wires))
+    return {
+        "span": per_span,
+        "half_span": 2 * per_span,
+        "contact_wire": wires[0].wave_speed / (2 * length),
+        "both_wires": together / (2 * length),
+        "measured": strongest(after),
+    }
+
+
+def strongest(after: Wake) -> float:
+    """Strongest frequency (Hz) of the free motion behind a pantograph."""
+    free = after.height[after.time >= BEGIN]
+    count = PADDED * len(free)
+    amplitude = np.abs(np.fft.rfft((free - free.mean()) * np.hanning(len(free)), count))
+    known = np.fft.rfftfreq(count, INTERVAL)
+    possible = (known >= SCANNED[0]) & (known <= SCANNED[-1])
+    return float(known[possible][amplitude[possible].argmax()])
+
+
+def fit(curve: Curve, frequency: float) -> Fit:
+    """Fit of a frequency (Hz) to the second pantograph's σ, by least squares."""
+    angle = 2 * np.pi * frequency * curve.distances / from_kmh(curve.speed_kmh)
+    std = curve.second["std"]
+    terms = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+    found = np.linalg.lstsq(terms, std)[0]
+    _, cosine, sine = found
+    residual = std - terms @ found
+    share = max(0.0, 1.0 - float(residual.var() / std.var()))
+    phase = math.atan2(sine, cosine) / (2 * math.pi) % 1.0
+    return Fit(frequency, math.sqrt(share), phase, correlation(std, np.cos(angle)))
+
+
+def fits(curve: Curve, after: Wake) -> dict[str, Fit]:
+    """Fits of all theories to a curve, and of the frequency that fits it best."""
+    found = {key: fit(curve, each) for key, each in frequencies(curve.case, curve.speed_kmh, after).items()}
+    best = max((fit(curve, float(each)) for each in SCANNED), key=lambda each: each.correlation)
+    return found | {BEST: best}
+
+
+def at_arrival(curve: Curve, after: Wake) -> dict[str, float]:
+    """Correlations of the second's σ with the wire's height and velocity when it arrives."""
+    arrival = curve.distances / from_kmh(curve.speed_kmh)
+    return {
+        name: correlation(curve.second["std"], np.interp(arrival, after.time, getattr(after, name)))
+        for name in ("height", "velocity")
+    }
+
+
+def correlation(one: Array, other: Array) -> float:
+    """Pearson's coefficient of two series."""
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+EVERY = 10.0  # distance (m) between two rows that are printed; the CSV has all
+FAR = 100.0  # distance (m) from which the second is said to hardly touch the first
+CLOSE = 0.05  # relative difference within which a finite-element model's σ over spans 4 to 11 should lie
 KEPT = ("distances", "speed_kmh", "catenary", "pantograph_number", "pantograph", "spans", "mean", "std",
         "max", "min", "contact_loss", "max_uplift")  # fmt: skip
 """Columns of the CSV."""
-Found = Mapping[str, passes.Fit]
+Found = Mapping[str, Fit]
 
 
 def run(report: Report) -> Outcome:
     """Curves of two lines at three speeds, fits of theories, and what others found."""
     by_case, rows = {}, []
-    for k, case in enumerate(passes.CASES):
+    for k, case in enumerate(CASES):
         report(case.line, 0.4 * k)
         by_case[case], own = curves(case)
         rows += [{key: row[key] for key in KEPT} for row in own]
-    found, arrivals = [], []
+    found: list[tuple[Curve, Found]] = []
+    arrivals = []
     for k, curve in enumerate(curve for each in by_case.values() for curve in each):
         report("the wire behind one pantograph", 0.8 + 0.03 * k)
-        after = passes.wake(curve.case, curve.speed_kmh)
+        after = wake(curve.case, curve.speed_kmh)
         found.append((curve, fits(curve, after)))
         arrivals.append((curve, at_arrival(curve, after)))
-    measured = {(curve.case, curve.speed_kmh): each["measured"] for curve, each in found}
     report("plots", 0.98)
+    plain = [
+        {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
+        | {key: each._asdict() for key, each in own.items()}
+        for (curve, own), (_, arrival) in zip(found, arrivals, strict=True)
+    ]
     return Outcome(
         title="Two pantographs: ours beside others",
         comparisons=tuple(_comparisons(by_case, arrivals)),
-        tables=(
-            *(distances_table(each) for each in by_case.values()),
-            extremes_table(arrivals),
-            theories_table(found),
-        ),
-        plots={"spacing-sigma": plot_std(by_case, measured), "spacing-uplift": plot_uplift(by_case)},
+        tables=(*map(distances_table, by_case.values()), extremes_table(arrivals), theories_table(found)),
+        plots={"spacing-sigma": plot_std(by_case, found), "spacing-uplift": plot_uplift(by_case)},
         numbers={
-            "distances_m": list(passes.DISTANCES),
-            "speeds_kmh": list(passes.SPEEDS_KMH),
+            "distances_m": list(DISTANCES),
+            "speeds_kmh": list(SPEEDS_KMH),
             "mean_correlation": means(found),
-            "fits": [
-                {"line": curve.case.line, "speed_kmh": curve.speed_kmh, "at_arrival": arrival}
-                | {key: each._asdict() for key, each in own.items()}
-                for (curve, own), (_, arrival) in zip(found, arrivals, strict=True)
-            ],
+            "fits": plain,
         },
         rows={"spacing": rows},
         verdict=verdict(found),
@@ -73,28 +236,18 @@ def run(report: Report) -> Outcome:
 def distances_table(curves: Sequence[Curve]) -> Table:
     """σ, loss of contact and uplift of the second, and σ of the first, of one line at all speeds."""
     first = curves[0]
-
-    def cell(curve: Curve, whose: str, key: str, digits: int, scale: float) -> Cell:
-        return lambda k: f"{scale * getattr(curve, whose)[key][k]:.{digits}f}"
-
-    return tabled(
-        f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)",
-        (
-            ("distance (m)", lambda k: f"{first.distances[k]:g}"),
-            *(
-                (f"{name}, {curve.speed_kmh:g}", cell(curve, whose, key, digits, scale))
-                for name, whose, key, digits, scale in (
-                    ("σ (N)", "second", "std", 1, 1.0),
-                    ("σ of the first (N)", "first", "std", 1, 1.0),
-                    ("CL (%)", "second", "contact_loss", 2, 1.0),
-                    ("uplift (mm)", "second", "max_uplift", 1, 1e3),
-                )
-                for curve in curves
-            ),
-        ),
-        np.flatnonzero((first.distances - first.distances[0]) % EVERY < 1e-9).tolist(),
-        text_columns=0,
-    )
+    rows = []
+    for k in np.flatnonzero((first.distances - first.distances[0]) % EVERY < 1e-9):
+        cells = [f"{first.distances[k]:g}"]
+        cells += [f"{curve.second['std'][k]:.1f}" for curve in curves]
+        cells += [f"{curve.first['std'][k]:.1f}" for curve in curves]
+        cells += [f"{curve.second['contact_loss'][k]:.2f}" for curve in curves]
+        cells += [f"{1e3 * curve.second['max_uplift'][k]:.1f}" for curve in curves]
+        rows.append(tuple(cells))
+    names = ("σ (N)", "σ of the first (N)", "CL (%)", "uplift (mm)")
+    headings = (f"{name}, {curve.speed_kmh:g}" for name in names for curve in curves)
+    title = f"Second pantograph, {first.case.pantograph} twice on {first.case.line}, by speed (km/h)"
+    return Table(title, ("distance (m)", *headings), rows, text_columns=0)
 
 
 def extremes_table(found: Sequence[tuple[Curve, Mapping[str, float]]]) -> Table:
@@ -124,14 +277,11 @@ def theories_table(found: Sequence[tuple[Curve, Found]]) -> Table:
     return tabled(
         "Second pantograph's σ over the distance L: correlation with cos 2π(f L / v − phase)",
         (
-            ("line", "{0[0].case.line}"),
-            ("km/h", "{0[0].speed_kmh:g}"),
+            "line: {0[0].case.line} | km/h: {0[0].speed_kmh:g}",
             ("theory", lambda each: names[each[1]]),
-            ("f (Hz)", "{0[2].frequency:.2f}"),
+            "f (Hz): {0[2].frequency:.2f}",
             ("v / f (m)", lambda each: f"{from_kmh(each[0].speed_kmh) / each[2].frequency:.1f}"),
-            ("R", "{0[2].correlation:.2f}"),
-            ("r in phase", "{0[2].in_phase:+.2f}"),
-            ("phase", "{0[2].phase:.2f}"),
+            "R: {0[2].correlation:.2f} | r in phase: {0[2].in_phase:+.2f} | phase: {0[2].phase:.2f}",
         ),
         [(curve, key, each) for curve, fitted in found for key, each in fitted.items()],
         text_columns=3,
@@ -164,7 +314,7 @@ def _comparisons(
     by_case: Mapping[Case, Sequence[Curve]], arrivals: Sequence[tuple[Curve, Mapping[str, float]]]
 ) -> Iterator[Comparison]:
     """Ours beside others, those of the reference line; arrivals: correlations of ``at_arrival``."""
-    at = {curve.speed_kmh: curve for curve in by_case[passes.CASES[0]]}
+    at = {curve.speed_kmh: curve for curve in by_case[CASES[0]]}
 
     def std(speed: float, *distances: float, whose: str = "second") -> float:
         curve = at[speed]
@@ -177,15 +327,10 @@ def _comparisons(
         ("first", 250.0, 200.0, 26.9),
         ("second", 300.0, 200.0, 51.6),
     ):
-        names: dict[str, Any] = {
-            "whose": f"{whose}'s",
-            "distance": distance,
-            "speed": speed,
-            "judged": judged,
-        }
-        names |= {"low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
+        names: dict[str, Any] = {"whose": f"{whose}'s", "distance": distance, "speed": speed}
+        names |= {"judged": judged, "low": (1 - CLOSE) * judged, "high": (1 + CLOSE) * judged}
         yield said("spacing-std", std(speed, distance, whose=whose), **names)
-    ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in passes.SPEEDS_KMH}
+    ratios = {speed: std(speed, 90.0, 150.0) / std(speed, 200.0, 210.0) for speed in SPEEDS_KMH}
     other = ", ".join(f"{ratios[speed]:.2f} at {speed:g}" for speed in (200.0, 300.0))
     yield said("spacing-ratio", ratios[250.0], other=other)
     firsts = [curve.first["std"][curve.distances >= FAR] for curve, _ in arrivals]
@@ -198,43 +343,35 @@ def _comparisons(
     yield said("spacing-arrival", float(np.mean(velocities)), low=low, high=high)
 
 
-def plot_std(curves: Mapping[Case, Sequence[Curve]], fits: Mapping[tuple[Case, float], passes.Fit]) -> Figure:
-    """σ over the distance, a column for each line and a row for each speed.
-
-    fits: of the frequency measured behind one pantograph, by line and speed.
-    """
-    count = len(next(iter(curves.values())))  # of speeds
-    figure, axes = panels(
-        (14, 2.9 * count + 0.8), count, len(curves), sharex=True, sharey="col", squeeze=False
-    )
+def plot_std(curves: Mapping[Case, Sequence[Curve]], found: Sequence[tuple[Curve, Found]]) -> Figure:
+    """σ over the distance, a column for each line and a row for each speed; found: fits of all curves."""
+    fits, count = {id(curve): own["measured"] for curve, own in found}, len(next(iter(curves.values())))
+    size = 14, 2.9 * count + 0.8
+    figure, axes = panels(size, count, len(curves), sharex=True, sharey="col", squeeze=False)
     for column, (case, of_line) in zip(axes.T, curves.items(), strict=True):
         length = load_catenary(case.line).alignment().mean_length
         for axis, curve in zip(column, of_line, strict=True):
-            best, distances = fits[case, curve.speed_kmh], curve.distances
+            best, distances = fits[id(curve)], curve.distances
             axis.plot(distances, curve.second["std"], color=VERMILION, label="second pantograph")
             axis.plot(distances, curve.first["std"], color=BLUE, label="first pantograph")
             period = from_kmh(curve.speed_kmh) / best.frequency
-            swing = _wave(curve, best)
-            axis.plot(
-                distances, swing, "--", color=GREEN, linewidth=1.6,
-                label="period v / f of the wire's own swing behind one pantograph, fitted height and phase",
-            )  # fmt: skip
+            cosine = np.cos(2 * np.pi * (best.frequency * distances / from_kmh(curve.speed_kmh) - best.phase))
+            slope, mean = np.polyfit(cosine, curve.second["std"], 1)
+            label = "period v / f of the wire's own swing behind one pantograph, fitted height and phase"
+            axis.plot(distances, mean + slope * cosine, "--", color=GREEN, linewidth=1.6, label=label)
             limit = STD_OF_MEAN * float(np.median(curve.second["mean"]))
             axis.axhline(limit, color=LIMIT, linestyle=":", linewidth=1.0, label="EN 50367: 0.3 of the mean")
             for k in range(1, int(distances[-1] / length) + 1):
-                label = "whole spans" if k == 1 else None
-                axis.axvline(k * length, color="0.82", linewidth=0.9, zorder=0, label=label)
+                name = "whole spans" if k == 1 else None
+                axis.axvline(k * length, color="0.82", linewidth=0.9, zorder=0, label=name)
             words = f"{curve.speed_kmh:g} km/h: f = {best.frequency:.2f} Hz, v / f = {period:.0f} m"
-            axis.set_title(f"{words}, R = {best.correlation:.2f}", fontsize="medium", loc="left")
+            above = f"{case.pantograph} twice on {case.line}\n" if axis is column[0] else ""
+            title = f"{above}{words}, R = {best.correlation:.2f}"
+            axis.set_title(title, fontsize="medium", loc="left")
             axis.set(ylabel="σ (N)", xlim=(distances[0], distances[-1]))
         column[0].set_ylim(0, 1.05 * max(float(curve.second["std"].max()) for curve in of_line))
-        column[0].set_title(
-            f"{case.pantograph} twice on {case.line}\n{column[0].get_title(loc='left')}", loc="left",
-            fontsize="medium",
-        )  # fmt: skip
         column[-1].set(xlabel="distance between the pantographs (m)")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="medium")
+    legend_below(figure, 3, "medium")
     return figure
 
 
@@ -254,14 +391,5 @@ def plot_uplift(curves: Mapping[Case, Sequence[Curve]]) -> Figure:
             axis.grid(color="0.9")
     for row in axes:  # now: all of a row have one scale
         row[0].set_ylim(bottom=0)
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="medium"
-    )
+    legend_below(figure, 3, "medium")
     return figure
-
-
-def _wave(curve: Curve, best: passes.Fit) -> np.ndarray:
-    """The cosine of a fit, with the height and the mean that fit σ, (n,)."""
-    angle = 2 * np.pi * (best.frequency * curve.distances / from_kmh(curve.speed_kmh) - best.phase)
-    slope, mean = np.polyfit(np.cos(angle), curve.second["std"], 1)
-    return np.asarray(mean + slope * np.cos(angle))

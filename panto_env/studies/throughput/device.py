@@ -1,12 +1,11 @@
-"""How fast lanes are on a GPU: steps by themselves, and through the environment's ``step``, beside its
-memory.
-"""
+"""How fast lanes are on a GPU: steps alone and through the environment's ``step``, beside its memory."""
 
 from __future__ import annotations
 
 import statistics
 import time
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import gymnasium
@@ -26,36 +25,32 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     'Pantograph-v0, accuracy="fast"': ("Pantograph-v0", {"accuracy": "fast"}),
     **{name: (name, {}) for name in IDS if name != "Pantograph-v0"},
 }
-STARTS = 64
-"""Starts of episodes: their number does not change the speed."""
-MINIMUM = 0.2
-"""Minimum time (s) of a repeat."""
-PAIR = 2**30
-"""Bytes that are copied to measure the memory."""
+STARTS = 64  # starts of episodes: their number does not change the speed
+MINIMUM = 0.2  # minimum time (s) of a repeat
+PAIR = 2**30  # bytes that are copied to measure the memory
 
 
 def run(name: str, repeats: int, report: Report = lambda _: None) -> dict[str, Any]:
     """Everything, as plain data; name: of the device. Raises InputError where it cannot be used."""
-    device, rows = usable_device(name), []
-    for label, (id_, settings) in CASES.items():
-        for lanes in LANES:
-            report(f"{label}, {lanes} lanes")
-            try:
-                made: Any = gymnasium.make_vec(
-                    id_, num_envs=lanes, device=name, starts=STARTS, figures=False, **settings
-                )
-                env: PantographTensorEnv = made.unwrapped
-                env.reset(seed=0)
-            except InputError as error:  # it is too small for so many
-                rows.append({"case": label, "lanes": lanes, "refused": str(error)})
-                break
-            rows.append({"case": label, "lanes": lanes} | _speeds(env, repeats))
-            del env, made
-    return {"device": _name(device), "copied": _copied(device, repeats), "repeats": repeats, "speeds": rows}
-
-
-def _name(device: torch.device) -> str:
-    return torch.cuda.get_device_name(device) if device.type == "cuda" else "the processor"
+    device = usable_device(name)
+    rows: list[dict[str, Any]] = []
+    for (label, (id_, settings)), lanes in product(CASES.items(), LANES):
+        if rows and rows[-1]["case"] == label and "refused" in rows[-1]:
+            continue
+        report(f"{label}, {lanes} lanes")
+        row = {"case": label, "lanes": lanes}
+        given = {"num_envs": lanes, "device": name, "starts": STARTS, "figures": False, **settings}
+        try:
+            made: Any = gymnasium.make_vec(id_, **given)
+            env: PantographTensorEnv = made.unwrapped
+            env.reset(seed=0)
+        except InputError as error:  # it is too small for so many
+            rows.append(row | {"refused": str(error)})
+            continue
+        rows.append(row | _speeds(env, repeats))
+        del env, made
+    device_name = torch.cuda.get_device_name(device) if device.type == "cuda" else "the processor"
+    return {"device": device_name, "copied": _copied(device, repeats), "repeats": repeats, "speeds": rows}
 
 
 def _wait(device: torch.device) -> None:
@@ -64,9 +59,7 @@ def _wait(device: torch.device) -> None:
 
 
 def _speeds(env: PantographTensorEnv, repeats: int) -> dict[str, float]:
-    """Steps per second under random actions, by themselves and through ``step``, and what wires read and
-    write.
-    """
+    """Steps per second under random actions, alone and through ``step``, and what wires read and write."""
     random = torch.Generator(env.device).manual_seed(0)
     shape = env.action_space.shape or ()
     actions = 2 * torch.rand(shape, generator=random, device=env.device) - 1
@@ -86,21 +79,21 @@ def _speeds(env: PantographTensorEnv, repeats: int) -> dict[str, float]:
 
 def _median(step: Callable[[], Any], env: PantographTensorEnv, repeats: int, most: int = 10**9) -> float:
     """Environment steps per second, the median of repeats of at most so many steps, each from new starts."""
-    step()
-    _wait(env.device)
-    begun = time.perf_counter()
-    step()
-    _wait(env.device)
-    count = min(most, max(1, round(MINIMUM / (time.perf_counter() - begun))))
-    rates = []
-    for _ in range(repeats):
-        env.reset(seed=0)
-        _wait(env.device)
+
+    def timed(count: int) -> float:
         begun = time.perf_counter()
         for _ in range(count):
             step()
         _wait(env.device)
-        rates.append(env.num_envs * count / (time.perf_counter() - begun))
+        return time.perf_counter() - begun
+
+    timed(1)
+    count = min(most, max(1, round(MINIMUM / timed(1))))
+    rates = []
+    for _ in range(repeats):
+        env.reset(seed=0)
+        _wait(env.device)
+        rates.append(env.num_envs * count / timed(count))
     return statistics.median(rates)
 
 
@@ -120,12 +113,11 @@ def table(result: dict[str, Any]) -> Table:
     """Speeds by case and lanes."""
     rows = []
     for row in result["speeds"]:
-        lanes = f"{row['lanes']:,}"
-        if "refused" in row:
-            rows.append((row["case"], lanes, "–", "–", row["refused"]))
-            continue
-        share = row["wire_bytes_per_second"] / result["copied"]
-        speeds = (f"{row[key]:,.0f}" for key in ("steps_per_second", "through_step"))
-        rows.append((row["case"], lanes, *speeds, f"{100 * share:.0f} %" if share else "–"))
+        cells = ["–", "–", row.get("refused", "–")]
+        if "refused" not in row:
+            cells[:2] = (f"{row[key]:,.0f}" for key in ("steps_per_second", "through_step"))
+            if share := row["wire_bytes_per_second"] / result["copied"]:
+                cells[2] = f"{100 * share:.0f} %"
+        rows.append((row["case"], f"{row['lanes']:,}", *cells))
     title = f"{result['device']}, whose memory copies {result['copied'] / 1e9:,.0f} GB/s"
     return Table(title, ("environment", "lanes", "steps/s", "through step()", "memory's share"), rows)

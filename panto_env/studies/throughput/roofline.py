@@ -44,8 +44,7 @@ FLOPS_PER_DROPPER = 46  # two differences 2 x 11, extension and tension 8, eight
 # u written there, and d read and written at the node.
 NUMBERS_PER_NODE = 5
 CHAIN = 32
-WIDE = 16
-"""Numbers of the vectors of the small loops: as many in single precision as the widest register has."""
+WIDE = 16  # numbers of the vectors of the small loops: as many in single precision as the widest register has
 _load, _store = row_access(WIDE)
 
 
@@ -83,12 +82,12 @@ def triad(a, b, c, rounds):
 
 
 def _fastest(run: Callable[[], object], repeats: int) -> float:
-    best = np.inf
+    times = []
     for _ in range(repeats):
         start = time.perf_counter()
         run()
-        best = min(best, time.perf_counter() - start)
-    return best
+        times.append(time.perf_counter() - start)
+    return min(times)
 
 
 def measure(
@@ -99,13 +98,11 @@ def measure(
     nodes: of both wires together. time_step: s.
     """
     real = np.float32 if single else np.float64
-    sums = np.full((32, WIDE), 0.5, dtype=real)
-    rounds = 20_000
+    sums, rounds = np.full((32, WIDE), 0.5, dtype=real), 20_000
     multiply_add(sums, 1)
     peak = 2 * CHAIN * sums.size * rounds / _fastest(lambda: multiply_add(sums, rounds), 5)
     a, b, c = (np.full((128, WIDE), 0.5, dtype=real) for _ in range(3))
     triad(a, b, c, 1)
-    rounds = 20_000
     cache = 3 * a.nbytes * rounds / _fastest(lambda: triad(a, b, c, rounds), 5)
     flops = FLOPS_PER_NODE * nodes + FLOPS_PER_DROPPER * droppers
     moved = NUMBERS_PER_NODE * nodes * a.itemsize

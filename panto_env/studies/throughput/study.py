@@ -30,10 +30,8 @@ from . import roofline
 COUNTED = "Pantograph-v0"
 """The environment whose plant has its arithmetic counted, so that the machine's limit for it is known."""
 SPEED_KMH = 300.0
-LINE_SPANS = 12
-"""Spans of the flexible line whose settings are compared, so that the widest window has room."""
-WINDOWS = (3, 5, 8, 10, 0)
-"""Spans computed about the train; 0: the whole line."""
+LINE_SPANS = 12  # spans of the flexible line whose settings are compared, so that the widest window has room
+WINDOWS = (3, 5, 8, 10, 0)  # spans computed about the train; 0: the whole line
 MODES = (10, 20, 40, 80)
 SECTION = 5 * (50.0, 65.0, 55.0, 70.0, 60.0, 60.0)
 """Lengths of spans (m) of a line whose spans differ; their mean is that of the line with equal ones."""
@@ -41,8 +39,7 @@ OVERLAP: dict[str, Any] = {"first_span": 13, "rises": [0.1, 0.5]}
 STITCH_WIRE = {"length": 16.0, "tension": 2800.0, "mass": 0.31}
 TRAINS = ((), (200.0,), (70.0, 140.0, 200.0))
 """Distances of pantographs behind the first (m), of trains whose cost is compared with that of one."""
-TRAIN_WINDOW = 20
-"""Spans about all of them, so that their wires cost the same."""
+TRAIN_WINDOW = 20  # spans about all of them, so that their wires cost the same
 DISCRETISATIONS: tuple[dict[str, Any], ...] = (
     {},
     {"precision": "double"},
@@ -55,8 +52,7 @@ DISCRETISATIONS: tuple[dict[str, Any], ...] = (
 )
 """Settings of the flexible plant whose cost is compared; what is not named is at its default."""
 
-Report = Callable[[str], None]
-"""Called with what is being measured."""
+Report = Callable[[str], None]  # called with what is being measured
 
 
 SINGLE_YARDSTICK, VECTOR_YARDSTICK = "Pendulum-v1", "CartPole-v1"
@@ -70,10 +66,8 @@ LANES = {
 """Lanes of vectors measured; wider ones of a line with wires gain nothing and take minutes."""
 SHARED = (("Pantograph-v0", 64), ("Pantograph-v0", 256), ("PantographStiffness-v0", 4096))
 """Vector environments, and their lanes, whose speed is measured on one core and more."""
-MINIMUM = 0.3
-"""Minimum time (s) of a repeat: as many whole episodes as that takes."""
-BLOCK = 0.05
-"""Time (s) after which an environment and its yardstick take turns: a machine's clock may change."""
+MINIMUM = 0.3  # minimum time (s) of a repeat: as many whole episodes as that takes
+BLOCK = 0.05  # time (s) after which an environment and its yardstick take turns: a machine's clock may change
 
 
 Measured = dict[str, Any]
@@ -87,14 +81,9 @@ def run(repeats: int = 5, report: Report = lambda _: None) -> Measured:
         speed, task = _plant_speed(dict(settings), repeats)
         plants.append({"id": name} | speed)
         if name == COUNTED:
-            line = task.plant.model.line
-            limits = roofline.measure(
-                2 * line.rows * WIDTH,
-                len(line.link_set),
-                task.plant.time_step,
-                speed["times_real_time"],
-                _in_single(task),
-            )
+            line, step = task.plant.model.line, task.plant.time_step
+            size = 2 * line.rows * WIDTH, len(line.link_set)
+            limits = roofline.measure(*size, step, speed["times_real_time"], _in_single(task))
     scaling = _cost_of_settings(repeats, report)
     environments = _by_lanes(repeats, report)
     return {
@@ -146,27 +135,26 @@ def _plant_speed(settings: dict[str, Any], repeats: int) -> tuple[Measured, Task
 
 def _cost_of_settings(repeats: int, report: Report) -> dict[str, list[Measured]]:
     """Speeds of the flexible plant over spans and discretisation, of the three-span plant over modes."""
+    costs: dict[str, list[Measured]] = {}
 
-    def measured(settings: dict[str, Any], what: str) -> tuple[Measured, Task]:
+    def measured(kind: str, facts: Measured, settings: dict[str, Any], what: str) -> Task:
         report(what)
-        return _plant_speed(settings, repeats)
+        speed, task = _plant_speed(settings, repeats)
+        costs.setdefault(kind, []).append(facts | speed)
+        return task
 
     three_span = dict(IDS["PantographThreeSpan-v0"])
     line = load_catenary(three_span["catenary"])
-    costs: dict[str, list[Measured]] = {
-        name: [] for name in ("spans", "modes", "discretisation", "lines", "trains")
-    }
     for window in WINDOWS:
         spans = window or LINE_SPANS
-        speed, _ = measured({"spans": LINE_SPANS, "window": window}, f"{spans} spans computed")
-        costs["spans"].append({"spans": spans, "whole_line": window == 0} | speed)
+        given: dict[str, Any] = {"spans": LINE_SPANS, "window": window}
+        measured("spans", {"spans": spans, "whole_line": window == 0}, given, f"{spans} spans computed")
     for count in MODES:
-        entry = line.model_copy(update={"modes": count})
-        speed, _ = measured(three_span | {"catenary": entry}, f"{count} modes of the three-span catenary")
-        costs["modes"].append({"modes": count} | speed)
+        given = three_span | {"catenary": line.model_copy(update={"modes": count})}
+        measured("modes", {"modes": count}, given, f"{count} modes of the three-span catenary")
     for settings in DISCRETISATIONS:
-        what = ", ".join(f"{key} {value}" for key, value in settings.items())
-        speed, task = measured({"spans": LINE_SPANS} | settings, f"the flexible plant, {what or 'defaults'}")
+        what = ", ".join(f"{key} {value}" for key, value in settings.items()) or "defaults"
+        task = measured("discretisation", {}, {"spans": LINE_SPANS} | settings, f"the flexible plant, {what}")
         grid = {
             "speed_kmh": settings.get("speed_kmh", SPEED_KMH),
             "accuracy": task.settings.accuracy,
@@ -174,15 +162,15 @@ def _cost_of_settings(repeats: int, report: Report) -> dict[str, list[Measured]]
             "time_step": task.plant.time_step,
             "precision": "single" if _in_single(task) else "double",
         }
-        costs["discretisation"].append(grid | speed)
+        costs["discretisation"][-1] = grid | costs["discretisation"][-1]
     for what, line_ in _lines().items():
-        speed, _ = measured({"catenary": line_, "distance": 27 * line_.stride}, what)
-        costs["lines"].append({"line": what} | speed)
+        measured("lines", {"line": what}, {"catenary": line_, "distance": 27 * line_.stride}, what)
     for distances in TRAINS:
         count = 1 + len(distances)
-        speed, task = measured(_train(distances), f"{count} pantographs on one wire")
+        task = measured(
+            "trains", {"pantographs": count}, _train(distances), f"{count} pantographs on one wire"
+        )
         assert task.plant.model.line.window == TRAIN_WINDOW
-        costs["trains"].append({"pantographs": count} | speed)
     return costs
 
 
@@ -293,14 +281,13 @@ def _time(step: Callable[[], None], count: int) -> float:
 
 def _by_lanes(repeats: int, report: Report) -> list[Measured]:
     """Every environment of ours beside its yardstick: single, then as vectors of more and more lanes."""
+    singles = (("Pantograph-v0", IDEAL), *((name, {}) for name in IDS))
+    cases: list[tuple[str, int | None, Any, str]] = [(name, None, how, "single") for name, how in singles]
+    cases += [(name, lanes, None, f"{lanes} lanes") for name in IDS for lanes in LANES[name]]
     rows = []
-    for name, settings in (("Pantograph-v0", IDEAL), *((name, {}) for name in IDS)):
-        report(f"{name}, single")
-        rows.append(_env_speed(name, repeats, settings=settings))
-    for name in IDS:
-        for lanes in LANES[name]:
-            report(f"{name}, {lanes} lanes")
-            rows.append(_env_speed(name, repeats, lanes))
+    for name, lanes, settings, words in cases:
+        report(f"{name}, {words}")
+        rows.append(_env_speed(name, repeats, lanes, settings))
     return rows
 
 
@@ -310,9 +297,8 @@ def by_cores(repeats: int, report: Report) -> list[Measured]:
         return []
     counts = sorted({2**k for k in range(cores().bit_length())} | {cores()})
     rows = []
-    for name, lanes in SHARED:
-        for count in counts:
-            report(f"{name}, {lanes} lanes on {count} cores")
-            with on_cores(count):  # the environment shares its lanes among as many threads when made
-                rows.append(_env_speed(name, repeats, lanes))
+    for (name, lanes), count in itertools.product(SHARED, counts):
+        report(f"{name}, {lanes} lanes on {count} cores")
+        with on_cores(count):  # the environment shares its lanes among as many threads when made
+            rows.append(_env_speed(name, repeats, lanes))
     return rows

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...base.plotting import legend_above, panels, series_colour
 from ...base.table import Table
-from ..study import tabled
+from ..study import Cell, Columns, tabled
 from .study import COUNTED, LINE_SPANS, SPEED_KMH
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def machine(result: Row) -> str:
 
 
 def _numbers(results: Sequence[Row]) -> list[str]:
-    """Column that distinguishes machines; empty for a single one."""
-    return [f"({k + 1})" for k in range(len(results))] if len(results) > 1 else [""]
+    """What distinguishes machines; empty for a single one."""
+    return [f" ({k + 1})" for k in range(len(results))] if len(results) > 1 else [""]
 
 
 def machines(results: Sequence[Row]) -> list[str]:
@@ -42,7 +42,7 @@ def machines(results: Sequence[Row]) -> list[str]:
 def summary(results: Sequence[Row]) -> Table:
     """Plants, and environments over yardsticks, of one machine or several, side by side."""
     columns = [_summary(result) for result in results]
-    headings = [f"{what} {number}".strip() for number in _numbers(results) for what in ("speed", "ratio")]
+    headings = [f"{what}{number}" for number in _numbers(results) for what in ("speed", "ratio")]
     rows = [
         (label, *(cell for column in columns for cell in column.get(label, ("–", "–"))))
         for label in dict.fromkeys(label for column in columns for label in column)
@@ -68,43 +68,52 @@ def _summary(result: Row) -> dict[str, tuple[str, str]]:
 def details(result: Row) -> list[Table | str]:
     """All else: plants and their settings, environments by lanes and by cores."""
     scaling = result["scaling"]
-    plants = [(row["catenary"], row) for row in result["plants"]]
-    modes = [(str(row["modes"]), row) for row in scaling["modes"]]
     flexible = f"the flexible catenary, a line of {LINE_SPANS} spans"
-    spans = [(f"{row['spans']}{', the whole line' * row['whole_line']}", row) for row in scaling["spans"]]
-    grids = [
-        (
-            f"{row['speed_kmh']:g} km/h, {row['accuracy']}: {row['spacing']:.3g} m, "
-            f"{1e3 * row['time_step']:.3g} ms, {row['precision']}",
-            row,
+    lines, trains = (scaling.get(name, []) for name in ("lines", "trains"))  # older results have none
+
+    def grid(row: Row) -> str:
+        how = f"{row['spacing']:.3g} m, {1e3 * row['time_step']:.3g} ms, {row['precision']}"
+        return f"{row['speed_kmh']:g} km/h, {row['accuracy']}: {how}"
+
+    def of_line(row: Row) -> str:
+        return f"{row['line']}, {row['times_real_time'] / lines[0]['times_real_time']:.2f} of the speed"
+
+    def of_train(row: Row) -> str:
+        return (
+            f"{row['pantographs']}, {trains[0]['times_real_time'] / row['times_real_time']:.2f} of the time"
         )
-        for row in scaling["discretisation"]
-    ]
-    lines = scaling.get("lines", [])  # older results have none
-    of_lines = [
-        (f"{row['line']}, {row['times_real_time'] / lines[0]['times_real_time']:.2f} of the speed", row)
-        for row in lines
-    ]
-    trains = scaling.get("trains", [])  # older results have none
-    alone = trains[0]["times_real_time"] if trains else 0.0
-    of_trains = [
-        (f"{row['pantographs']}, {alone / row['times_real_time']:.2f} of the time", row) for row in trains
-    ]
-    environments = [(_environment(row), row) for row in result["environments"]]
-    cores = [(f"{_environment(row)}, {_count(row['cores'], 'core')}", row) for row in scaling["cores"]]
-    return [
-        _plants(f"Plants, one core, {SPEED_KMH:g} km/h", "catenary", plants),
+
+    def on_cores(row: Row) -> str:
+        return f"{_environment(row)}, {_count(row['cores'], 'core')}"
+
+    def plants(title: str, key: str, rows: Sequence[Row], name: Cell) -> Table:
+        return tabled(title, ((key, name), *PLANT), rows)
+
+    def spans(row: Row) -> str:
+        return f"{row['spans']}{', the whole line' * row['whole_line']}"
+
+    parts: list[Table | str] = [
+        plants(f"Plants, one core, {SPEED_KMH:g} km/h", "catenary", result["plants"], "{[catenary]}"),
         _limits(result["roofline"]),
-        _plants(f"Spans computed of {flexible}", "spans", spans),
-        _plants("Modes of the three-span catenary", "modes", modes),
-        _plants(f"Speed, accuracy and precision of {flexible}", "speed, accuracy, grid, step", grids),
-        *([_plants("Lines, their window travelling", "line", of_lines)] if lines else []),
-        *([_plants("Pantographs, 20 spans computed", "pantographs", of_trains)] if trains else []),
-        _environments("Environments", environments),
-        _environments("Vector environments by cores", cores)
-        if cores
-        else "This platform does not let a process choose its cores: the cost by cores is not measured.",
+        plants(f"Spans computed of {flexible}", "spans", scaling["spans"], spans),
+        plants("Modes of the three-span catenary", "modes", scaling["modes"], "{[modes]}"),
+        plants(
+            f"Speed, accuracy and precision of {flexible}",
+            "speed, accuracy, grid, step",
+            scaling["discretisation"],
+            grid,
+        ),
     ]
+    if lines:
+        parts.append(plants("Lines, their window travelling", "line", lines, of_line))
+    if trains:
+        parts.append(plants("Pantographs, 20 spans computed", "pantographs", trains, of_train))
+    parts.append(tabled("Environments", (("environment", _environment), *SPEED), result["environments"]))
+    if not scaling["cores"]:
+        without = "This platform does not let a process choose its cores: the cost by cores is not measured."
+        return [*parts, without]
+    of_cores = (("environment", on_cores), *SPEED)
+    return [*parts, tabled("Vector environments by cores", of_cores, scaling["cores"])]
 
 
 def markdown(results: Sequence[Row]) -> tuple[str, str]:
@@ -130,34 +139,13 @@ def _limits(roofline: Row) -> str:
     )
 
 
-def _plants(title: str, key: str, rows: Sequence[tuple[str, Row]]) -> Table:
-    return tabled(
-        title,
-        (
-            (key, "{[0]}"),
-            ("× real time", "{[1][times_real_time]:,.0f}"),
-            ("slowest", "{[1][slowest]:,.0f}"),
-            ("fastest", "{[1][fastest]:,.0f}"),
-            ("first call (s)", "{[1][first_call]:.2f}"),
-        ),
-        rows,
-    )
-
-
-def _environments(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
-    return tabled(
-        title,
-        (
-            ("environment", "{[0]}"),
-            ("steps/s", "{[1][steps_per_second]:,.0f}"),
-            ("slowest", "{[1][slowest]:,.0f}"),
-            ("fastest", "{[1][fastest]:,.0f}"),
-            ("yardstick", "{[1][yardstick]}"),
-            ("its", "{[1][yardstick_steps_per_second]:,.0f}"),
-            ("ratio", "{[1][ratio]:.2g}"),
-        ),
-        rows,
-    )
+SPREAD = "slowest: {[slowest]:,.0f} | fastest: {[fastest]:,.0f}"
+PLANT: Columns = ("× real time: {[times_real_time]:,.0f}", SPREAD, "first call (s): {[first_call]:.2f}")
+SPEED: Columns = (
+    "steps/s: {[steps_per_second]:,.0f}",
+    SPREAD,
+    "yardstick: {[yardstick]} | its: {[yardstick_steps_per_second]:,.0f} | ratio: {[ratio]:.2g}",
+)
 
 
 def _environment(row: Row) -> str:
@@ -212,9 +200,8 @@ def _draw_cores(axis: Axes, rows: Sequence[Row]) -> None:
     for k, (name, lanes) in enumerate(dict.fromkeys((row["id"], row["lanes"]) for row in rows)):
         own = [row for row in rows if (row["id"], row["lanes"]) == (name, lanes)]
         gain = [row["steps_per_second"] / own[0]["steps_per_second"] for row in own]
-        axis.plot(
-            [row["cores"] for row in own], gain, "o-", color=series_colour(k), label=f"{name}, {lanes} lanes"
-        )
+        label = f"{name}, {lanes} lanes"
+        axis.plot([row["cores"] for row in own], gain, "o-", color=series_colour(k), label=label)
     axis.plot(counts, counts, ":", color="0.5", label="in step with cores")
     axis.set(xlabel="cores", ylabel="steps per second, times one core's", xticks=counts, ylim=(0, None))
     legend_above(axis, 2)
