@@ -36,11 +36,14 @@ def passes(request):
     line, pantograph = load_catenary(name), load_pantograph("dsa380")
     spans = line.spans if line.ends else 18
     distance = float(line.alignment(spans).support(spans - 2))
-    return line, pantograph, Passes(line, pantograph, ROOM, 65.0, distance, spans, Numerics(accuracy="fast", precision=precision))
+    own = Passes(
+        line, pantograph, ROOM, 65.0, distance, spans, Numerics(accuracy="fast", precision=precision)
+    )
+    return line, pantograph, own, CLOSE[precision]
 
 
 def test_they_give_what_whole_passes_give(passes):
-    line, pantograph, own = passes
+    line, pantograph, own, close = passes
     random = np.random.default_rng(0)
     droppers_at, supports_at = own.layout.positions, np.array(own.layout.supports[1:-1])
     scatter, heights = 2e-3 * random.standard_normal(len(droppers_at)), np.zeros(len(supports_at))
@@ -70,12 +73,12 @@ def test_they_give_what_whole_passes_give(passes):
         np.testing.assert_array_equal(late[same], whole[0])
     change = np.abs(whole - whole[0]).max(axis=1)
     assert (change > 1).sum() >= 4  # in an overlap, the train may not touch the wire of one
-    assert (np.abs(late - whole).max(axis=1) <= CLOSE[own.numerics.precision] * np.maximum(change, 1)).all()
+    assert (np.abs(late - whole).max(axis=1) <= close * np.maximum(change, 1)).all()
 
 
 def test_lines_of_other_damping_have_plants_of_their_own_on_the_same_grid(passes):
     """Also where one call has several of them."""
-    line, pantograph, own = passes
+    line, pantograph, own, _ = passes
     droppers, supports = np.zeros(len(own.layout.droppers)), np.zeros(len(own.layout.spans) - 1)
     drawn = DrawnLine(ROOM, np.zeros((0, 3)), droppers, supports)
 
