@@ -12,7 +12,7 @@ import copyreg
 import itertools
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple, Self
 
@@ -93,7 +93,7 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
         if isinstance(array, np.ndarray):
             owner = _owner(array)
             owners[id(owner)] = owner
-            first, last = _reach(array)
+            first, last = np.lib.array_utils.byte_bounds(array) if array.size else (array.ctypes.data,) * 2
             known = used.get(id(owner), (first, last))
             used[id(owner)] = min(first, known[0]), max(last, known[1])
     blocks = []
@@ -114,10 +114,9 @@ def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
 
 
 def _together(parts: _Parts) -> Any:
-    memory = []
-    for content, place in parts.blocks:
-        memory.append(aligned_zeros(content.shape, np.uint8, place))
-        memory[-1][:] = content
+    memory = [aligned_zeros(content.shape, np.uint8, place) for content, place in parts.blocks]
+    for own, (content, _) in zip(memory, parts.blocks, strict=True):
+        own[:] = content
 
     def value(field: Any) -> Any:
         if isinstance(field, _Parts):
@@ -133,15 +132,6 @@ def _owner(array: Any) -> Any:
     while isinstance(array.base, np.ndarray):
         array = array.base
     return array
-
-
-def _reach(array: NDArray[Any]) -> tuple[int, int]:
-    """First address of an array's memory, and the one after its last; strides must not be negative."""
-    first = array.ctypes.data
-    if array.size == 0:
-        return first, first
-    steps = sum((count - 1) * stride for count, stride in zip(array.shape, array.strides, strict=True))
-    return first, first + steps + array.itemsize
 
 
 POINTER = np.dtype(np.intp).itemsize
@@ -161,19 +151,16 @@ class Packed:
 
 def words_of(value: Any) -> NDArray[np.int64]:
     """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
-    words: list[int] = []
-    _add_words(value, words)
-    return np.array(words, dtype=np.int64)
+    return np.array([*_words(value)], dtype=np.int64)
 
 
-def _add_words(value: Any, words: list[int]) -> None:
+def _words(value: Any) -> Iterator[int]:
     if isinstance(value, tuple):
-        for field in value:
-            _add_words(field, words)
+        yield from itertools.chain.from_iterable(map(_words, value))
     elif isinstance(value, np.ndarray):
-        words += array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
+        yield from array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
     else:
-        words += struct.unpack("q", struct.pack("d", value)) if isinstance(value, float) else [int(value)]
+        yield from struct.unpack("q", struct.pack("d", value)) if isinstance(value, float) else (int(value),)
 
 
 ADDRESS = 4
@@ -205,15 +192,6 @@ def _kind(value: Any) -> Any:
         return type(value)
     flags = value.flags
     return value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
-
-
-def entry(compiled: Any, signature: tuple[Any, ...]) -> Callable[..., Any]:
-    """A kernel's entry point for arguments of these types, compiled if necessary."""
-    known = compiled.overloads.get(signature)
-    if known is None:
-        compiled.compile(signature)
-        known = compiled.overloads[signature]
-    return known.entry_point  # type: ignore[no-any-return]
 
 
 class PackedType(types.Type):  # type: ignore[misc]
@@ -312,5 +290,8 @@ def bind(compiled: Callable[..., Any], packed: Any, *changing: Any) -> Callable[
     """
     if not JIT:
         return partial(compiled, packed)
+    kernel: Any = compiled
     signature = (packed.type, *map(type_of, changing))
-    return partial(entry(compiled, signature), packed)
+    if signature not in kernel.overloads:
+        kernel.compile(signature)
+    return partial(kernel.overloads[signature].entry_point, packed)

@@ -15,8 +15,7 @@ from panto_env.analysis.single_check import spans_at_rest
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact
-from panto_env.plant.catenary.single import Single
-from panto_env.plant.catenary.single.resolution import spacing
+from panto_env.plant.catenary.single import Single, spacing
 from panto_env.plant.numerics import Numerics, Runs
 
 from ..finite_element import hermite
