@@ -100,7 +100,7 @@ class Rig:
 
 
 Power = namedtuple("Power", "current voltage copper mechanical electrical")
-"""Of the motors of one place, means of each time step: of each motor (A, V), of all (W): lost in armatures, put
+"""Of the motors of one place, means of each step: of each motor (A, V), of all (W): lost in armatures, put
 out by arms, taken in."""
 
 

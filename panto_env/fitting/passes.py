@@ -256,7 +256,7 @@ class Passes:
             table = self._samples(plant)
             for end in steps:
                 plant.advance_passively(end - done, table, 1)
-                kept.append(keep(plant, 0))
+                kept.append(keep(plant))
                 done = end
         return kept
 

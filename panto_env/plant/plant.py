@@ -338,13 +338,12 @@ class Kept(NamedTuple):
     rows: tuple[Array, ...]  # of pantographs, actuators and trains
 
 
-def keep(plant: Plant, lane: int) -> Kept:
-    """The present state of one lane of a flexible line."""
+def keep(plant: Plant) -> Kept:
+    """The present state of the first lane of a flexible line."""
     line = plant.model.line
-    wire = tuple(array[min(lane, len(array) - 1)].copy() for array in _arrays(plant.model.wire))
-    static, gap = (each[min(lane, len(each) - 1)].copy() for each in (line.link_static, line.link_gap))
-    rows = tuple(table[..., min(lane, table.shape[-2] - 1), :].copy() for table in _tables(plant))
-    return Kept(wire, static, gap, float(plant.speed[lane]), rows)
+    wire = tuple(array[0].copy() for array in _arrays(plant.model.wire))
+    rows = tuple(table[..., 0, :].copy() for table in _tables(plant))
+    return Kept(wire, line.link_static[0].copy(), line.link_gap[0].copy(), float(plant.speed[0]), rows)
 
 
 def go_on(plant: Plant, drawn: Sequence[DrawnLine], kept: Kept) -> None:

@@ -213,13 +213,12 @@ def test_light_rotors_with_a_strong_back_emf_are_stable(backlash, inductance):
 def test_efficiency_is_what_a_motor_passes_on_and_a_load_has_to_overcome_more():
     """Lifted and lowered at a steady speed by a slow wave of the wire, the motors press 60 N."""
     motor = MotorActuator(gear_efficiency=0.8)
+    lost = motor.force_of(motor.friction_torque) + 0.2 * 60
     for sense in (1, -1):
         bench = Bench(motor, amplitude=-0.5 * sense, frequency=0.5, step=1e-3)
         rows = bench.run([60.0] * 60, 0.01)[400:, :]
         assert (sense * rows[:, 1] > 0.05).all()
-        assert rows[:, 3] == pytest.approx(
-            60 - sense * (motor.force_of(motor.friction_torque) + 0.2 * 60), abs=0.8
-        )
+        assert rows[:, 3] == pytest.approx(60 - sense * lost, abs=0.8)
 
 
 def test_friction_holds_what_it_can():

@@ -153,11 +153,6 @@ FIT_BOUNDS = ((0.9, 0.4, 0.2), (1.1, 2.5, 5.0))
 """Minimum and maximum coefficients, relative to the assumed ones."""
 
 
-def check(data: RigData) -> None:
-    """Raise InputError where the computed line cannot exist."""
-    LINES[data.line.kind].check(data.line)
-
-
 class Rig(CatenaryModel):
     """A pantograph on a cylinder that follows a line's computed contact point.
 
