@@ -284,7 +284,8 @@ def draw(
 ) -> DrawnLine:
     """Draw one line in one of these conditions; supports: those between two spans."""
     condition = conditions[int(random.integers(len(conditions))) if len(conditions) > 1 else 0]
-    rows, scatter, heights, tensions = [], None, None, (1.0, 1.0)
+    rows = []
+    scatter, heights, tensions = None, None, (1.0, 1.0)
     if condition.irregularity > 0:
         phases = random.uniform(0, 1, len(IRREGULARITY))
         for (wavelength, amplitude), phase in zip(IRREGULARITY, phases, strict=True):

@@ -99,9 +99,8 @@ def test_each_pantograph_of_a_train_feels_the_height_at_its_own_place():
     task.reset(0, np.random.default_rng(0))
     assert task.plant.of(0, Row.BY_HEIGHT) == 0.0
     found = []
-    while not task.results.truncated[0]:
-        for _ in range(20):
-            task.step(np.zeros((task.agents, 1)))
+    for _ in range(task.length.most_control_steps):
+        task.step(np.zeros((task.agents, 1)))
         x = float(task.plant.position(0, task.plant.of(0, Row.STEP) - 0.5)[0])
         found.append((x, task.plant.of(0, Row.BY_HEIGHT), task.plant.of(0, Row.BY_HEIGHT, 1)))
     x, first, second = np.array(found).T

@@ -112,6 +112,6 @@ def test_friction_in_the_frame_dampens_its_motion_under_a_line():
     for friction in (0.0, 5.0, 100.0):
         rubbed = smooth.model_copy(update={"frame_friction": friction})
         run = simulate("ohl-three-span", rubbed, 250, distance=400.0)
-        spreads.append(run.frame[run.inside()].std())
+        spreads.append(run.frame[run.inside("all")].std())
     assert spreads[0] > 1.05 * spreads[1]
     assert spreads[2] < 0.05 * spreads[0]

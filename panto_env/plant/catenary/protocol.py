@@ -92,6 +92,7 @@ class CatenaryModel(Protocol):
 
         Not called for a massless wire, which has no state.
         """
+        return None
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
