@@ -6,6 +6,7 @@ spring whose other end moves as ``wire(t)``.
 """
 
 import math
+from collections import namedtuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -96,3 +97,33 @@ class Rig:
             states += solved.y.T.tolist()
             state = solved.y[:, -1]
         return np.array(states)
+
+
+Power = namedtuple("Power", "current voltage copper mechanical electrical")
+"""Of the motors of one place, means of each step: of each motor (A, V), of all (W): lost in armatures, put
+out by arms, taken in."""
+
+
+def motor_power(motor, force, speed, time_step):
+    """Power of motors from a recorded force (N) and the speed (m/s) at which their ends moved apart.
+
+    Both are means over time steps (s), (n,): a run's ``head_force``, and the velocity of the head minus that
+    of the mass below it; or ``frame_force``, and ``frame_velocity``. The motors' equations are inverted:
+    friction follows the sign of the speed, so a step in which they stick or reverse is only approximate. Not
+    for motors with backlash, whose rotors move relative to the arms.
+    """
+    sense, inertia = np.sign(speed), motor.reflected_mass * np.gradient(speed, time_step)
+    # The teeth bear X = e - inertia, and pass on X - sense (dry friction + lost share of |X|) = force -
+    # inertia.
+    borne = force - inertia + sense * motor.force_of(motor.friction_torque)
+    borne = borne / (1.0 - sense * (1.0 - motor.gear_efficiency) * np.sign(borne))
+    current = (borne + inertia) / motor.force_of(motor.torque_constant)
+    emf = motor.torque_constant * motor.shaft_per_metre * speed
+    voltage = motor.resistance * current + motor.inductance * np.gradient(current, time_step) + emf
+    return Power(
+        current=current,
+        voltage=voltage,
+        copper=motor.motors * motor.resistance * current**2,
+        mechanical=(force - inertia) * speed,
+        electrical=motor.motors * voltage * current,
+    )

@@ -68,7 +68,7 @@ def kernel_sources(package: Path) -> list[tuple[Place, str]]:
         if own in tree.imported and own not in tree.defined:
             waiting.append(tree.imported[own])
             continue
-        statements = [_bare(each) for each in tree.defined.get(own, ())]
+        statements: list[ast.stmt] = [_Bare().visit(each) for each in tree.defined.get(own, ())]
         found[place] = "\n".join(map(ast.dump, statements))
         for statement in statements:
             waiting += _named(statement, module, tree)
@@ -77,7 +77,7 @@ def kernel_sources(package: Path) -> list[tuple[Place, str]]:
 
 def _module_name(path: Path, package: Path) -> str:
     parts = path.relative_to(package.parent).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    return ".".join(parts).removesuffix(".__init__")
 
 
 def _parse(path: Path, module: str, files: dict[str, Path]) -> _Module:
@@ -160,11 +160,6 @@ class _Bare(ast.NodeTransformer):
         return self.generic_visit(node)
 
 
-def _bare(statement: ast.stmt) -> ast.stmt:
-    bare: ast.stmt = _Bare().visit(statement)
-    return bare
-
-
 PACKAGE = Path(__file__).resolve().parents[1]
 HASH = re.compile("[0-9a-f]{16}")
 
@@ -202,6 +197,7 @@ def cache_folder() -> Path | None:
     own = _own_folder(Path(os.environ.get("PANTO_CACHE_DIR") or Path(home) / "panto_env"))
     if own is not None:
         return own
+    process = os.getpid()
     try:
         common = Path(tempfile.gettempdir()) / f"panto_env-{_user()}"
         own = _own_folder(common)
@@ -210,14 +206,13 @@ def cache_folder() -> Path | None:
         alone = Path(tempfile.mkdtemp(prefix="panto_env-"))
     except OSError:
         return None
-    atexit.register(_remove, alone, os.getpid())
+
+    def remove() -> None:
+        if os.getpid() == process:  # not at the end of its forked children
+            shutil.rmtree(alone, ignore_errors=True)
+
+    atexit.register(remove)
     return alone
-
-
-def _remove(folder: Path, process: int) -> None:
-    """Remove the folder of a process at its end, but not at the end of its forked children."""
-    if os.getpid() == process:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _own_folder(parent: Path) -> Path | None:
@@ -228,19 +223,17 @@ def _own_folder(parent: Path) -> Path | None:
 
 def _private_folder(parent: Path, name: str) -> Path | None:
     folder = parent / name
-    try:
+    with suppress(OSError):
         parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
         return folder if _private(folder) and os.access(folder, os.W_OK) else None
-    except OSError:
-        return None
+    return None
 
 
 def _kept_hash(file: Path) -> str:
     """``kernel_hash``, which takes a quarter of a second, from a file of these sources, or written to it."""
     with suppress(OSError, UnicodeDecodeError):
-        found = file.read_text(encoding="ascii")
-        if HASH.fullmatch(found):
+        if HASH.fullmatch(found := file.read_text(encoding="ascii")):
             return found
     with suppress(OSError):
         file.write_text(kernel_hash(), encoding="ascii")

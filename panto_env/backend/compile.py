@@ -126,18 +126,6 @@ class _NoCode:
     """What stands for the machine code of a part, which it has not."""
 
 
-def refuse_calls(part: Any) -> None:
-    """Let a part not be called from Python: it has no machine code."""
-
-    def refuse(*_: Any, **__: Any) -> None:
-        name = part.py_func.__name__
-        raise TypeError(f"{name} is a part of kernels: call it in one, or python_function({name})")
-
-    # Numba looks for the machine code among what it has inserted, and where there is none it compiles.
-    part._insert = lambda *_: None
-    part._compile_for_args = refuse
-
-
 def _compiler(lowering: Any) -> Any:
     """Numba's compiler with another lowering."""
 
@@ -196,10 +184,7 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Compile a function that kernels call, and inline it at each call."""
-    compiled: Any = numba.njit(**INLINED)(function)
-    if JIT:
-        refuse_calls(compiled)
-    return compiled  # type: ignore[no-any-return]
+    return _part(function, INLINED)
 
 
 def called(function: F) -> F:
@@ -208,19 +193,27 @@ def called(function: F) -> F:
     For large parts that most runs do not reach: a call costs them nothing, and the kernel, which is optimised
     as a whole, takes a quarter less time to compile.
     """
-    compiled: Any = numba.njit(**INLINED | NOT_INLINED)(function)
+    return _part(function, INLINED | NOT_INLINED)
+
+
+def _part(function: F, options: dict[str, Any]) -> F:
+    """A part of kernels, which cannot be called from Python: it has no machine code."""
+    part: Any = numba.njit(**options)(function)
+
+    def refuse(*_: Any, **__: Any) -> None:
+        name = function.__name__
+        raise TypeError(f"{name} is a part of kernels: call it in one, or python_function({name})")
+
     if JIT:
-        refuse_calls(compiled)
-    return compiled  # type: ignore[no-any-return]
+        # Numba looks for the machine code among what it has inserted, and where there is none it compiles.
+        part._insert = lambda *_: None
+        part._compile_for_args = refuse
+    return part  # type: ignore[no-any-return]
 
 
 def in_python(plain: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
     """Decorator of the compiled form of a function, an intrinsic of Numba; ``plain``: its Python form."""
-
-    def choose_form(compiled: Callable[..., Any]) -> Any:
-        return intrinsic(compiled) if JIT else plain
-
-    return choose_form
+    return lambda compiled: intrinsic(compiled) if JIT else plain
 
 
 def python_function(compiled: Callable[..., Any]) -> Callable[..., Any]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numba
@@ -94,9 +94,7 @@ class Columns:
             columns = columns if shape else columns.squeeze(1)
             return columns.movedim(-1, axis + 1)
 
-        self.tuples = tuple(
-            map_arrays(placed, axes, each) for axes, each in zip(self._axes, several, strict=True)
-        )
+        self.tuples = tuple(map(partial(map_arrays, placed), self._axes, several))
         """The named tuples. What differs from lane to lane has an axis of tiles, then those of its array;
         all such are views of ``blocks``.
         """
@@ -165,13 +163,11 @@ class Columns:
 
     def _columns_of(self, lanes: torch.Tensor, per_lane: int) -> tuple[torch.Tensor, torch.Tensor]:
         """Tiles and columns in them of lanes, (n,), with so many columns of each."""
-        columns = lanes % self.tile
+        tiles, columns = lanes // self.tile, lanes % self.tile
         if per_lane == 1:
-            return lanes // self.tile, columns
+            return tiles, columns
         each = torch.arange(per_lane, device=lanes.device)
-        return (lanes // self.tile).repeat_interleave(per_lane), (
-            columns[:, None] * per_lane + each
-        ).flatten()
+        return tiles.repeat_interleave(per_lane), (columns[:, None] * per_lane + each).flatten()
 
 
 def map_arrays(function: Callable[..., Any], *tuples: Any) -> Any:
@@ -187,9 +183,7 @@ def map_arrays(function: Callable[..., Any], *tuples: Any) -> Any:
 
 def _axis(one: Any, several: Any) -> int | None:
     """Axis of the lanes of an array, None where it is alike in all."""
-    differ = [
-        axis for axis, pair in enumerate(zip(one.shape, several.shape, strict=True)) if pair[0] != pair[1]
-    ]
+    differ = np.flatnonzero(np.not_equal(one.shape, several.shape)).tolist()
     return differ[0] if differ else None
 
 
@@ -218,9 +212,8 @@ class PackedTiles:
             table[:, begin : begin + len(place)] = place + far * np.arange(columns.tiles)[:, None]
         self._table = torch.empty(table.shape, dtype=torch.int64, device=columns.device)
         self.address, self.apart = self._table.data_ptr(), 8 * table.shape[1]
-        table[:, : len(tiles)] = (
-            self.address + self.apart * np.arange(columns.tiles)[:, None] + 8 * begins[:-1]
-        )
+        places = self.address + self.apart * np.arange(columns.tiles)[:, None]
+        table[:, : len(tiles)] = places + 8 * begins[:-1]
         self._table.copy_(torch.from_numpy(table))
         self.type = PackedType(tuple(_type_of(tuple_) for tuple_, _ in tiles))
 
@@ -253,11 +246,11 @@ def _type_of(value: Any) -> Any:
 def _packed_at(form: PackedType) -> Any:
     """A function of kernels that takes the address of packed arguments of one form for these."""
 
+    def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], ir.IntType(8).as_pointer())
+
     @intrinsic
     def packed_at(typing: Any, address: Any) -> Any:
-        def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            return builder.inttoptr(values[0], ir.IntType(8).as_pointer())
-
         return form(types.int64), build
 
     return packed_at
@@ -295,20 +288,19 @@ def compiled(
         if tile * cuda.blockDim.x + lane < lanes:
             call(arguments, apart, answers, answers_apart, tile, lane)
 
-    signature = types.void(*[types.int64] * 5)
-    bounds = TILE, BLOCKS
-    text, _ = cuda.compile(
-        each_lane, signature, device=False, abi="numba", cc=capability, launch_bounds=bounds
-    )
+    options: dict[str, Any] = {"device": False, "abi": "numba", "launch_bounds": (TILE, BLOCKS)}
+    text, _ = cuda.compile(each_lane, types.void(*[types.int64] * 5), cc=capability, **options)
     return str(text)
 
 
-def _kept(
-    part: Callable[..., Any], form: PackedType, results: PackedType, capability: tuple[int, int]
-) -> str:
-    """As ``compiled``; from the disk where it is there already."""
+@lru_cache
+def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
+    """As ``compiled``, for a GPU by its number; from the disk where it is there already."""
     import numba_cuda
+    from cuda.core import Device, ObjectCode
 
+    Device(index).set_current()
+    capability = torch.cuda.get_device_capability(index)
     name = getattr(part, "py_func", part).__name__
     made_of = [kernel_hash(), name, str(form), str(results), list(capability), numba_cuda.__version__]
 
@@ -318,15 +310,7 @@ def _kept(
             print(text, file=sys.stderr)
         return compiled(part, form, results, capability)
 
-    return str(cached("gpu", made_of, compute))
-
-
-@lru_cache
-def _kernel(part: Callable[..., Any], form: PackedType, results: PackedType, index: int) -> Any:
-    from cuda.core import Device, ObjectCode
-
-    Device(index).set_current()
-    ptx = _kept(part, form, results, torch.cuda.get_device_capability(index))
+    ptx = str(cached("gpu", made_of, compute))
     found = re.search(r"\.entry\s+(\w+)", ptx)
     assert found is not None  # each kernel has an entry
     return ObjectCode.from_ptx(ptx.encode()).get_kernel(found.group(1))

@@ -56,12 +56,10 @@ class _InPackage(_CacheLocator):  # type: ignore[misc]
         return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) else None
 
     def get_cache_path(self) -> str:
-        """The folder of the package's kernels."""
         return str(cache_folder())
 
     def get_source_stamp(self) -> str:
-        """Nothing: the folder's name says it."""
-        return ""
+        return ""  # the folder's name says it
 
     def get_disambiguator(self) -> str:
         """What makes names of files differ where those of modules and functions do not."""

@@ -12,7 +12,7 @@ import copyreg
 import itertools
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple, Self
 
@@ -57,20 +57,16 @@ def aligned_zeros(shape: tuple[int, ...], kind: Any = np.float64, place: int | N
     return spare[first : first + count].reshape(shape)
 
 
-class _View(NamedTuple):
-    block: int
-    offset: int  # bytes
-    shape: tuple[int, ...]
-    strides: tuple[int, ...]  # bytes
-    kind: np.dtype[Any]
+class _Placed(NamedTuple):
+    array: NDArray[Any]
+    place: int  # of its memory in a page (bytes)
 
 
 class _Parts(NamedTuple):
     """A named tuple of arrays in a form for copies, from which ``_together`` makes another one."""
 
     kind: type
-    blocks: list[tuple[NDArray[np.uint8], int]]  # memory that arrays share, and its place in a page (bytes)
-    fields: list[Any]  # a ``_View`` for each array, ``_Parts`` for each named tuple; others unchanged
+    fields: list[Any]  # ``_Placed`` for each array, ``_Parts`` for each named tuple; others unchanged
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: ``_together`` copies the memory."""
@@ -80,68 +76,26 @@ class _Parts(NamedTuple):
 def copy_whole(*tuples: Any) -> None:
     """Register the classes of these named tuples to be copied and pickled as a whole.
 
-    Arrays that share memory then share it in the copy, and keep their place within a page.
+    Their arrays, in C's order, keep their place within a page.
     """
     for each in tuples:
-        copyreg.pickle(type(each), _apart)
+        copyreg.pickle(type(each), lambda own: (_together, (_apart(own),)))
 
 
-def _apart(arrays: Any) -> tuple[Any, tuple[_Parts]]:
-    owners: dict[int, Any] = {}
-    used: dict[int, tuple[int, int]] = {}  # addresses in an owner's memory that the arrays cover
-    for array in arrays:
-        if isinstance(array, np.ndarray):
-            owner = _owner(array)
-            owners[id(owner)] = owner
-            first, last = _reach(array)
-            known = used.get(id(owner), (first, last))
-            used[id(owner)] = min(first, known[0]), max(last, known[1])
-    blocks = []
-    for key, (first, last) in used.items():
-        begin = first - owners[key].ctypes.data
-        blocks.append((owners[key].ravel("K").view(np.uint8)[begin : begin + last - first], first % PAGE))
-    number = {key: block for block, key in enumerate(used)}
-
-    def field(value: Any) -> Any:
-        if hasattr(value, "_fields"):
-            return _apart(value)[1][0]
-        if not isinstance(value, np.ndarray):
-            return value
-        key = id(_owner(value))
-        return _View(number[key], value.ctypes.data - used[key][0], value.shape, value.strides, value.dtype)
-
-    return _together, (_Parts(type(arrays), blocks, [field(value) for value in arrays]),)
+def _apart(value: Any) -> Any:
+    if hasattr(value, "_fields"):
+        return _Parts(type(value), [_apart(field) for field in value])
+    return _Placed(value, value.ctypes.data % PAGE) if isinstance(value, np.ndarray) else value
 
 
-def _together(parts: _Parts) -> Any:
-    memory = []
-    for content, place in parts.blocks:
-        memory.append(aligned_zeros(content.shape, np.uint8, place))
-        memory[-1][:] = content
-
-    def value(field: Any) -> Any:
-        if isinstance(field, _Parts):
-            return _together(field)
-        if not isinstance(field, _View):
-            return field
-        return np.ndarray(field.shape, field.kind, memory[field.block], field.offset, field.strides)
-
-    return parts.kind(*map(value, parts.fields))
-
-
-def _owner(array: Any) -> Any:
-    while isinstance(array.base, np.ndarray):
-        array = array.base
-    return array
-
-
-def _reach(array: NDArray[Any]) -> tuple[int, int]:
-    """First address of an array's memory, and the one after its last; strides must not be negative."""
-    first = array.ctypes.data
-    if array.size == 0:
-        return first, first
-    steps = sum((count - 1) * stride for count, stride in zip(array.shape, array.strides, strict=True))
-    return first, first + steps + array.itemsize
+def _together(value: Any) -> Any:
+    if isinstance(value, _Parts):
+        return value.kind(*map(_together, value.fields))
+    if not isinstance(value, _Placed):
+        return value
+    copied = aligned_zeros(value.array.shape, value.array.dtype, value.place)
+    copied[...] = value.array
+    return copied
 
 
 POINTER = np.dtype(np.intp).itemsize
@@ -161,19 +115,16 @@ class Packed:
 
 def words_of(value: Any) -> NDArray[np.int64]:
     """The compiled form of an array, a float, an int or a tuple of these, in words of 8 bytes."""
-    words: list[int] = []
-    _add_words(value, words)
-    return np.array(words, dtype=np.int64)
+    return np.array([*_words(value)], dtype=np.int64)
 
 
-def _add_words(value: Any, words: list[int]) -> None:
+def _words(value: Any) -> Iterator[int]:
     if isinstance(value, tuple):
-        for field in value:
-            _add_words(field, words)
+        yield from itertools.chain.from_iterable(map(_words, value))
     elif isinstance(value, np.ndarray):
-        words += array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
+        yield from array_form(value.size, value.itemsize, value.ctypes.data, value.shape, value.strides)
     else:
-        words += struct.unpack("q", struct.pack("d", value)) if isinstance(value, float) else [int(value)]
+        yield from struct.unpack("q", struct.pack("d", value)) if isinstance(value, float) else (int(value),)
 
 
 ADDRESS = 4
@@ -205,15 +156,6 @@ def _kind(value: Any) -> Any:
         return type(value)
     flags = value.flags
     return value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
-
-
-def entry(compiled: Any, signature: tuple[Any, ...]) -> Callable[..., Any]:
-    """A kernel's entry point for arguments of these types, compiled if necessary."""
-    known = compiled.overloads.get(signature)
-    if known is None:
-        compiled.compile(signature)
-        known = compiled.overloads[signature]
-    return known.entry_point  # type: ignore[no-any-return]
 
 
 class PackedType(types.Type):  # type: ignore[misc]
@@ -312,5 +254,8 @@ def bind(compiled: Callable[..., Any], packed: Any, *changing: Any) -> Callable[
     """
     if not JIT:
         return partial(compiled, packed)
+    kernel: Any = compiled
     signature = (packed.type, *map(type_of, changing))
-    return partial(entry(compiled, signature), packed)
+    if signature not in kernel.overloads:
+        kernel.compile(signature)
+    return partial(kernel.overloads[signature].entry_point, packed)

@@ -104,13 +104,14 @@ def _itself(vector: Any) -> Any:
     return vector
 
 
-def _mask(vector: Any) -> Any:
-    return MaskType(vector.count)
-
-
 def _arithmetic(instruction: str, *functions: Any) -> None:
     for function in functions:
         _operator(function, _itself, lambda builder, a, b: getattr(builder, instruction)(a, b, flags=FLAGS))
+
+
+def _comparison(sign: str, function: Any) -> None:
+    mask = lambda vector: MaskType(vector.count)  # noqa: E731
+    _operator(function, mask, lambda builder, a, b: builder.fcmp_ordered(sign, a, b))
 
 
 _arithmetic("fadd", operator.add, operator.iadd)
@@ -119,12 +120,6 @@ _arithmetic("fmul", operator.mul, operator.imul)
 _arithmetic("fdiv", operator.truediv, operator.itruediv)
 # Not as an instruction of its own, which a GPU's compiler does not have.
 _operator(operator.neg, _itself, lambda builder, a: builder.fsub(ir.Constant(a.type, None), a), inputs=1)
-
-
-def _comparison(sign: str, function: Any) -> None:
-    _operator(function, _mask, lambda builder, a, b: builder.fcmp_ordered(sign, a, b))
-
-
 _comparison("<", operator.lt)
 _comparison(">", operator.gt)
 _comparison("<=", operator.le)
@@ -175,18 +170,10 @@ def _is_table(array: Any, dimensions: tuple[int, ...] = (2,)) -> bool:
     return isinstance(array, types.Array) and array.ndim in dimensions and array.layout in "CA"
 
 
-def _load_plain(rows: Any, i: int) -> Any:
-    return rows[i].copy()
-
-
-def _store_plain(rows: Any, i: int, vector: Any) -> None:
-    rows[i] = vector
-
-
 def row_access(count: int) -> tuple[Any, Any]:
     """``load_row`` and ``store_row`` for rows of ``count`` numbers."""
 
-    @in_python(_load_plain)
+    @in_python(lambda rows, i: rows[i].copy())
     def load(typing: Any, rows: Any, i: Any) -> Any:
         if not (_is_table(rows) and isinstance(i, types.Integer)):
             return None
@@ -200,7 +187,7 @@ def row_access(count: int) -> tuple[Any, Any]:
 
         return VectorType(rows.dtype, count)(rows, types.intp), build
 
-    @in_python(_store_plain)
+    @in_python(operator.setitem)
     def store(typing: Any, rows: Any, i: Any, vector: Any) -> Any:
         if not (_is_table(rows) and isinstance(i, types.Integer)):
             return None
@@ -228,8 +215,7 @@ load_row, store_row = row_access(WIDTH)
 
 def _shift(up: bool) -> Any:
     def plain(vector: Any, end: Any) -> Any:
-        parts = (end[:1], vector[:-1]) if up else (vector[1:], end[-1:])
-        return np.concatenate(parts)
+        return np.concatenate((end[:1], vector[:-1]) if up else (vector[1:], end[-1:]))
 
     def shift(typing: Any, vector: Any, end: Any) -> Any:
         places = [WIDTH, *range(WIDTH - 1)] if up else [*range(1, WIDTH), 2 * WIDTH - 1]
@@ -248,16 +234,10 @@ shift_down: Any = _shift(up=False)
 """``shift_down(vector, end)``: each number one element back; the last element is that of ``end``."""
 
 
-def _gather_plain(rows: Any, places: Any, i: int) -> Any:
-    return rows[np.unravel_index(places[i], rows.shape)]
-
-
-def _scatter_plain(rows: Any, places: Any, i: int, vector: Any) -> None:
-    np.add.at(rows, np.unravel_index(places[i], rows.shape), vector)
-
-
-def _are_places(array: Any) -> bool:
-    return _is_table(array) and isinstance(array.dtype, types.Integer)
+def _addressed(rows: Any, places: Any, i: Any) -> bool:
+    """Whether row ``i`` of ``places`` can say where numbers of a table stand."""
+    numbers = _is_table(places) and isinstance(places.dtype, types.Integer)
+    return _is_table(rows, (2, 3)) and numbers and isinstance(i, types.Integer)
 
 
 def _read_places(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> list[Any]:
@@ -267,13 +247,13 @@ def _read_places(context: Any, builder: Any, kind: Any, places: Any, i: Any) -> 
     return [builder.sext(builder.load(each), i.type) for each in found]
 
 
-@in_python(_gather_plain)
+@in_python(lambda rows, places, i: rows[np.unravel_index(places[i], rows.shape)])
 def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
     """``gather(rows, places, i)``: a vector of numbers from a table (..., rows, WIDTH).
 
     Row i of ``places``, (n, WIDTH), says where they stand, counted row by row.
     """
-    if not (_is_table(rows, (2, 3)) and _are_places(places) and isinstance(i, types.Integer)):
+    if not _addressed(rows, places, i):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:
@@ -285,12 +265,12 @@ def gather(typing: Any, rows: Any, places: Any, i: Any) -> Any:
     return VectorType(rows.dtype)(rows, places, types.intp), build
 
 
-@in_python(_scatter_plain)
+@in_python(lambda rows, places, i, added: np.add.at(rows, np.unravel_index(places[i], rows.shape), added))
 def scatter_add(typing: Any, rows: Any, places: Any, i: Any, vector: Any) -> Any:
     """``scatter_add(rows, places, i, vector)``: add a vector to the numbers of a table that ``gather`` reads
     at these places.
     """
-    if not (_is_table(rows, (2, 3)) and _are_places(places) and isinstance(i, types.Integer)):
+    if not _addressed(rows, places, i):
         return None
 
     def build(context: Any, builder: Any, sig: Any, values: Any) -> Any:

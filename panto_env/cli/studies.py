@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -329,7 +329,7 @@ def rig(
             if stability:
                 status.update(f"stability of {escape(data.name)}")
                 found = report.stability(data, pantograph, speed_kmh)
-                facts[-1]["stability"] = report.stability_facts(found)
+                facts[-1]["stability"] = asdict(found)
                 tables.append(report.stability_table(data, found))
             if clock:
                 status.update(f"{escape(data.name)} against the clock")

@@ -234,7 +234,7 @@ class Task:
             self.noise.prepare(self.sensors, skip)
         if self.odometers.drawn:
             rows = None if skip is None else np.repeat(skip, self.agents)
-            self.odometers.prepare(self.episode.odometer, rows)
+            self.odometers.noise.prepare(self.episode.odometer, rows)
         if skip is None and results is None:
             return self._evaluate(self._plain_step(), self.results)  # the usual step, as fast as possible
         results = results or self.results

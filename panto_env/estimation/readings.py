@@ -13,7 +13,7 @@ import numpy as np
 from ..backend import NOT_NEGATIVE, aligned_zeros, implements, inlined
 from ..base.arrays import Array, Index, Lanes
 from ..plant.pantograph.schema import PantographData, matrices
-from ..plant.sensors import Reading, SensorArrays, SensorSettings, take_first_readings, take_readings
+from ..plant.sensors import Reading, SensorSettings, take_first_readings, take_readings
 from ..plant.sensors.base import AHEAD
 from ..plant.state import ROW, Row
 from .kalman import steady_gain
@@ -66,7 +66,7 @@ def estimating(
     control_steps: int,
     lanes: int,
     collectors: int,
-) -> tuple[SensorArrays, tuple[float, ...] | None]:
+) -> tuple[Any, tuple[float, ...] | None]:
     """Sensors with an estimator of the contact force, and the rms of each number of their noise, if any.
 
     pantograph: that the estimator knows. speed (m/s), span (m): for force models that need them;

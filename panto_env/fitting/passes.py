@@ -251,7 +251,7 @@ class Passes:
             table = self._samples(plant)
             for done, end in pairwise([0, *steps]):
                 plant.advance_passively(end - done, table, 1)
-                kept.append(keep(plant, 0))
+                kept.append(keep(plant))
         return kept
 
     def _start(self, plant: Plant, variants: Sequence[Variant]) -> None:

@@ -48,9 +48,8 @@ class Alignment:
         """
         count = len(lengths) if spans is None else spans
         every = [*lengths[:count], *[lengths[-1]] * (count - len(lengths))]
-        if len(set(every)) == 1:
-            return cls.equal(every[0], count)
-        return cls((0.0, *np.cumsum(every).tolist()))
+        alike = len(set(every)) == 1
+        return cls.equal(every[0], count) if alike else cls((0.0, *np.cumsum(every).tolist()))
 
     @classmethod
     def equal(cls, length: float, spans: int) -> Self:
@@ -145,8 +144,7 @@ class Alignment:
 
     def limits(self, spans: Spans) -> tuple[float, float]:
         """Positions (m) at which the first span begins and the last one ends."""
-        first, last = spans
-        return self.support(first - 1), self.support(last)
+        return self.support(spans[0] - 1), self.support(spans[1])
 
     def within(self, x: Array, spans: Spans) -> NDArray[np.bool_]:
         """Which positions (m), (n,), lie inside the spans."""

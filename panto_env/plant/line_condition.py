@@ -32,9 +32,10 @@ Worn = Annotated[float, Between(0, 0.4)]  # wires are replaced at a fifth to a t
 # A little may also have been gained: by friction of the pulleys, or weights too heavy.
 Lost = Annotated[float, Between(-0.1, 0.5)]
 
-
 ON_WIRE = ("hard_spots", "worn_stretches", "surface_bumps")
 """Lists of what is on the contact wire itself: each a span, a distance from its first support, and more."""
+ALONG_LINE = ("lost_contact_tension", "lost_messenger_tension", "ice", "temperature")
+"""What changes wires all along the line."""
 
 
 class LineCondition(Settings):
@@ -185,9 +186,10 @@ class LineCondition(Settings):
     @property
     def shortest_wave(self) -> float:
         """Shortest wavelength of the wire's height (m), infinite where it is even."""
-        irregularity = min(length for length, _ in IRREGULARITY) if self.irregularity > 0 else math.inf
-        bump = min((length for _, _, length, _ in self.surface_bumps), default=math.inf)
-        return min(irregularity, bump, self.wear_wavelength if self.wear_depth > 0 else math.inf)
+        waves = [length for length, _ in IRREGULARITY if self.irregularity > 0]
+        waves += [length for _, _, length, _ in self.surface_bumps]
+        waves += [self.wear_wavelength] if self.wear_depth > 0 else []
+        return min(waves, default=math.inf)
 
     @property
     def defective(self) -> bool:
@@ -198,8 +200,7 @@ class LineCondition(Settings):
     @property
     def along_line(self) -> LineCondition:
         """What changes the wires' tension and mass all along the line, and nothing else."""
-        names = {"lost_contact_tension", "lost_messenger_tension", "ice", "temperature"}
-        return LineCondition(**self.model_dump(include=names | {"reference_temperature"}))
+        return LineCondition(**self.model_dump(include={*ALONG_LINE, "reference_temperature"}))
 
     @property
     def temperature_in_words(self) -> str:
@@ -210,15 +211,7 @@ class LineCondition(Settings):
     @property
     def of_wires(self) -> tuple[Any, ...]:
         """Defects of the wires themselves, and what weather does to them: all lanes of a plant share it."""
-        return (
-            self.hard_spots,
-            self.worn_stretches,
-            self.surface_bumps,
-            self.lost_contact_tension,
-            self.lost_messenger_tension,
-            self.ice,
-            self.temperature,
-        )
+        return tuple(getattr(self, name) for name in (*ON_WIRE, *ALONG_LINE))
 
 
 NEW = LineCondition()
@@ -290,14 +283,13 @@ def draw(
     conditions: Sequence[LineCondition], random: np.random.Generator, droppers: int = 0, supports: int = 0
 ) -> DrawnLine:
     """Draw one line in one of these conditions; supports: those between two spans."""
-    choice = int(random.integers(len(conditions))) if len(conditions) > 1 else 0
-    condition = conditions[choice]
+    condition = conditions[int(random.integers(len(conditions))) if len(conditions) > 1 else 0]
     rows = []
+    scatter, heights, tensions = None, None, (1.0, 1.0)
     if condition.irregularity > 0:
         phases = random.uniform(0, 1, len(IRREGULARITY))
         for (wavelength, amplitude), phase in zip(IRREGULARITY, phases, strict=True):
             rows.append((condition.irregularity * amplitude, 1 / wavelength, phase))
-    scatter, heights, tensions = None, None, (1.0, 1.0)
     if condition.dropper_scatter > 0:
         scatter = condition.dropper_scatter * random.standard_normal(droppers)
     if condition.support_scatter > 0:

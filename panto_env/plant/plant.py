@@ -11,7 +11,7 @@ import numpy as np
 from ..backend import aligned_zeros, bind, copy_whole, pack
 from ..base.arrays import Array, Index, Lanes, sparse_zeros, to_kmh
 from ..base.errors import InputError, beside
-from .catenary import CATENARIES, CatenaryData, CatenaryModel, check_collectors
+from .catenary import CATENARIES, CatenaryData, CatenaryModel
 from .catenary.flexible.scattered_build import slots_of_links
 from .catenary.protocol import check_speeds
 from .catenary.schema import check_span_count
@@ -57,23 +57,22 @@ class Plant:
         are not usable, or a defect is given at a dropper, support or place that the line does not have; and
         for several collectors on a line along which no waves run from one to the other.
         """
-        check_collectors(catenary, len(train.collectors))
-        self.catenary, self.train, self.lanes = catenary, train, lanes
+        riding = [own.pantograph for own in train.collectors]
+        count, kind = len(riding), CATENARIES[catenary.kind]
+        if count > 1 and not kind.several_collectors:
+            raise InputError(
+                "Several pantographs need a flexible catenary or a single wire, whose waves run from one to "
+                f"the other, and line '{catenary.name}' is neither; give one pantograph, or another line."
+            )
+        self.catenary, self.train, self.lanes, self.runs = catenary, train, lanes, runs
         self.spans = check_span_count(catenary.spans if spans is None else spans)
         self.alignment = catenary.alignment(self.spans)
-        self.runs = runs
         winds = [condition.weather for condition in runs.conditions if condition.wind]
-        for own in train.collectors:
-            check_wind(winds, runs.speeds, own.pantograph)
-            own.pantograph.check_heights(catenary.name, catenary.contact_heights)
-        self.model: CatenaryModel = CATENARIES[catenary.kind].model(
-            catenary,
-            lanes=lanes,
-            collectors=len(train.collectors),
-            spans=self.spans,
-            numerics=numerics or Numerics(),
-            runs=runs,
-        )
+        for own in riding:
+            check_wind(winds, runs.speeds, own)
+            own.check_heights(catenary.name, catenary.contact_heights)
+        size: dict[str, Any] = {"lanes": lanes, "collectors": count, "spans": self.spans}
+        self.model: CatenaryModel = kind.model(catenary, **size, numerics=numerics or Numerics(), runs=runs)
         if bilateral and self.model.wires_per_collector > 1:
             two = "two side by side" if catenary.wires_touched > 1 else "overlaps of two"
             raise InputError(
@@ -82,43 +81,29 @@ class Plant:
             )
         self.time_step = self.model.time_step
         self.speed = np.zeros(lanes)  # of each lane's train, its mean where it drifts (m/s)
-        count, actuator = len(train.collectors), train.first.actuator
-        sizes = [2 * len(own.pantograph.masses) for own in train.collectors]
+        sizes = [2 * len(own.masses) for own in riding]
         self.pantographs = pantographs(sizes, lanes if varied else 1)
-        every = np.arange(self.pantographs.table.shape[1])
-        for number, own in enumerate(train.collectors):
-            self._set_pantograph(number, every, own.pantograph)
-        self.actuators = actuator.arrays(self.time_step, lanes, count)
+        for number, own in enumerate(riding):
+            self._set_pantograph(number, np.arange(self.pantographs.table.shape[1]), own)
+        self.actuators = train.first.actuator.arrays(self.time_step, lanes, count)
         waves = max(condition.waves for condition in runs.conditions)
-        tables = [own.pantograph.force_over_height for own in train.collectors]
-        knots = sorted({0.0, *(height for table in tables for height, _ in table)})
+        heights = sorted({0.0, *(height for own in riding for height, _ in own.force_over_height)})
+        speeds = np.array(sorted({0.0, *(speed for own in riding for speed, _ in own.uplift_table)}))
+        speeds /= to_kmh(1.0)
         lateral: Array = np.zeros(0)
-        if any(own.pantograph.rolls for own in train.collectors):
+        if any(own.rolls for own in riding):
             places = np.arange(0.0, self.alignment.length + LATERAL_EVERY, LATERAL_EVERY)
             lateral = catenary.lateral(places, self.spans, runs.conditions)
-        rolling = 2 if lateral.size else 0
-        by_speed = [own.pantograph.uplift_table for own in train.collectors]
-        speeds = np.array(sorted({0.0, *(speed for table in by_speed for speed, _ in table)})) / to_kmh(1.0)
+        squared = to_kmh(1 / self.time_step) ** 2
         self.run = Run(
-            table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes) + rolling)),
+            table=aligned_zeros((count, lanes, Row.STATE + 2 * max(sizes) + (2 if lateral.size else 0))),
             distance=per_collector((own.distance for own in train.collectors), float, count),
             driven=per_collector((own.driven for own in train.collectors), int, count),
             aerodynamic=per_collector(
-                (
-                    own.pantograph.aerodynamic_coefficient * to_kmh(1 / self.time_step) ** 2
-                    for own in train.collectors
-                ),
-                float,
-                count,
+                (own.aerodynamic_coefficient * squared for own in riding), float, count
             ),
             over_stride=np.array(
-                [
-                    speeds * self.time_step,
-                    *(
-                        np.zeros(len(speeds)) + own.pantograph.tabled_uplift(speeds)
-                        for own in train.collectors
-                    ),
-                ]
+                [speeds * self.time_step, *(0.0 * speeds + own.tabled_uplift(speeds) for own in riding)]
             ),
             tunnels=catenary.tunnel_rows,
             waves=aligned_zeros((lanes, 3 * waves)),
@@ -126,7 +111,7 @@ class Plant:
             wind=aligned_zeros((lanes, GUST_ROWS if winds else 0)),
             alignment=self.alignment.arrays,
             levels=np.array(catenary.contact_heights),
-            over_height=np.array([knots, *(own.pantograph.force_over(knots) for own in train.collectors)]),
+            over_height=np.array([heights, *(own.force_over(heights) for own in riding)]),
             lateral=lateral,
             lowest_force=-np.inf if bilateral else 0.0,
         )
@@ -209,12 +194,12 @@ class Plant:
         run.waves[lanes] = waves
         run.drift[lanes] = 0.0 if drift is None else drift
         if run.wind.shape[1]:
-            mean = [draw_wind(line.condition.weather, self.time_step) for line in drawn]
             run.wind[lanes] = [
-                own if line.wind is None else line.wind for own, line in zip(mean, drawn, strict=True)
+                draw_wind(line.condition.weather, self.time_step) if line.wind is None else line.wind
+                for line in drawn
             ]
-        heights = self.model.start_point.height
-        heights = heights + np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
+        uneven = np.sum(waves[:, ::3] * np.cos(2 * np.pi * waves[:, 2::3]), axis=1)
+        heights = self.model.start_point.height + uneven
         for collector in range(len(self.train.collectors)):
             static = None if static_forces is None else static_forces[collector]
             varied = [own[collector] for own in pantographs]
@@ -276,17 +261,20 @@ class Plant:
         check_compression(own.pantograph.name, state)
         forces = (state[:, 0] - heights) / compliance
         table = np.zeros((len(lanes), run.table.shape[2]))
-        table[:, Row.STRIDE] = strides
-        table[:, Row.NOMINAL_FORCE] = nominal_forces
-        table[:, Row.LIFT] = lifts
-        table[:, Row.WIND] = by_wind
-        table[:, Row.CONTACT_FORCE] = forces
         table[:, Row.STATE : Row.STATE + state.shape[1]] = state
+        for row, values in (
+            (Row.STRIDE, strides),
+            (Row.NOMINAL_FORCE, nominal_forces),
+            (Row.LIFT, lifts),
+            (Row.WIND, by_wind),
+            (Row.CONTACT_FORCE, forces),
+            (Row.HEAD_HEIGHT, state[:, 0]),
+            (Row.FRAME_HEIGHT, state[:, state.shape[1] // 2 - 1]),
+            (Row.WIRE_HEIGHT, state[:, 0] - forces * (strip + rolled)),
+        ):
+            table[:, row] = values
         if aside and own.pantograph.rolls:
             table[:, -2] = -forces * aside / own.pantograph.roll_stiffness
-        table[:, Row.HEAD_HEIGHT] = state[:, 0]
-        table[:, Row.FRAME_HEIGHT] = state[:, state.shape[1] // 2 - 1]
-        table[:, Row.WIRE_HEIGHT] = state[:, 0] - forces * (strip + rolled)
         return table
 
     def samples(self, rows: int, *, tension: bool = False) -> Samples:
@@ -350,13 +338,12 @@ class Kept(NamedTuple):
     rows: tuple[Array, ...]  # of pantographs, actuators and trains
 
 
-def keep(plant: Plant, lane: int) -> Kept:
-    """The present state of one lane of a flexible line."""
+def keep(plant: Plant) -> Kept:
+    """The present state of the first lane of a flexible line."""
     line = plant.model.line
-    wire = tuple(array[min(lane, len(array) - 1)].copy() for array in _arrays(plant.model.wire))
-    static, gap = (each[min(lane, len(each) - 1)].copy() for each in (line.link_static, line.link_gap))
-    rows = tuple(table[..., min(lane, table.shape[-2] - 1), :].copy() for table in _tables(plant))
-    return Kept(wire, static, gap, float(plant.speed[lane]), rows)
+    wire = tuple(array[0].copy() for array in _arrays(plant.model.wire))
+    rows = tuple(table[..., 0, :].copy() for table in _tables(plant))
+    return Kept(wire, line.link_static[0].copy(), line.link_gap[0].copy(), float(plant.speed[0]), rows)
 
 
 def go_on(plant: Plant, drawn: Sequence[DrawnLine], kept: Kept) -> None:

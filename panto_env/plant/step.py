@@ -15,14 +15,7 @@ from .catenary.protocol import (
     rise_at_contact,
 )
 from .functions import cosine_of_turns
-from .pantograph.step import (
-    PART,
-    add_contact_force,
-    contact_force,
-    move_freely,
-    roll_freely,
-    shared_forces,
-)
+from .pantograph.step import PART, add_contact_force, contact_force, move_freely, roll_freely, shared_forces
 from .state import LATERAL_EVERY, PLACE, ROW, SAMPLE_ROWS, own_row
 from .train import lift, lift_by_height, lift_by_wind, mean_stride, place_on_line
 
@@ -205,11 +198,7 @@ def finish(pantographs, run, contact, lane):
     """End the step of one collector, and complete its sample of means over the step."""
     own = run.table[contact, lane]
     size = pantographs.sizes[contact]
-    frame, head_speed, frame_speed = (
-        ROW.STATE + size // 2 - 1,
-        ROW.STATE + size // 2,
-        ROW.STATE + size - 1,
-    )
+    frame, head_speed, frame_speed = (ROW.STATE + size // 2 - 1, ROW.STATE + size // 2, ROW.STATE + size - 1)
     frame_before, head_speed_before, frame_speed_before = own[frame], own[head_speed], own[frame_speed]
     add_contact_force(pantographs, contact, own, lane)
     own[ROW.FRAME_HEIGHT] = 0.5 * (frame_before + own[frame])

@@ -51,7 +51,7 @@ class Wind(NamedTuple):
     @property
     def strongest(self) -> float:
         """Head wind that no gust exceeds: the mean, and all cosines together (m/s)."""
-        return self.mean + self.turbulence * abs(self.mean) * float(np.sum(np.sqrt(2 * np.array(_shares()))))
+        return self.mean + self.turbulence * abs(self.mean) * float(np.sum(np.sqrt(2 * SHARES)))
 
 
 def resolved(shortest: float = SHORTEST_GUST, longest: float = LONGEST_GUST) -> float:
@@ -64,14 +64,10 @@ def resolved(shortest: float = SHORTEST_GUST, longest: float = LONGEST_GUST) -> 
     return float(longer - shorter)
 
 
-def _limits() -> Array:
-    """Wavelengths between which the bands of the gusts lie, (BANDS + 1,) (m)."""
-    return np.geomspace(LONGEST_GUST, SHORTEST_GUST, BANDS + 1)
-
-
-def _shares() -> list[float]:
-    """Share of each band in the variance of the spectrum."""
-    return [resolved(short, long) for long, short in pairwise(_limits())]
+LIMITS = np.geomspace(LONGEST_GUST, SHORTEST_GUST, BANDS + 1)
+"""Wavelengths between which the bands of the gusts lie (m)."""
+SHARES = np.array([resolved(short, long) for long, short in pairwise(LIMITS)])
+"""Share of each band in the variance of the spectrum."""
 
 
 def draw_wind(wind: Wind, time_step: float, random: np.random.Generator | None = None) -> Array:
@@ -80,10 +76,9 @@ def draw_wind(wind: Wind, time_step: float, random: np.random.Generator | None =
     rows[0] = wind.mean * time_step
     if random is None or not wind.gusts:
         return rows
-    limits, shares = _limits(), _shares()
     within, phase = random.uniform(0, 1, (2, BANDS))
-    lengths = limits[:-1] * (limits[1:] / limits[:-1]) ** within
-    amplitudes = wind.turbulence * abs(wind.mean) * np.sqrt(2 * np.array(shares))
+    lengths = LIMITS[:-1] * (LIMITS[1:] / LIMITS[:-1]) ** within
+    amplitudes = wind.turbulence * abs(wind.mean) * np.sqrt(2 * SHARES)
     rows[1:] = np.stack([amplitudes * time_step, 1 / lengths, phase], axis=1).ravel()
     return rows
 
@@ -160,11 +155,11 @@ def draw_side_wind(wind: Wind, time_step: float, random: np.random.Generator | N
     if random is None or not wind.gusts:
         return rows
     limits = np.geomspace(SLOWEST_GUST, QUICKEST_GUST, SIDE_BANDS + 1)
-    shares = [side_resolved(slow, quick) for slow, quick in pairwise(limits)]
+    shares = np.array([side_resolved(slow, quick) for slow, quick in pairwise(limits)])
     within, phase, share = random.uniform(0, 1, (3, SIDE_BANDS))
     frequency = limits[:-1] * (limits[1:] / limits[:-1]) ** within * wind.mean / HEIGHT  # Hz
     deviation = VERTICAL_SHARE * wind.turbulence * wind.mean
     wavenumber = DECAY * frequency / (2 * np.pi * wind.mean) * np.tan(np.pi * (share - 0.5))
-    amplitude = deviation * np.sqrt(2 * np.array(shares)) * (abs(wavenumber) * SHORTEST_WAVE <= 1)
+    amplitude = deviation * np.sqrt(2 * shares) * (abs(wavenumber) * SHORTEST_WAVE <= 1)
     rows[1:] = np.stack([amplitude * time_step, frequency * time_step, wavenumber, phase], axis=1).ravel()
     return rows

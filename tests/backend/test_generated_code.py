@@ -39,11 +39,7 @@ def loops(cache):
     """
     environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent), "PANTO_CACHE_DIR": str(cache)}
     result = subprocess.run(
-        [sys.executable, "-c", CODE],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=True,
+        [sys.executable, "-c", CODE], capture_output=True, text=True, env=environment, check=True
     )
     lines = result.stdout.splitlines()
     start = {match[1]: i for i, line in enumerate(lines) if (match := re.match(r"(\.LBB\w+):", line))}

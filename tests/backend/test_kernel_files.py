@@ -25,48 +25,39 @@ CALL = "from module import thrice; print(thrice(1.5), sum(thrice.stats.cache_hit
 
 
 @pytest.fixture
-def call(tmp_path):
-    """Calls a kernel in a process of its own; what it prints, and on standard error."""
-    (tmp_path / "module.py").write_text(MODULE)
-    (tmp_path / "tmp").mkdir()
-
-    def call(cache="cache", code=CALL, variables=None, **options):
-        environment = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / cache), "TMPDIR": str(tmp_path / "tmp")}
-        environment |= variables or {}
-        told = subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            **options,
-        )
-        assert told.returncode == 0, told.stderr
-        return told.stdout.split(), told.stderr
-
-    return call
-
-
-START = "from pathlib import Path; import time\nwhile not Path('go').exists(): time.sleep(0.01)\n"
-
-
-@pytest.fixture
 def start(tmp_path):
     """Starts a process that may compile a kernel; those that are left at the end are ended."""
     (tmp_path / "module.py").write_text(MODULE)
-    environment, started = os.environ | {"PANTO_CACHE_DIR": str(tmp_path / "cache")}, []
+    (tmp_path / "tmp").mkdir()
+    started = []
 
-    def start(code):
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        process = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment, **pipes)
-        started.append(process)
-        return process
+    def start(code, cache="cache", variables=None, **options):
+        own = {"PANTO_CACHE_DIR": str(tmp_path / cache), "TMPDIR": str(tmp_path / "tmp")}
+        options |= {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
+        environment = os.environ | own | (variables or {})
+        started.append(subprocess.Popen([sys.executable, "-c", code], env=environment, **options))
+        return started[-1]
 
     yield start
     for process in started:
         process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def call(start):
+    """Calls a kernel in a process of its own; what it prints, and on standard error."""
+
+    def call(cache="cache", code=CALL, variables=None, **options):
+        process = start(code, cache, variables, **options)
+        told, said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+        return told.split(), said
+
+    return call
+
+
+START = "from pathlib import Path; import time\nwhile not Path('go').exists(): time.sleep(0.01)\n"
 
 
 @pytest.mark.slow

@@ -36,10 +36,7 @@ CASES = {
     "motors": ("PantographStiffness-v0", {"actuator": {"kind": "motor", "place": "both"}}),
     "loose motors": ("PantographStiffness-v0", {"actuator": "head-motor:backlash=0.014"}),
     "defects": ("Pantograph-v0", LIGHT | {"window": 3, "line_condition": DEFECTS}),
-    "clamps": (
-        "Pantograph-v0",
-        LIGHT | {"catenary": "re330", "window": 3, "observation": "full"},
-    ),
+    "clamps": ("Pantograph-v0", LIGHT | {"catenary": "re330", "window": 3, "observation": "full"}),
 }
 STEPS = {"three spans": 20, "stiffness": 30}
 """Control steps of a case, 6 unless named here: the three-span line is to pass a support."""
@@ -65,80 +62,76 @@ def short_line():
     return line.model_copy(update={"span_length": 12.0, "droppers": near, "spans": 5})
 
 
+def run_of(*series, line=None, pantograph="en50318-2002", **settings):
+    """Series of a run on a short line, in double precision."""
+    given = {"precision": "double", "spacing": 0.5, "time_step": 2e-3} | settings
+    run = panto_env.simulate(line or short_line(), pantograph, **given)
+    return [getattr(run, each).tolist() for each in series]
+
+
+EVERYTHING = "contact_force", "dropper_force", "uplift"
+DAMPED = load_pantograph("en50318-2002").model_copy(update={"contact_damping": 100.0})
+
+
 def passive_run():
     """Forces of contact and droppers and uplift, from the line's first anchor to its last."""
-    run = panto_env.simulate(
-        catenary=short_line(), window=3, precision="double", distance=58.0, spacing=0.5, time_step=2e-3
-    )
-    return [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
+    return run_of(*EVERYTHING, window=3, distance=58.0)
 
 
 def drifting_run():
     """A worn line under a damped contact, at a speed that drifts."""
-    damped = load_pantograph("en50318-2002").model_copy(update={"contact_damping": 100.0})
-    numerics = {"window": 3, "precision": "double", "spacing": 0.5, "time_step": 2e-3}
     uneven = {"speed_drift": 5.0, "line_condition": "worn", "seed": 1}
-    run = panto_env.simulate(catenary=short_line(), pantograph=damped, distance=30.0, **numerics, **uneven)
-    return [run.contact_force.tolist(), run.position.tolist()]
+    return run_of("contact_force", "position", pantograph=DAMPED, window=3, distance=30.0, **uneven)
 
 
 def run_in_weather():
     """Ice on both wires, one of them fixed and cold, and a speed that drifts in a gusty wind."""
-    line, blown = (
-        short_line(),
-        load_pantograph("en50318-2002").model_copy(update={"aerodynamic_coefficient": 1e-3}),
-    )
+    line = short_line()
     fixed = line.messenger_wire.model_copy(update={"axial_stiffness": 10e6})
     line = line.model_copy(update={"messenger_wire": fixed})
+    blown = load_pantograph("en50318-2002").model_copy(update={"aerodynamic_coefficient": 1e-3})
     weather = {"wind": 12.0, "ice": 0.4, "temperature": -20.0}
-    numerics = {"window": 3, "precision": "double", "spacing": 0.5, "time_step": 2e-3}
-    drawn = {"speed_drift": 5.0, "line_condition": weather, "seed": 1}
-    run = panto_env.simulate(line, blown, distance=30.0, **numerics, **drawn)
-    return [run.contact_force.tolist(), run.dropper_force.tolist()]
+    drawn = {"speed_drift": 5.0, "line_condition": weather, "seed": 1, "window": 3, "distance": 30.0}
+    return run_of("contact_force", "dropper_force", line=line, pantograph=blown, **drawn)
+
+
+def unlike_spans(distance, conditions, changes, droppers):
+    """Runs on a sequence of short spans, in a window that travels and on the whole line."""
+    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table["droppers"] |= droppers
+    line = FlexibleCatenaryData.model_validate(table | changes)
+    found = []
+    for window, condition in conditions.items():
+        given = {"window": window or None, "line_condition": condition, "distance": distance}
+        found += run_of(*EVERYTHING, line=line, **given)
+    return found
 
 
 def uneven_run():
     """Short spans that differ: a window that travels, and the whole line with a hard spot."""
-    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table["steady_arm"] |= {"stiffness": 300.0, "mass": 0.9}
-    table["droppers"] |= {"contact_clamp_mass": 0.2}
     spans = [{"span_length": length} for length in (12.0, 14.3, 11.1, 13.7, 12.9)]
-    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans})
-    settings = {"precision": "double", "distance": 62.0, "spacing": 0.5, "time_step": 2e-3}
+    arm = short_line().steady_arm.model_dump(exclude_none=True) | {"stiffness": 300.0, "mass": 0.9}
     conditions = {3: {"raised_supports": [(2, 0.02)]}, 0: {"hard_spots": [(3, 4.2, 2.0, 100.0)]}}
-    found = []
-    for window, condition in conditions.items():
-        run = panto_env.simulate(
-            line, "en50318-2002", window=window or None, line_condition=condition, **settings
-        )
-        found += [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
-    return found
+    changes = {"sequence": spans, "steady_arm": arm}
+    return unlike_spans(62.0, conditions, changes, {"contact_clamp_mass": 0.2})
 
 
 def overlapping_run():
     """Short spans with stitch wires and an overlap: a window that travels, and defects on the whole line."""
-    table = short_line().model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table["stitch_wire"] = {"length": 9.0, "tension": 2000.0, "mass": 0.3, "clamp_mass": 0.2}
-    table |= {"span_length": 20.0}
-    table["droppers"] |= {"positions": (2.5, 10.0, 17.5), "sag": (0.0, 0.0, 0.0)}
-    spans = [{}, {}, {"stitch_wire": {"length": 0.0}}, {}]
-    overlaps = [{"first_span": 4, "rises": (0.02, 0.1), "level": 1.0}]
-    line = FlexibleCatenaryData.model_validate(table | {"sequence": spans * 2, "overlaps": overlaps})
-    settings = {"precision": "double", "distance": 150.0, "spacing": 0.5, "time_step": 2e-3}
+    changes = {
+        "stitch_wire": {"length": 9.0, "tension": 2000.0, "mass": 0.3, "clamp_mass": 0.2},
+        "span_length": 20.0,
+        "sequence": [{}, {}, {"stitch_wire": {"length": 0.0}}, {}] * 2,
+        "overlaps": [{"first_span": 4, "rises": (0.02, 0.1), "level": 1.0}],
+    }
     conditions = {4: {"broken_droppers": [(5, 5)]}, 0: {"hard_spots": [(6, 4.2, 2.0, 100.0)]}}
-    found = []
-    for window, condition in conditions.items():
-        run = panto_env.simulate(
-            line, "en50318-2002", window=window or None, line_condition=condition, **settings
-        )
-        found += [run.contact_force.tolist(), run.dropper_force.tolist(), run.uplift.tolist()]
-    return found
+    droppers = {"positions": (2.5, 10.0, 17.5), "sag": (0.0, 0.0, 0.0)}
+    return unlike_spans(150.0, conditions, changes, droppers)
 
 
 def train_run():
     """Two controlled pantographs of different kinds with damped strips, one behind the other."""
-    damped = load_pantograph("en50318-2002").model_copy(update={"contact_damping": 100.0})
-    train = {"pantographs": [damped, "three-mass"], "distances": [14.0], "controlled": [1, 2]}
+    train = {"pantographs": [DAMPED, "three-mass"], "distances": [14.0], "controlled": [1, 2]}
     numerics = {"window": 3, "spacing": 0.5, "time_step": 2e-3}
     given = LIGHT | train | numerics | {"catenary": short_line(), "spans": 8, "run_in": 0.0, "washout": 0.5}
     env = gymnasium.make("Pantograph-v0", **given)

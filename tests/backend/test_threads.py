@@ -51,7 +51,7 @@ def helpers():
 
 def test_each_lane_is_worked_on_once_in_each_step():
     batch, counts = Batch(2000), set()
-    for k in range(50):
+    for k in range(20):
         done, calls, answer = batch.step(k)
         assert (done.round() == k).all()
         assert answer == (LANES if k == 7 else 0)  # the largest answer of all threads
@@ -78,13 +78,11 @@ def test_threads_end_with_their_owner():
     assert not any(thread.is_alive() for thread in ours)
 
 
-@pytest.mark.parametrize("catenary", ["en50318-2002", "periodic-stiffness", "ohl-three-span"])
-def test_bits_do_not_depend_on_the_number_of_threads(catenary, monkeypatch):
-    pantograph = {"periodic-stiffness": "three-mass"}.get(catenary, "own-two-mass")
-    settings = {"catenary": catenary, "pantograph": pantograph, "sensors": "realistic", "distance": 200.0}
+def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
+    settings = {"sensors": "realistic", "distance": 200.0}
     monkeypatch.setattr(threads, "WORTH", 0.0)
     seen = []
-    for count in (1, 2, 3):
+    for count in (1, 3):
         monkeypatch.setattr(threads, "cores", lambda count=count: count)
         task, random = Task(run_settings(settings), lanes=7), np.random.default_rng(0)
         task.reset(np.arange(7), np.random.default_rng(1))
@@ -93,9 +91,8 @@ def test_bits_do_not_depend_on_the_number_of_threads(catenary, monkeypatch):
             task.step(random.uniform(-1, 1, (7, 1)), skip)
         assert (task._threads._pool is None) == (count == 1)
         seen.append([task.results.observation, task.results.values, task.plant.run.table])
-    for others in seen[1:]:
-        for one, other in zip(seen[0], others, strict=True):
-            np.testing.assert_array_equal(one, other)
+    for one, other in zip(*seen, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
@@ -110,7 +107,7 @@ import panto_env.backend.threads as threads
 threads.cores = machine.cores
 threads.WORTH = 0.0
 warnings.simplefilter("ignore")
-envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=512)
+envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=8)
 envs.reset(seed=1)
 actions = np.zeros(envs.action_space.shape, dtype=np.float32)
 for _ in range(20):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from panto_env.backend import kernel
+from panto_env.backend import kernel, python_function
 from panto_env.catalog import load_catenary
 from panto_env.plant.catenary import CATENARIES
 from panto_env.plant.functions import cosine_of_turns, sine_of_turns, stencil
@@ -17,29 +17,20 @@ from .test_flexible import travel
 pytestmark = pytest.mark.plain
 
 
-@kernel
-def force_of(compliance, gap, change, damping, gap_yield, change_yield, lowest):
-    return contact_force(compliance, gap, change, damping, gap_yield, change_yield, lowest)
+law_of = python_function(contact_force)
 
 
 def law(stiffness, *others):
     """The contact law with a spring of this stiffness."""
-    return force_of(1 / stiffness, *others)
+    return law_of(1 / stiffness, *others)
 
 
-def test_force_is_that_of_a_spring_at_the_mean_gap():
-    stiffness, gap, yields = 50e3, 2.5e-3, 5e-6
-    force = law(stiffness, gap, 1e-3, 0.0, yields, 1e-5, 0.0)
-    assert force == pytest.approx(stiffness * (gap - yields * force))
-
-
-def test_damper_adds_its_rate():
-    force = law(50e3, 2.5e-3, 1e-3, 1e4, 0.0, 0.0, 0.0)
-    assert force == pytest.approx(50e3 * 2.5e-3 + 1e4 * 1e-3)
-
-
-def test_spring_and_damper_give_way_to_the_force_each_by_its_own():
-    stiffness, gap, change, damping, yields, compliance = 30e3, 2.5e-3, 1e-3, 4e4, 4e-6, 1e-5
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "yields", "compliance"),
+    [(50e3, 0.0, 5e-6, 1e-5), (50e3, 1e4, 0.0, 0.0), (30e3, 4e4, 4e-6, 1e-5)],
+)
+def test_spring_at_the_mean_gap_and_damper_give_way_to_the_force(stiffness, damping, yields, compliance):
+    gap, change = 2.5e-3, 1e-3
     force = law(stiffness, gap, change, damping, yields, compliance, 0.0)
     spring, damper = stiffness * (gap - yields * force), damping * (change - compliance * force)
     assert force == pytest.approx(spring + damper)
@@ -69,11 +60,6 @@ def test_mass_bouncing_on_a_spring_matches_scipy_and_keeps_its_energy():
     assert max(energy) / min(energy) - 1 < 0.02
 
 
-@kernel
-def sine_and_cosine(turns):
-    return sine_of_turns(turns), cosine_of_turns(turns)
-
-
 def test_cubics_are_interpolated_exactly():
     positions, spacing = np.random.default_rng(0).uniform(1, 9, 50), 0.25
     nodes = spacing * np.arange(60)
@@ -85,13 +71,16 @@ def test_cubics_are_interpolated_exactly():
     assert ((between >= 1) & (between < 2)).all()
 
 
-@pytest.mark.parametrize("name", ["sine", "cosine"])
-def test_turns_are_numpy_s(name):
-    theirs = {"sine": np.sin, "cosine": np.cos}[name]
+@kernel
+def sine_and_cosine(turns):
+    return sine_of_turns(turns), cosine_of_turns(turns)
+
+
+def test_turns_are_numpy_s():
     turns = np.random.default_rng(0).uniform(-3, 50, 200)
-    assert [sine_and_cosine(each)[name == "cosine"] for each in turns] == pytest.approx(
-        theirs(2 * np.pi * turns), abs=1e-13
-    )
+    sines, cosines = np.transpose([sine_and_cosine(each) for each in turns])
+    assert sines == pytest.approx(np.sin(2 * np.pi * turns), abs=1e-13)
+    assert cosines == pytest.approx(np.cos(2 * np.pi * turns), abs=1e-13)
 
 
 @pytest.mark.parametrize("x", [40.17, 40.5])

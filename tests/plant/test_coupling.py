@@ -15,28 +15,22 @@ from ..finite_element import simulation as finite_element
 from ..finite_element.figures import figures as figures_of
 
 LINE, PANTOGRAPH = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
-HEAVY = LINE.model_copy(
-    update={
-        "name": "heavy clamps",
-        "droppers": LINE.droppers.model_copy(update={"contact_clamp_mass": 3.0, "messenger_clamp_mass": 3.0}),
-    }
-)
+CLAMPS = LINE.droppers.model_copy(update={"contact_clamp_mass": 3.0, "messenger_clamp_mass": 3.0})
+HEAVY = LINE.model_copy(update={"name": "heavy clamps", "droppers": CLAMPS})
 
 
 def stiff(stiffness, damping=0.0):
     return PANTOGRAPH.model_copy(update={"contact_stiffness": stiffness, "contact_damping": damping})
 
 
-@pytest.mark.parametrize(("dx", "step"), [(0.375, 2e-3), (0.25, 1e-3), (0.125, 2.5e-4)])
+@pytest.mark.parametrize(("dx", "step"), [(0.375, 2e-3), (0.125, 2.5e-4)])
 def test_the_stiffest_explicit_contact_is_that_of_the_eigenvalues(dx, step):
     """The largest of k dt^2 W' (4 M - dt^2 K)^-1 W over places between two nodes, on 400 nodes of a ring."""
     wire, size = LINE.contact_wire, 400
-    beta, stiffness = LINE.damping.beta, np.zeros((size, size))
+    beta, stiffness, one = LINE.damping.beta, np.zeros((size, size)), np.eye(size)
     for shift, weight in enumerate(stencil_weights(wire, dx, step, beta), start=1):
-        stiffness += weight * (
-            2 * np.eye(size) - np.roll(np.eye(size), shift, 0) - np.roll(np.eye(size), -shift, 0)
-        )
-    room = 4 * np.eye(size) - stiffness * (1 + 2 * beta / step)
+        stiffness += weight * (2 * one - np.roll(one, shift, 0) - np.roll(one, -shift, 0))
+    room = 4 * one - stiffness * (1 + 2 * beta / step)
     first, weights = stencil(100 * dx + np.linspace(0, dx, 50), dx)
     forces = np.zeros((size, 50))
     forces[first[:, None] + np.arange(4), np.arange(50)[:, None]] = weights
@@ -44,23 +38,14 @@ def test_the_stiffest_explicit_contact_is_that_of_the_eigenvalues(dx, step):
     largest *= step**2 / (wire.mass * dx)
     assert point_gain(wire, dx, step, beta) == pytest.approx(largest, rel=0.01)
     # There the leapfrog with this contact has an eigenvalue of 4 / dt^2, and its fastest motion grows.
-    touched = stiffness * (1 + 2 * beta / step)
-    touched += (
-        step**2 / (wire.mass * dx) / point_gain(wire, dx, step, beta) * np.outer(forces[:, -1], forces[:, -1])
-    )
-    assert eigvalsh(touched).max() <= 4 * 1.001
+    pushed = step**2 / (wire.mass * dx) / point_gain(wire, dx, step, beta) * np.outer(*forces[:, [-1, -1]].T)
+    assert eigvalsh(stiffness * (1 + 2 * beta / step) + pushed).max() <= 4 * 1.001
 
 
 def test_the_stiffest_explicit_contact_of_modes_is_that_of_one_step_after_another():
     """On a grid of time: the free motion of all modes and a contact that reads them at mid-step."""
-    line = ThreeSpan(
-        load_catenary("ohl-three-span"),
-        lanes=1,
-        collectors=1,
-        spans=5,
-        numerics=Numerics(time_step=1e-2),
-        runs=Runs(),
-    )
+    given = {"numerics": Numerics(time_step=1e-2), "runs": Runs()}
+    line = ThreeSpan(load_catenary("ohl-three-span"), lanes=1, collectors=1, spans=5, **given)
     parts, limit = line.line, 1 / line.contact_gain
     shape = max(parts.shape, key=lambda row: row @ row)
     growth = {}
@@ -82,13 +67,12 @@ FINE = {"spacing": 0.125, "time_step": 2.5e-4}
 @pytest.mark.parametrize(
     ("catenary", "pantograph", "speed"),
     [
-        ("en50318-2002", stiff(200e3), 300),
         ("en50318-2002", stiff(500e3), 300),
         ("en50318-2002", stiff(50e3, 1000.0), 300),
         ("re330", stiff(200e3), 350),
         (HEAVY, PANTOGRAPH, 300),
     ],
-    ids=["200 kN/m", "500 kN/m", "1000 N s/m", "re330", "clamps of 3 kg"],
+    ids=["500 kN/m", "1000 N s/m", "re330", "clamps of 3 kg"],
 )
 def test_a_stiff_contact_loses_no_contact_by_grid_or_step(catenary, pantograph, speed, accuracy):
     """Contact loss was 29 % at 200 kN/m on the grid of before, 4 % at 1000 N s/m; clamps of 3 kg diverged."""
@@ -101,11 +85,13 @@ def test_a_stiff_contact_loses_no_contact_by_grid_or_step(catenary, pantograph, 
 
 
 @pytest.mark.filterwarnings("ignore:A grid of")
-@pytest.mark.parametrize("stiffness", [50e3, 1e6])
-@pytest.mark.parametrize("settings", [{"accuracy": "fast"}, {"time_step": 5e-3}, {}], ids=str)
+@pytest.mark.parametrize(
+    ("stiffness", "settings"), [(50e3, {"time_step": 5e-3}), (1e6, {"accuracy": "fast"}), (1e6, {})]
+)
 def test_a_contact_that_may_pull_never_grows(stiffness, settings):
-    run = simulate("en50318-2002", stiff(stiffness), 300, bilateral=True, record_droppers=False, **settings)
-    assert run.summary((4, 9)).std < 60.0
+    given = {"bilateral": True, "record_droppers": False, "distance": 450.0} | settings
+    run = simulate("en50318-2002", stiff(stiffness), 300, **given)
+    assert run.summary((4, 6)).std < 60.0
     assert np.abs(run.contact_force).max() < 600.0
 
 

@@ -28,6 +28,7 @@ def test_every_output_in_a_window_is_that_of_the_whole_line(name):
     )
 
 
+@pytest.mark.slow
 def test_a_long_pass_on_a_stitched_line_has_no_forces_of_its_own_ahead():
     """Waves ahead of the train grow on the way; 314 N stood there where the whole line has 16 N."""
     found = differences(*CASES["stitched, EAC-350"], last=36)

@@ -32,11 +32,8 @@ def scaled(data, factors):
         place = table
         for group in groups:
             place = place[group]
-        place[key] = (
-            [factor * each for each in place[key]]
-            if isinstance(place[key], list | tuple)
-            else factor * place[key]
-        )
+        many = isinstance(place[key], list | tuple)
+        place[key] = [factor * each for each in place[key]] if many else factor * place[key]
     return type(data).model_validate(table)
 
 
@@ -61,11 +58,8 @@ PANTOGRAPH_FACTORS = {
 
 def factors(random, ranges):
     """Of a third of the values."""
-    return {
-        name: float(np.exp(random.uniform(*np.log(ends))))
-        for name, ends in ranges.items()
-        if random.random() < 1 / 3
-    }
+    chosen = (each for each in ranges.items() if random.random() < 1 / 3)
+    return {name: float(np.exp(random.uniform(*np.log(ends)))) for name, ends in chosen}
 
 
 def case_of(seed):
@@ -124,10 +118,8 @@ def sequence_of(random):
     """Of a third of the lines, spans that differ: lengths over the line's own, and contact heights (m)."""
     if random.random() > 1 / 3:
         return ()
-    lengths, steps = (
-        random.uniform(0.5, 1.2, SPANS),
-        random.choice([0.0, 5e-3, 0.03]) * random.normal(size=SPANS),
-    )
+    lengths = random.uniform(0.5, 1.2, SPANS)
+    steps = random.choice([0.0, 5e-3, 0.03]) * random.normal(size=SPANS)
     return tuple(zip(lengths.tolist(), np.append(0.0, np.cumsum(steps)[:-1]).tolist(), strict=True))
 
 
@@ -143,28 +135,19 @@ def made(case):
             del table["spans"]
         line = type(line).model_validate(table | {"stitch_wire": stitch})
     if case["sequence"]:
-        spans = [
-            {"span_length": length * line.span_length, "contact_height": height}
-            for length, height in case["sequence"]
-        ]
+        own = line.span_length
+        spans = [{"span_length": own * x, "contact_height": height} for x, height in case["sequence"]]
         table = line.model_dump(exclude={"sources", "spans"}, exclude_none=True)
         line = type(line).model_validate(table | {"sequence": spans})
     return line, pantograph
 
 
 def place_in(line, spans, at_overlap):
-    """Spans of the same number that begin with an overlap, or else with a bridge's ramp."""
-    if at_overlap and line.overlaps:
-        first = max(line.overlaps[0].first_span, spans[0])
-        return first, first + spans[1] - spans[0]
-    return bridge_in(line, spans)
-
-
-def bridge_in(line, spans):
-    """Spans of the same number that begin with the first ramp of a bridge, or those given."""
-    heights = np.flatnonzero(line.contact_heights)
-    first = max(spans[0], int(heights[0])) if heights.size else spans[0]
-    return (first, first + spans[1] - spans[0]) if first < line.spans - 4 else spans
+    """Spans of the same number that begin with an overlap, or else with a bridge's first ramp, if any."""
+    overlap, heights = at_overlap and line.overlaps, np.flatnonzero(line.contact_heights)
+    first = line.overlaps[0].first_span if overlap else int(heights[0]) if heights.size else 0
+    first = max(first, spans[0])
+    return (first, first + spans[1] - spans[0]) if overlap or first < line.spans - 4 else spans
 
 
 def stretch(run, line):
@@ -177,11 +160,8 @@ def momentum(run, pantograph, line):
     """What is left of the balance of the whole pantograph's forces, as a mean force (N), and what may be."""
     duration = run.time_step * len(run.time)
     spring, damper = pantograph.stiffnesses[-1], pantograph.dampings[-1]
-    lift = (
-        run.nominal_force
-        - spring * stretch(run, line).mean()
-        - damper * (run.frame[-1] - run.frame[0]) / duration
-    )
+    lift = run.nominal_force - spring * stretch(run, line).mean()
+    lift -= damper * (run.frame[-1] - run.frame[0]) / duration
     swing = sum(pantograph.masses) * max(np.abs(run.head_velocity).max(), np.abs(run.frame_velocity).max())
     return lift - run.contact_force.mean(), 2 * swing / duration
 

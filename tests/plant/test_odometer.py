@@ -14,12 +14,15 @@ from ..lanes import check_lanes_are_singles
 
 NAME = "panto_env:PantographStiffness-v0"
 SPAN, SPEED = 50.0, 200 / 3.6
+"""Of the environment's line (m), and of the runs (m/s)."""
+PLACES = ("sine of span position", "cosine of span position")
 
 
 def runs(sensors, seeds=1, distance=600.0, **settings):
     """True positions (m), errors of the position read (m) and of the speed (m/s) of an episode per seed."""
     env = gymnasium.make(NAME, sensors=sensors, speed_kmh=200.0, distance=distance, **settings).unwrapped
-    layout, span = env.context.layout, env.context.alignment.mean_length
+    layout = env.context.layout
+    assert env.context.alignment.mean_length == SPAN
     for seed in range(seeds):
         seen, info = env.reset(seed=seed)
         told, ended = [(info["position"], seen)], False
@@ -29,66 +32,49 @@ def runs(sensors, seeds=1, distance=600.0, **settings):
             ended = any(ends)
         position = np.array([each for each, _ in told])
         sine, cosine, speed = (
-            np.array([layout.read(seen, name) for _, seen in told])
-            for name in ("sine of span position", "cosine of span position", "speed")
+            np.array([layout.read(seen, name) for _, seen in told]) for name in (*PLACES, "speed")
         )
-        turns = np.arctan2(sine, cosine) / (2 * np.pi) - position / span
-        yield position, span * (turns - np.round(turns)), speed - SPEED
-
-
-def span_length():
-    return gymnasium.make(NAME).unwrapped.context.alignment.mean_length
+        turns = np.arctan2(sine, cosine) / (2 * np.pi) - position / SPAN
+        yield position, SPAN * (turns - np.round(turns)), speed - SPEED
 
 
 def test_a_wrong_wheel_makes_a_saw_tooth_and_a_wrong_speed():
     """Of one slope along the run, zero at every mast; the slope is the share by which speed is wrong."""
-    span, scales = span_length(), []
-    for position, error, speed in runs("ideal:odometer_scale=0.02", seeds=60, distance=160.0):
+    scales = []
+    for position, error, speed in runs("ideal:odometer_scale=0.02", seeds=60, distance=80.0):
         scale = speed[1] / SPEED
         np.testing.assert_allclose(speed, scale * SPEED, atol=2e-5)
-        np.testing.assert_allclose(error, scale * (position % span), atol=2e-5)
+        np.testing.assert_allclose(error, scale * (position % SPAN), atol=2e-5)
         scales.append(scale)
     assert np.std(scales) == pytest.approx(0.02, rel=0.25)
     assert abs(np.mean(scales)) < 4 * 0.02 / 60**0.5
 
 
-@pytest.mark.plain
-@pytest.mark.parametrize(("sensors", "told"), [("blind", 0.0), ("realistic", 1.0)])
-def test_blind_sensors_do_not_tell_the_place(sensors, told):
-    """Sine and cosine of the place are zero, and else of a point on the unit circle."""
-    env = gymnasium.make(NAME, sensors=sensors, distance=60.0).unwrapped
-    layout, (seen, _) = env.context.layout, env.reset(seed=0)
-    for _ in range(20):
-        sine, cosine = (layout.read(seen, f"{name} of span position") for name in ("sine", "cosine"))
-        assert sine**2 + cosine**2 == pytest.approx(told, abs=1e-6)
-        seen = env.step(np.zeros(1))[0]
-
-
 def test_a_mast_is_detected_with_an_error_that_lasts_until_the_next():
-    span, jitter = span_length(), []
-    for position, error, speed in runs("ideal:mast_jitter=0.3", seeds=20, distance=1000.0):
-        number = np.floor(position / span).astype(int)
+    jitter = []
+    for position, error, speed in runs("ideal:mast_jitter=0.3", seeds=10, distance=1000.0):
+        number = np.floor(position / SPAN).astype(int)
         for mast in range(number.max() + 1):
             errors = error[number == mast]
             np.testing.assert_allclose(errors, errors[0], atol=2e-5)
             jitter.append(errors[0])
         np.testing.assert_allclose(speed, 0.0, atol=2e-5)
     assert np.std(jitter) == pytest.approx(0.3, rel=0.15)
-    assert abs(np.corrcoef(jitter[1:], jitter[:-1])[0, 1]) < 0.2
+    assert abs(np.corrcoef(jitter[1:], jitter[:-1])[0, 1]) < 0.25
 
 
 def test_slip_is_a_random_walk_from_mast_to_mast():
     """Its variance grows with the way, and increments are independent."""
-    span, steps, ends = span_length(), [], []
-    for position, error, _ in runs("ideal:odometer_walk=1.0", seeds=12, distance=1000.0):
-        number = np.floor(position / span).astype(int)
+    steps, ends = [], []
+    for position, error, _ in runs("ideal:odometer_walk=1.0", seeds=8, distance=1000.0):
+        number = np.floor(position / SPAN).astype(int)
         for mast in range(1, number.max()):
             errors = error[number == mast]
             steps += list(np.diff(errors))
             ends.append(errors[-1])
     assert np.std(steps) == pytest.approx(np.sqrt(SPEED * 0.01 / 100.0), rel=0.05)
     assert abs(np.corrcoef(steps[1:], steps[:-1])[0, 1]) < 0.05
-    assert np.std(ends) == pytest.approx(np.sqrt(span / 100.0), rel=0.15)
+    assert np.std(ends) == pytest.approx(np.sqrt(SPAN / 100.0), rel=0.15)
 
 
 def test_noise_of_the_speed_is_on_the_speed_alone():
@@ -98,16 +84,18 @@ def test_noise_of_the_speed_is_on_the_speed_alone():
     assert abs(np.corrcoef(speed[1:], speed[:-1])[0, 1]) < 0.1
 
 
+@pytest.mark.plain
 def test_blind_sensors_read_no_position_and_all_else_as_realistic_ones():
+    """Sine and cosine of the place are zero, and else of a point on the unit circle."""
     envs = [gymnasium.make(NAME, sensors=sensors).unwrapped for sensors in ("realistic", "blind")]
     seen = [[env.reset(seed=4)[0]] for env in envs]
     for env, told in zip(envs, seen, strict=True):
         told += [env.step(np.zeros(1))[0] for _ in range(30)]
     realistic, blind = np.array(seen)
     layout = envs[0].context.layout
-    places = [layout.index(f"{name} of span position") for name in ("sine", "cosine")]
+    places = [layout.index(name) for name in PLACES]
     assert not blind[:, places].any()
-    assert realistic[:, places].any()
+    assert (realistic[:, places] ** 2).sum(axis=1) == pytest.approx(1.0, abs=1e-6)
     rest = np.delete(np.arange(len(layout.entries)), places)
     np.testing.assert_array_equal(realistic[:, rest], blind[:, rest])
 
@@ -121,8 +109,7 @@ def test_an_odometer_leaves_the_other_noise_and_the_motion_as_they_were():
     ]
     generators = [np.random.default_rng(5), np.random.default_rng(5)]
     layout = tasks[0].layout
-    changed = ["sine of span position", "cosine of span position", "speed"]
-    same = [k for k, entry in enumerate(layout.entries) if entry.name not in changed]
+    same = [k for k, entry in enumerate(layout.entries) if entry.name not in (*PLACES, "speed")]
     for _ in range(3):
         for task, random in zip(tasks, generators, strict=True):
             task.reset(0, random)
@@ -144,11 +131,9 @@ def test_each_episode_has_another_wheel():
     assert len(speeds) == 5
 
 
-@pytest.mark.parametrize("name", ["panto_env:Pantograph-v0", NAME])
-@pytest.mark.parametrize("drift", [0.0, 4.0])
-def test_lanes_have_odometers_of_their_own_as_single_environments_do(name, drift):
-    settings = {"sensors": "realistic", "distance": 25.0, "run_in": 1.5, "speed_drift": drift, "settle": 0.0}
-    assert check_lanes_are_singles(name, settings, steps=130).ends >= 8
+def test_lanes_have_odometers_of_their_own_as_single_environments_do():
+    settings = {"sensors": "realistic", "distance": 25.0, "run_in": 1.5, "speed_drift": 4.0, "settle": 0.0}
+    assert check_lanes_are_singles(NAME, settings, steps=130).ends >= 8
 
 
 def test_a_copy_goes_on_as_the_original():

@@ -36,7 +36,7 @@ def column(env, observations, name):
     return np.array([env.context.layout.read(observation, name) for observation in observations])
 
 
-@pytest.mark.parametrize("age", [0, 1, 4, 8, 9, 10, 11, 25, 30, 3.25, 8.6, 9.75, 12.5])
+@pytest.mark.parametrize("age", [0, 1, 9, 10, 25, 30, 3.25, 9.75, 12.5])
 def test_reading_is_as_old_as_the_delay(age):
     """Of so many time steps and half a one, as a sample is a mean over its step: shorter than a control step
     of 10 ms, as long, longer, and between two samples."""
@@ -78,10 +78,9 @@ def test_only_readings_are_late():
         ("velocity_noise", 2e-2, {"head velocity", "frame velocity"}),
     ],
 )
-@pytest.mark.parametrize("delay", [0.0, 0.013])
-def test_noise_is_of_its_size_independent_and_on_its_readings_alone(noise, rms, names, delay):
-    quiet = make(sensors={"delay": delay})
-    noisy = make(sensors={noise: rms, "delay": delay})
+def test_noise_is_of_its_size_independent_and_on_its_readings_alone(noise, rms, names):
+    quiet = make(sensors={"delay": 0.013})
+    noisy = make(sensors={noise: rms, "delay": 0.013})
     first, second = observe(quiet, 200), observe(noisy, 200)
     errors = {}
     for entry in quiet.context.layout.entries:

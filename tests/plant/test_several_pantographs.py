@@ -12,7 +12,7 @@ from panto_env.plant.catenary.flexible.near import near_droppers
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
 from panto_env.plant.state import Row
-from panto_env.plant.train import MOST_COLLECTORS, Train
+from panto_env.plant.train import Train
 
 from ..finite_element.sections import sections
 from ..marks import some_at_once
@@ -40,20 +40,12 @@ def forces(rows, collector=0, lane=0):
 
 def part(pantograph, share):
     """A pantograph with a share of everything, its contact spring included."""
-    stiffness = 50e3 if pantograph.contact_stiffness == "rigid" else pantograph.contact_stiffness
     shared = {
         name: tuple(share * value for value in getattr(pantograph, name))
         for name in ("masses", "stiffnesses", "dampings")
     }
-    return pantograph.model_copy(
-        update={
-            **shared,
-            "contact_stiffness": share * stiffness,
-            "contact_damping": share * pantograph.contact_damping,
-            "static_force": share * pantograph.static_force,
-            "aerodynamic_coefficient": share * pantograph.aerodynamic_coefficient,
-        }
-    )
+    names = ("contact_stiffness", "contact_damping", "static_force", "aerodynamic_coefficient")
+    return pantograph.model_copy(update=shared | {name: share * getattr(pantograph, name) for name in names})
 
 
 @pytest.mark.parametrize("name", some_at_once(["en50318-2002", "overlap-2002"], ["en50318-2002"]))
@@ -63,11 +55,12 @@ def test_parts_of_a_pantograph_at_one_place_are_the_pantograph(name, monkeypatch
     exact = lambda *given: (near := near_droppers(*given))._replace(own=np.zeros_like(near.own))  # noqa: E731
     monkeypatch.setattr(build, "near_droppers", exact)
     line = sections()[name].line if name == "overlap-2002" else load_catenary(name)
-    metres, spans = min(600.0, line.alignment().length - 60), line.spans if line.sequence else 14
-    _, whole = run(Train.of(part(ONE, 1.0)), metres, line=line, spans=spans, precision="double")
+    metres = line.alignment().length - 60 if line.sequence else 200.0
+    given = {"metres": metres, "line": line, "spans": line.spans if line.sequence else 6}
+    _, whole = run(Train.of(part(ONE, 1.0)), **given, precision="double")
     shares = (0.3, 0.7)
     parts = Train.of(*(part(ONE, share) for share in shares), distances=[0.0])
-    _, rows = run(parts, metres, line=line, spans=spans, precision="double")
+    _, rows = run(parts, **given, precision="double")
     assert forces(whole).std() > 10
     for collector, share in enumerate(shares):
         np.testing.assert_allclose(forces(rows, collector), share * forces(whole), atol=1e-6)
@@ -75,24 +68,25 @@ def test_parts_of_a_pantograph_at_one_place_are_the_pantograph(name, monkeypatch
 
 def test_two_at_one_place_may_be_named_in_either_order():
     train = [Train.of(*pair, distances=[0.0]) for pair in ((ONE, OTHER), (OTHER, ONE))]
-    rows = [run(each, 400.0, spans=12, precision="double")[1] for each in train]
+    rows = [run(each, 150.0, spans=5, precision="double")[1] for each in train]
     assert np.abs(forces(rows[0], 0) - forces(rows[0], 1)).max() > 5
     for collector in (0, 1):
         np.testing.assert_allclose(forces(rows[0], collector), forces(rows[1], 1 - collector), atol=1e-6)
 
 
-@pytest.mark.parametrize("distance", [35.0, 150.0])
-def test_one_that_never_touches_changes_no_bit_of_the_other(distance):
-    alone = run(Train.of(ONE), 700.0, spans=14, train_length=distance)[1]
+def test_one_that_never_touches_changes_no_bit_of_the_other():
+    distance = 35.0
+    alone = run(Train.of(ONE), 300.0, spans=8, train_length=distance)[1]
     released = OTHER.static_force - OTHER.nominal_force(SPEED) - 50.0
     static_forces = np.array([[ONE.static_force], [released]])
     train = Train.of(ONE, OTHER, distances=[distance])
-    both = run(train, 700.0, spans=14, static_forces=static_forces)[1]
+    both = run(train, 300.0, spans=8, static_forces=static_forces)[1]
     assert not forces(both, 1).any()
     assert forces(alone).std() > 10
     np.testing.assert_array_equal(forces(both, 0), forces(alone))
 
 
+@pytest.mark.slow
 def test_far_behind_on_a_line_that_damps_its_waves_it_is_the_only_one():
     """With the line's real damping it is not: 840 m behind sigma is half as large again."""
 
@@ -132,8 +126,8 @@ def test_it_waits_at_rest_until_it_comes_onto_the_line():
 
 def test_lanes_of_trains_are_bit_for_bit_the_single_train():
     train = Train.of(ONE, OTHER, ONE, distances=[50.0, 120.0])
-    alone, lanes = (run(train, 500.0, spans=14, lanes=count)[1] for count in (1, 3))
-    for lane in range(3):
+    alone, lanes = (run(train, 200.0, spans=6, lanes=count)[1] for count in (1, 2))
+    for lane in range(2):
         np.testing.assert_array_equal(lanes[lane], alone[0])
 
 
@@ -143,19 +137,16 @@ def test_pantographs_of_different_kinds_keep_their_own_equations():
     assert len(three.masses) != len(ONE.masses)
     line = LINE.model_copy(update={"damping": LINE.damping.model_copy(update={"alpha": 4.0})})
     for first, second in ((ONE, three), (three, ONE)):
-        distance = 480.0
-        _, both = run(Train.of(first, second, distances=[distance]), 900.0, line=line, spans=24)
-        plant, alone = run(Train.of(second), 900.0 - distance, line=line, spans=24, train_length=distance)
+        distance, way = 480.0, 200.0
+        _, both = run(Train.of(first, second, distances=[distance]), distance + way, line=line, spans=16)
+        plant, alone = run(Train.of(second), way, line=line, spans=16, train_length=distance)
         own = forces(both, 1)[-len(forces(alone)) :]
-        behind = plant.position(0, len(forces(alone)))[0]
-        assert behind == pytest.approx(900.0 - distance, abs=0.2)
+        assert plant.position(0, len(forces(alone)))[0] == pytest.approx(way, abs=0.2)
         assert abs(own.mean() - forces(alone).mean()) < 0.5
         assert abs(own.std() - forces(alone).std()) < 0.5
 
 
-def test_trains_that_cannot_be_are_refused_in_a_sentence():
-    with pytest.raises(InputError, match=f"1 to {MOST_COLLECTORS} pantographs, not 5"):
-        Train.of(*[ONE] * 5, distances=[10, 20, 30, 40])
+def test_a_line_without_waves_carries_one_pantograph():
     massless = load_catenary("periodic-stiffness")
     with pytest.raises(InputError, match=r"need a flexible catenary.*'periodic-stiffness' is neither"):
         Plant(massless, Train.of(ONE, ONE, distances=[50.0]))

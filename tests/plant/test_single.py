@@ -15,8 +15,7 @@ from panto_env.analysis.line_check import spans_at_rest
 from panto_env.backend import kernel
 from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.plant.catenary.protocol import advance_wire, apply_force, look_at_contact, place_contact
-from panto_env.plant.catenary.single import Single
-from panto_env.plant.catenary.single.resolution import spacing
+from panto_env.plant.catenary.single import Single, spacing
 from panto_env.plant.numerics import Numerics, Runs
 
 from ..finite_element import hermite
@@ -71,7 +70,7 @@ def at_rest(model, x):
     return np.interp(x, view.x, view.contact)
 
 
-@pytest.mark.parametrize("length", [8.0, 10.0, 12.0])
+@pytest.mark.parametrize("length", [8.0, 12.0])
 def test_a_rail_sags_as_a_beam_that_cannot_turn_at_its_supports(length):
     model = built(changed(RAIL, span_length=length), spans=20)
     wire = RAIL.contact_wire
@@ -104,14 +103,10 @@ def frequency(data, span):
     return 0.5 * (len(exact) - 1) / (line.time_step * (exact[-1] - exact[0]))
 
 
-@pytest.mark.parametrize("length", [8.0, 10.0, 12.0])
-def test_a_rail_swings_at_a_beam_s_frequency(length):
-    wire, rail = RAIL.contact_wire, changed(RAIL, span_length=length, **HARD)
+def test_a_rail_swings_at_a_beam_s_frequency_and_a_wire_at_a_string_s():
+    wire, length = RAIL.contact_wire, 8.0
     expected = np.pi / (2 * length**2) * np.sqrt(wire.bending_stiffness / wire.mass)
-    assert frequency(rail, length) == pytest.approx(expected, rel=1e-3)
-
-
-def test_a_wire_swings_at_a_string_s_frequency():
+    assert frequency(changed(RAIL, span_length=length, **HARD), length) == pytest.approx(expected, rel=1e-3)
     string = changed(TRAM, contact_wire__bending_stiffness=0.0, **HARD)
     assert frequency(string, 30.0) == pytest.approx(string.wave_speed / 60, rel=1e-3)
 
@@ -121,7 +116,7 @@ def test_a_wire_swings_at_a_string_s_frequency():
 def test_a_moving_force_s_work_is_the_energy_gained(data, step):
     """By matrices of the judge's: of wire and supports, to rounding, however long the step."""
     model = built(changed(data, **UNDAMPED), time_step=step, spacing=data.span_length / 16)
-    count = round(6.0 * data.span_length / (20.0 * step))
+    count = round(3.0 * data.span_length / (20.0 * step))
     heights, work = np.zeros((2, count))
     travel(model.line, model.wire, data.span_length, 20.0 * step, 100.0, heights, work)
     nodes = np.linspace(0, model.length, model.wire.moved.shape[1])
@@ -167,10 +162,6 @@ def test_elasticity_is_by_the_judge_s_matrices(data):
     assert 1 / mean_of_single(data).spring == pytest.approx(np.mean(yields), rel=0.07)
 
 
-def whole_pass(data, pantograph, speed, **settings):
-    return simulate(data, pantograph, speed, spans=24, window=0, **settings)
-
-
 def measures(run, first, last):
     own = run.summary((first, last))
     return [own.std, own.max, own.min]
@@ -178,7 +169,6 @@ def measures(run, first, last):
 
 BY_THE_JUDGE = {
     "rail": (RAIL, "dsa380", 120.0, 24, 1.25),
-    "rail-8": (load_catenary("rail-8"), "dsa380", 100.0, 24, 1.0),
     "tram": (TRAM, "own-tram", 50.0, 8, 0.5),
     "unlike spans": (
         changed(RAIL, span_lengths=[10.0, 8.0, 12.0, 9.0, 11.0] * 3, spans=15), "dsa380", 110.0, 15, 1.0
@@ -202,8 +192,7 @@ def test_figures_are_those_of_finite_elements(name):
 # those with which we disagree.
 OF_ANOTHER = {
     **{f"rail, {v} km/h": (RAIL, "dsa380", v, s) for v, s in
-       ((60, 4.11), (80, 8.37), (100, 11.80), (120, 14.08), (140, 12.04), (160, 13.00))},
-    "rail of 12 m, 80 km/h": (changed(RAIL, span_length=12.0), "dsa380", 80, 13.19),
+       ((60, 4.11), (100, 11.80), (120, 14.08), (160, 13.00))},
     "rail of 12 m, 120 km/h": (changed(RAIL, span_length=12.0), "dsa380", 120, 20.92),
     "rail on hard supports": (changed(RAIL, support__stiffness=1e7), "dsa380", 120, 17.48),
     "tram, 50 km/h": (TRAM, "own-tram", 50, 12.20),
@@ -216,7 +205,7 @@ OF_ANOTHER = {
 @pytest.mark.parametrize("name", OF_ANOTHER)
 def test_sigma_is_another_code_s_within_three_percent(name):
     data, pantograph, speed, sigma = OF_ANOTHER[name]
-    run = whole_pass(data, pantograph, float(speed))
+    run = simulate(data, pantograph, float(speed), spans=24, window=0)
     assert run.summary((13, 21)).std == pytest.approx(sigma, rel=0.03)
     if data == TRAM:
         largest, smallest = {50: (155.0, 75.2), 70: (175.9, 50.4)}[speed]
@@ -228,7 +217,7 @@ def test_sigma_is_another_code_s_within_three_percent(name):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("data", "pantograph", "speed"),
-    [(RAIL, "dsa380", 140.0), (TRAM, "own-tram", 30.0), (TRAM, "own-tram", 70.0)],
+    [(RAIL, "dsa380", 140.0), (TRAM, "own-tram", 70.0)],
 )
 def test_figures_have_converged(data, pantograph, speed):
     usual = simulate(data, pantograph, speed, spans=24)
@@ -240,7 +229,7 @@ def test_figures_have_converged(data, pantograph, speed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed", [80.0, 140.0, 160.0])
+@pytest.mark.parametrize("speed", [80.0, 160.0])
 def test_a_window_gives_the_figures_of_a_line_without_ends(speed):
     """On a rail waves run far; 150 to 200 spans from the start those of the start have died out."""
     settings = {"spans": 320, "distance": 2050.0}
@@ -251,36 +240,19 @@ def test_a_window_gives_the_figures_of_a_line_without_ends(speed):
 
 def test_where_bending_counts_by_a_hair_figures_are_the_same():
     """Two lines on either side of the rule for the wave speed differ in their damping layers."""
-    light = {"contact_wire__bending_stiffness": 200.0, "spans": 40}
+    light = {"contact_wire__bending_stiffness": 200.0, "spans": 30}
     tension = 200.0 * (np.pi / 10.0) ** 2 / 0.01
     runs = []
     for share in (0.999, 1.001):
         own = changed(RAIL, contact_wire__tension=share * tension, **light, contact_wire__mass=1.07)
         assert np.isfinite(own.wave_speed) == (share > 1)
-        runs.append(simulate(own, "own-tram", 60.0).summary((15, 30)).std)
+        runs.append(simulate(own, "own-tram", 60.0, distance=250.0).summary((15, 24)).std)
     assert runs[0] == pytest.approx(runs[1], rel=0.01)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:Line 'en50318-2002'")  # of its stiff droppers
-@pytest.mark.parametrize(("speed", "apart"), [(50.0, 0.04), (70.0, 0.02)])
-def test_a_flexible_line_hung_at_its_supports_alone_is_nearly_a_single_wire(speed, apart):
-    """Its messenger stands still; droppers 0.25 m from a support turn the contact wire there by half each."""
-    wire = TRAM.contact_wire.model_dump()
-    hung = changed(
-        load_catenary("en50318-2002"), span_length=30.0, spans=24, contact_wire=wire,
-        messenger_wire={"mass": 0.05, "tension": 200e3, "bending_stiffness": 100.0},
-        droppers={"positions": [0.25, 29.75], "sag": [0.0, 0.0], "stiffness": 1e7},
-        support={"stiffness": 1e7, "damping": 50.0}, damping={"alpha": 0.05, "beta": 1e-4},
-    )  # fmt: skip
-    alone = changed(TRAM, support__stiffness=1e7)
-    ours, theirs = (simulate(data, "own-tram", speed, spans=24).summary((13, 21)) for data in (alone, hung))
-    assert ours.std == pytest.approx(theirs.std, rel=apart)
 
 
 def test_spans_given_one_by_one_are_the_same_line_where_they_are_alike():
     one_by_one = changed(TRAM, span_lengths=[30.0] * 24)
-    runs = [simulate(data, "own-tram", 70.0, spans=24, distance=300.0) for data in (TRAM, one_by_one)]
+    runs = [simulate(data, "own-tram", 70.0, spans=24, distance=120.0) for data in (TRAM, one_by_one)]
     assert (runs[0].contact_force == runs[1].contact_force).all()
 
 
@@ -305,7 +277,7 @@ def test_a_second_pantograph_meets_the_waves_of_the_first():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["pd", "repetitive", "fb+ff", "agent-robust", "agent-any-pantograph"])
+@pytest.mark.parametrize("policy", ["repetitive", "fb+ff", "agent-robust", "agent-any-pantograph"])
 def test_policies_act_on_it(policy):
     given = {"speed_kmh": 50.0, "distance": 150.0, "policy": policy, "line_condition": "fair"}
     run = simulate("tram-30", "own-tram", **given)
@@ -314,13 +286,13 @@ def test_policies_act_on_it(policy):
 
 
 def test_lanes_of_an_environment_do_not_touch_each_other():
-    """Two of three have the same seed and commands; over 200 steps their windows travel."""
+    """Two of three have the same seed and commands."""
     settings = {"catenary": "rail-10", "pantograph": "dsa380", "speed_kmh": 120.0, "line_condition": "new"}
     lanes = gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=3, **settings)
     lanes.reset(seed=[5, 6, 5])
     command = np.zeros(lanes.action_space.shape, np.float32)
     command[[0, 2]] = 0.5
-    for _ in range(200):
+    for _ in range(60):
         seen, *_ = lanes.step(command)
     assert (seen[0] == seen[2]).all()
     assert (seen[0] != seen[1]).any()

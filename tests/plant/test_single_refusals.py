@@ -13,28 +13,19 @@ from panto_env.catalog.loader import text_of
 from ..command import panto
 from .test_single import RAIL, TRAM, changed
 
+OF_LINES = {
+    "broken_droppers=[(3, 1)]": "has no droppers, which broken_droppers is about: take",
+    "dropper_scatter=0.005": "has no droppers, which dropper_scatter is about: take",
+    "raised_supports=[(3, 0.01)]": "has no messenger wire, which raised_supports is about",
+    "lost_messenger_tension=0.1": "has no messenger wire, which lost_messenger_tension is about",
+    "lost_contact_tension=0.1": "change contact_wire.tension there",
+    "temperature=20": "change contact_wire.tension there",
+    "ice=0.5": "load of ice, which ice is about: raise contact_wire.mass",
+    "side_wind=20": "has no plan seen from above, which side_wind is about",
+    "worn_stretches=[(3, 1.0, 5.0, 0.2)]": "has no spots or stretches unlike the rest",
+}
 WORDS = [
-    (
-        {"line_condition": "new:broken_droppers=[(3, 1)]"},
-        "has no droppers, which broken_droppers is about: take",
-    ),
-    ({"line_condition": "as-built"}, "has no droppers, which dropper_scatter is about: take"),
-    (
-        {"line_condition": "new:raised_supports=[(3, 0.01)]"},
-        "has no messenger wire, which raised_supports is about",
-    ),
-    (
-        {"line_condition": "new:lost_messenger_tension=0.1"},
-        "has no messenger wire, which lost_messenger_tension is about",
-    ),
-    ({"line_condition": "new:lost_contact_tension=0.1"}, "change contact_wire.tension there"),
-    ({"line_condition": "new:temperature=20"}, "change contact_wire.tension there"),
-    ({"line_condition": "new:ice=0.5"}, "load of ice, which ice is about: raise contact_wire.mass"),
-    ({"line_condition": "new:side_wind=20"}, "has no plan seen from above, which side_wind is about"),
-    (
-        {"line_condition": "new:worn_stretches=[(3, 1.0, 5.0, 0.2)]"},
-        "has no spots or stretches unlike the rest",
-    ),
+    *(({"line_condition": f"new:{condition}"}, words) for condition, words in OF_LINES.items()),
     ({"speed_kmh": 400.0}, "below the wave speed of the contact wire, 348 km/h on line 'tram-30'"),
     ({"catenary": changed(RAIL, span_length=40.0)}, "would sag by 1.96 m in a span of 40 m"),
     ({"catenary": changed(TRAM, contact_wire__tension=2e3)}, "more tension or bending_stiffness"),

@@ -5,7 +5,7 @@ It depends on what the paper does not print: how many modes are kept, and what b
 `python -m tests.plant.test_three_span_projection` prints a table; docs/paper2.md has rows of it.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -14,20 +14,15 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from panto_env import simulate
 from panto_env.catalog import load_catenary, load_pantograph
-from tests.plant.test_three_span import Wire
+from tests.plant.test_three_span import Wire, equations
 
 SPEED_KMH, STEP, SPANS, SETTLED = 150.0, 2.5e-3, 9, 5
 """km/h; s between samples; spans that are solved; those that are left out at the start."""
 LINE, PANTOGRAPH = "ohl-three-span", "own-two-mass"
 
 
-@dataclass(frozen=True)
-class Reading:
-    """One way to find the initial conditions of the next span."""
-
-    modes: int
-    displacement: str
-    velocity: str
+Reading = namedtuple("Reading", "modes displacement velocity")
+"""One way to find the initial conditions of the next span."""
 
 
 def projections(wire):
@@ -46,26 +41,9 @@ def projections(wire):
 def forces_of(reading):
     """Contact force (N), (spans, samples), of Eqs 1 to 6 and the pantograph's equations."""
     line = load_catenary(LINE).model_copy(update={"modes": reading.modes})
-    pantograph, speed, span = load_pantograph(PANTOGRAPH), SPEED_KMH / 3.6, line.span_length
-    wire = Wire(line)
-    known, omega, n = projections(wire), wire.frequency, reading.modes
-    (m1, m2), (k1, k2), (c1, c2) = pantograph.masses, pantograph.stiffnesses, pantograph.dampings
-    contact, lift = pantograph.contact_stiffness, pantograph.static_force
-
-    def rates(time, state, covered):
-        q, rate, (z1, z2, v1, v2) = state[:n], state[n : 2 * n], state[2 * n :]
-        shape = wire.modes(span + speed * time - covered * span)  # Eq. 6, from the left end
-        force = max(contact * (z1 - shape @ q), 0.0)
-        inner = k1 * (z1 - z2) + c1 * (v1 - v2)
-        bend = shape * force - 2 * line.damping_ratio * omega * rate - omega**2 * q
-        return np.concatenate(
-            [rate, bend, [v1, v2, (-inner - force) / m1, (lift + inner - k2 * z2 - c2 * v2) / m2]]
-        )
-
-    yields = wire.modes(span) ** 2 @ omega**-2.0 + 1 / contact
-    heights = np.linalg.solve([[k1 + 1 / yields, -k1], [-k1, k1 + k2]], [0, lift])
-    rest = wire.modes(span) * omega**-2.0 * heights[0] / yields
-    state = np.concatenate([rest, np.zeros(n), heights, np.zeros(2)])
+    speed, span, n = SPEED_KMH / 3.6, line.span_length, reading.modes
+    wire, contact = Wire(line), load_pantograph(PANTOGRAPH).contact_stiffness
+    (rates, state), known = equations(line, wire, speed), projections(wire)
     period, forces = span / speed, []
     for covered in range(SPANS):
         time = covered * period + STEP * np.arange(round(period / STEP) + 1)
@@ -74,10 +52,8 @@ def forces_of(reading):
         wires = np.sum(wire.modes(places) * y[:n, :-1].T, axis=1)
         forces.append(np.maximum(contact * (y[2 * n, :-1] - wires), 0.0))
         state = y[:, -1].copy()
-        state[:n], state[n : 2 * n] = (
-            known[reading.displacement] @ state[:n],
-            known[reading.velocity] @ state[n : 2 * n],
-        )
+        state[:n] = known[reading.displacement] @ state[:n]
+        state[n : 2 * n] = known[reading.velocity] @ state[n : 2 * n]
     return np.array(forces)
 
 

@@ -52,9 +52,8 @@ def test_kernels_and_python_agree_on_where_a_collector_is_behind_the_first(drift
     plant.advance_passively(400, samples)
     x = plant.position(0, np.arange(400) + 0.5)
     line = plant.catenary
-    stiffness = line.mean_stiffness * (
-        1 + line.stiffness_variation * np.cos(2 * np.pi * plant.alignment.in_spans(x))
-    )
+    wave = np.cos(2 * np.pi * plant.alignment.in_spans(x))
+    stiffness = line.mean_stiffness * (1 + line.stiffness_variation * wave)
     force, height = samples.rows[0, 1:, 0, 0], samples.rows[0, 1:, 0, 3]
     touching = force > 0
     assert touching.mean() > 0.5

@@ -20,6 +20,7 @@ SIMPLE = {"catenary": EVEN, "speed_kmh": 200.0, "distance": 550.0}
 COARSE = ((100.0, 6.0), (150.0, 30.0), (260.0, 55.0), (500.0, 90.0))
 WINDY = {"wind": 12.0, "turbulence": 0.1}
 SHORT = {"tunnels": [{"begin": 0.0, "end": 50.0, "factor": 1.2}]}
+ACROSS = {"pantograph": "dsa250", "line_condition": {"side_wind": 9.0}}
 
 
 def own(**values):
@@ -47,15 +48,6 @@ def test_a_table_is_the_law_at_its_points_straight_between_and_nothing_at_rest()
     assert own(aerodynamic_linear=0.1).aerodynamic_uplift(100 / 3.6) == pytest.approx(10.0 + 9.7)
     from_rest = own(uplift_over_speed=[[0.0, 3.0], [100.0, 13.0]])
     assert from_rest.aerodynamic_uplift(np.array([0.0, 50 / 3.6])) == pytest.approx([3.0, 8.0])
-
-
-def test_a_fine_table_gives_the_law_s_forces_while_speed_and_wind_change():
-    settings = SIMPLE | {"speed_drift": 6.0, "line_condition": WINDY, "seed": 4}
-    law, table = (simulate(**settings, pantograph=each) for each in (LAW, tabled(range(0, 401))))
-    np.testing.assert_allclose(table.contact_force, law.contact_force, atol=2e-3)  # lambda h^2 / 8 and less
-    np.testing.assert_allclose(table.lift, law.lift, atol=2e-3)
-    assert table.static_force == pytest.approx(law.static_force, abs=1e-9)
-    assert np.ptp(law.contact_force) > 10
 
 
 @pytest.mark.parametrize(
@@ -87,9 +79,7 @@ def test_air_that_presses_down_leaves_less_to_the_wire():
     assert run.nominal_force == pytest.approx(expected)
     np.testing.assert_allclose(run.contact_force, share() * expected, rtol=1e-6)
     with pytest.raises(InputError, match="nothing presses"):
-        Task(run_settings(SIMPLE | {"pantograph": own(aerodynamic_coefficient=-0.01)})).reset(
-            0, np.random.default_rng(0)
-        )
+        simulate(**SIMPLE, pantograph=own(aerodynamic_coefficient=-0.01))
 
 
 @pytest.mark.parametrize("given", [{"uplift_over_speed": COARSE}, {"aerodynamic_coefficient": -0.0006}])
@@ -104,21 +94,6 @@ def test_the_static_force_is_trimmed_for_the_mean_whatever_air_does(given):
 def tunnels(*each, **settings):
     through = [dict(zip(("begin", "end", "factor"), tunnel, strict=True)) for tunnel in each]
     return SIMPLE | {"catenary": line({"tunnels": through}, like=EVEN), "pantograph": LAW} | settings
-
-
-def test_the_mean_of_a_pass_through_a_tunnel_is_that_of_the_way_in_it():
-    """The wire's mean force is the share of the mean lift: ramps at portals cancel, and swings die out."""
-    run = simulate(**tunnels((1000.0, 1600.0, 1.6), (2000.0, 2300.0, 0.5), distance=4000.0, spans=90))
-    uplift = LAW.aerodynamic_uplift(200 / 3.6)
-    more = uplift * (0.6 * 600 - 0.5 * 300) / 4000
-    assert np.mean(run.contact_force) == pytest.approx(share() * (run.nominal_force + more), rel=1e-4)
-    deep = (run.position > 1400) & (run.position < 1580)
-    np.testing.assert_allclose(
-        run.contact_force[deep], share() * (run.nominal_force + 0.6 * uplift), rtol=2e-3
-    )
-    portal = abs(run.position - 1000) < 12
-    assert np.abs(np.diff(run.contact_force[portal])).max() < 1.0  # eased, not a step of 23 N
-    assert run.nominal_force == run.lift[0] == LAW.nominal_force(200 / 3.6)  # those of the open line
 
 
 def test_in_a_tunnel_no_wind_blows_and_at_a_portal_it_sets_in():
@@ -171,20 +146,10 @@ def test_no_gust_exceeds_the_strongest_wind():
     ("message", "given"),
     [
         ("ends at 150 km/h, and the air comes with up to 200 km/h", {"pantograph": tabled((150,))}),
-        (
-            "ends at 220 km/h, and the air comes with up to ",
-            {"pantograph": tabled((220,)), "line_condition": {"wind": 5.0}},
-        ),
+        ("ends at 220 km/h, and", {"pantograph": tabled((220,)), "line_condition": {"wind": 5.0}}),
         ("ends at 210 km/h", {"pantograph": tabled((210,)), "speed_drift": 6.0}),
         ("nor is it in a tunnel", {"catenary": line(SHORT, like="rig"), "pantograph": "dsa380"}),
-        (
-            "in which no wind blows across",
-            {
-                "catenary": line(SHORT, like="re250"),
-                "pantograph": "dsa250",
-                "line_condition": {"side_wind": 9.0},
-            },
-        ),
+        ("in which no wind blows across", {"catenary": line(SHORT, like="re250"), **ACROSS}),
     ],
 )
 def test_what_is_not_known_is_refused(message, given):

@@ -54,11 +54,11 @@ def test_the_computer_computes_what_the_simulated_rig_does():
 @pytest.mark.parametrize("name", ["rig", "rig-flexible"])
 def test_a_run_can_be_repeated_and_ends_with_a_sentence(name):
     computer = RigComputer(name, SPEED, force=120.0, spans=3)
-    first = [computer.step(force(k)) for k in range(1500)]
+    first = [computer.step(force(k)) for k in range(500)]
     assert np.ptp(first) > 0.01
     computer.reset()
     assert computer.position == 0
-    assert [computer.step(force(k)) for k in range(1500)] == first
+    assert [computer.step(force(k)) for k in range(500)] == first
     computer.reset()
     with pytest.raises(InputError, match="at the end of the line"):
         step_often(computer, force, 4000)
@@ -69,7 +69,6 @@ def test_a_run_can_be_repeated_and_ends_with_a_sentence(name):
     ("arguments", "said"),
     [
         ((math.nan,), "the load cell's range"),
-        ((-math.inf,), "the load cell's range"),
         ((1200.0,), "range of ±1000 N, not at 1200 N"),
         ((120.0, math.nan), "displacement must be a number"),
     ],
@@ -99,12 +98,11 @@ def test_a_line_is_no_rig():
 
 def test_every_step_is_timed_and_the_late_ones_are_missed():
     computer = RigComputer("rig", SPEED, force=120.0)
-    with pytest.raises(
-        InputError, match=r"must run for \S+ s or longer, a step of its own, not for 1e-308 s\.$"
-    ):
+    words = r"must run for \S+ s or longer, a step of its own, not for 1e-308 s\.$"
+    with pytest.raises(InputError, match=words):
         against_the_clock(computer, 1e-308)
-    timing = against_the_clock(computer, 0.3)
-    assert len(timing.steps) == len(timing.late) == 300
+    timing = against_the_clock(computer, 0.05)
+    assert len(timing.steps) == len(timing.late) == 50
     assert (timing.steps > 0).all()
     assert (timing.late >= 0).all()
     made = Timing(1e-3, np.array([1e-5, 9e-4, 1.1e-3, 1e-5]), np.array([0, 2e-4, 0, 0.0]))
@@ -126,13 +124,10 @@ def test_margins_are_those_of_a_loop_known_in_closed_form():
     assert found.delay == pytest.approx((np.pi / 2) / gain - delay, rel=1e-3)
     assert found.frequency == pytest.approx(gain / (2 * np.pi), rel=1e-3)
     assert found.gain == pytest.approx(np.pi / (2 * delay) / gain, rel=1e-2)
-    stable = [
-        is_stable(k * np.exp(-s * delay) / s) for k in (0.95 * np.pi / 2 / delay, 1.05 * np.pi / 2 / delay)
-    ]
-    assert stable == [True, False]
-    assert threshold(lambda k: is_stable(k * np.exp(-s * delay) / s), 1000, 10) == pytest.approx(
-        np.pi / 2 / delay, rel=0.02
-    )
+    largest = np.pi / 2 / delay
+    assert [is_stable(k * largest * np.exp(-s * delay) / s) for k in (0.95, 1.05)] == [True, False]
+    found = threshold(lambda k: is_stable(k * np.exp(-s * delay) / s), 1000, 10)
+    assert found == pytest.approx(largest, rel=0.02)
 
 
 def test_the_pantograph_pushes_back_as_its_chain_of_masses_does():
@@ -156,7 +151,8 @@ def test_an_uncompensated_mass_is_in_the_loop():
 
 
 @pytest.mark.parametrize("name", ["rig", pytest.param("rig-flexible", marks=pytest.mark.slow)])
-def test_frequency_response_and_simulation_agree_on_the_delay_that_is_borne(name):
+def test_frequency_response_and_simulation_agree_on_the_delay_that_is_borne(name, monkeypatch):
+    monkeypatch.setattr(growth, "PLACES", 12)
     rig = load_catenary(name)
     delay = Loop(rig, PANTOGRAPH, SPEED).margins().delay
     assert 0.005 < delay < 0.01
@@ -181,23 +177,18 @@ def test_frequency_response_and_simulation_agree_on_the_slowest_cylinder():
 
 
 def test_the_flexible_line_on_a_rig_is_followed_and_three_spans_without_droppers_are_not():
-    pairs = {
-        name: compare(load_catenary(name), "en50318-2002", PANTOGRAPH, SPEED)
-        for name in ("rig", "rig-flexible")
-    }
+    line = "en50318-2002"
+    rigs = {name: load_catenary(name) for name in ("rig", "rig-flexible")}
+    pairs = {name: compare(data, line, PANTOGRAPH, SPEED) for name, data in rigs.items()}
     errors = {name: [band.error for band in pair.bands()] for name, pair in pairs.items()}
     assert max(errors["rig-flexible"][:4]) < 0.05  # to 20 Hz
     assert pairs["rig-flexible"].followed() >= 15
     assert min(errors["rig"]) > 0.2
     bands = pairs["rig"].bands(edges=[(10.0, 12.5)])
     assert bands[0].rig < 0.5 * bands[0].reference  # the passing of the droppers is lost
+    short = growth.with_values(rigs["rig"], {"cylinder": {"stroke": 0.02}})
     with pytest.raises(InputError, match="has nothing to compare"):
-        compare(
-            growth.with_values(load_catenary("rig"), {"cylinder": {"stroke": 0.02}}),
-            "en50318-2002",
-            PANTOGRAPH,
-            SPEED,
-        )
+        compare(short, line, PANTOGRAPH, SPEED)
 
 
 @pytest.mark.slow

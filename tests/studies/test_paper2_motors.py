@@ -7,8 +7,9 @@ import pytest
 
 from panto_env import InputError, simulate
 from panto_env.plant.actuators import actuator_settings
-from panto_env.plant.actuators.motor.schema import motor_power
 from panto_env.studies.paper2 import motors
+
+from ..motor_reference import motor_power
 
 SPEED = 250.0
 

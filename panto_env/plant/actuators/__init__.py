@@ -10,19 +10,11 @@ from importlib import import_module
 from typing import Any
 
 from ...base.settings import parse_kind
-from .base import ActuatorArrays, ActuatorSettings, drive
+from .base import ActuatorSettings, drive
 from .lagged import LaggedActuator
 from .motor import MotorActuator
 
-__all__ = [
-    "ACTUATORS",
-    "ACTUATOR_PRESETS",
-    "KINDS",
-    "ActuatorArrays",
-    "ActuatorSettings",
-    "actuator_settings",
-    "drive",
-]
+__all__ = ["ACTUATORS", "ACTUATOR_PRESETS", "KINDS", "ActuatorSettings", "actuator_settings", "drive"]
 
 KINDS = [
     "lagged",
@@ -33,7 +25,6 @@ ACTUATORS: dict[str, type[ActuatorSettings]] = {
     name: import_module(f".{name}", __name__).KIND for name in KINDS
 }
 """Settings class of each kind, by name."""
-
 ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": LaggedActuator(),
     # Published active pantographs: delay 4-5 ms, lag 15-40 ms, about 2500 N/s, +-80 to +-100 N.

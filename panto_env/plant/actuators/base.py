@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from ...backend import operation
-from ...base.arrays import Array
 from ...base.settings import Between, Settings
 from ..state import Place
-
-
-class ActuatorArrays(Protocol):
-    """Actuators of all lanes: a named tuple of arrays, whose type picks the source of ``drive``."""
-
-    @property
-    def table(self) -> Array:
-        """Everything that changes, (collectors, lanes, rows); zero at rest."""
 
 
 class ActuatorSettings(Settings, ABC):
@@ -44,8 +35,12 @@ class ActuatorSettings(Settings, ABC):
         return 0.0, 0.0
 
     @abstractmethod
-    def arrays(self, time_step: float, lanes: int, collectors: int) -> ActuatorArrays:
-        """Actuators of all lanes at rest, for steps of ``time_step`` (s)."""
+    def arrays(self, time_step: float, lanes: int, collectors: int) -> Any:
+        """Actuators of all lanes at rest, for steps of ``time_step`` (s).
+
+        A named tuple of arrays, whose type picks the source of ``drive``. All that changes is in its
+        ``table``, (collectors, lanes, rows), which is zero at rest.
+        """
 
 
 @operation

@@ -8,19 +8,10 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from ...base.errors import InputError
 from .protocol import CatenaryKind, CatenaryModel
 from .schema import CatenaryData
 
-__all__ = [
-    "CATENARIES",
-    "KINDS",
-    "CatenaryData",
-    "CatenaryKind",
-    "CatenaryModel",
-    "check_collectors",
-    "check_line",
-]
+__all__ = ["CATENARIES", "KINDS", "CatenaryData", "CatenaryKind", "CatenaryModel", "check_line"]
 
 KINDS = [
     "flexible",
@@ -37,12 +28,3 @@ CATENARIES: dict[str, CatenaryKind] = {name: import_module(f".{name}", __name__)
 def check_line(line: CatenaryData) -> None:
     """Raise InputError where a line with these values cannot exist, for example with droppers that push."""
     CATENARIES[line.kind].check(line)
-
-
-def check_collectors(line: CatenaryData, count: int) -> None:
-    """Raise InputError where a line cannot carry waves between this many collectors."""
-    if count > 1 and not CATENARIES[line.kind].several_collectors:
-        raise InputError(
-            "Several pantographs need a flexible catenary or a single wire, whose waves run from one to the "
-            f"other, and line '{line.name}' is neither; give one pantograph, or another line."
-        )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -13,12 +12,11 @@ from ...base.arrays import Array
 from ...base.settings import Between
 from ..alignment import AlignmentArrays, in_spans
 from ..functions import cosine_of_turns
-from ..line_condition import DrawnLine
 from ..numerics import Numerics, Runs
 from .protocol import (
-    NOTHING,
+    NONE,
     CatenaryKind,
-    LineView,
+    CatenaryModel,
     StartPoint,
     check_speeds,
     look_at_contact,
@@ -72,16 +70,12 @@ TIME_STEP = 5e-3
 """Default time step (s): forces within 0.2 % of the peak (tests/plant/test_periodic_stiffness.py)."""
 
 
-class PeriodicStiffness:
-    """A massless spring with a stiffness that varies along the span; it needs no grid."""
+class PeriodicStiffness(CatenaryModel):
+    """A massless spring with a stiffness that varies along the span; it needs no grid, and has no end."""
 
-    massless: bool = True
-    wires_per_collector: int = 1
-    contact_gain: float = 0.0
-    contact_share: float = 0.0
-    grid: Mapping[str, float] = {}
-    wave_speed: float = np.inf  # no wave runs along a spring
-    length: float = np.inf  # the line has no end
+    massless = True
+    wave_speed = np.inf  # no wave runs along a spring
+    supports = NONE
 
     def __init__(
         self,
@@ -102,21 +96,8 @@ class PeriodicStiffness:
         self.line: Any = PeriodicLine(data.mean_stiffness, data.stiffness_variation, alignment.arrays)
         self.wire: Any = PeriodicWire(np.zeros(lanes))
         self.usual_end = alignment.length
-        self.supports: Array = np.zeros(0)
-        self.droppers: Array = np.zeros(0)
         stiffness = self.line.mean * (1.0 + self.line.variation)
         self.start_point = StartPoint(0.0, 0.0, 1.0 / stiffness)
-
-    def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
-        """Do nothing: the wire has no state."""
-
-    def rest_tension(self, lane: int) -> Array:
-        """No tension: there are no droppers."""
-        return np.zeros(0)
-
-    def view(self, lane: int, begin: float, end: float) -> LineView:
-        """An empty view: a spring has no shape along the line."""
-        return NOTHING
 
 
 __all__ = ["KIND", "PeriodicStiffness", "PeriodicStiffnessData"]

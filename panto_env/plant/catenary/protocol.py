@@ -61,36 +61,25 @@ class StartPoint(NamedTuple):
 
 
 class CatenaryModel(Protocol):
-    """A line that is built for a number of lanes."""
+    """A line that is built for a number of lanes; one without droppers need not say that it has none."""
 
     time_step: float  # s
     line: Any  # named tuple of constants, whose class picks the sources of the operations
     wire: Any  # named tuple of arrays: the wire's state in all lanes
-    massless: bool  # whether the contact wire has no mass of its own
-    wires_per_collector: int  # maximum number of contact wires that a collector touches at a time
-    contact_gain: float  # inverse of the stiffness at which an explicit contact law is unstable (m/N)
-    contact_share: (
-        float  # least share that the wire's heights before and after a step have in the contact law
-    )
-    grid: Mapping[str, float]  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
+    massless: bool = False  # whether the contact wire has no mass of its own
+    wires_per_collector: int = 1  # maximum number of contact wires that a collector touches at a time
+    contact_gain: float = 0.0  # inverse of the stiffness from which an explicit contact law is unstable (m/N)
+    contact_share: float = 0.0  # least share of the wire's heights before and after a step in that law
+    grid: Mapping[str, float] = {}  # "spacing" (m) and "window" (spans) of its grid; empty where it has none
     wave_speed: float  # of the contact wire (m/s), infinite where no wave runs along it
-    length: float  # maximum distance of a run (m)
+    length: float = np.inf  # maximum distance of a run (m)
     usual_end: float  # default distance of a run (m)
-    supports: (
-        Array  # (supports,): positions whose uplift is recorded (m), of a second contact wire behind all
-    )
-    droppers: Array  # (droppers,): positions (m)
+    supports: Array  # (supports,): where uplift is recorded (m), of a second contact wire behind all
+    droppers: Array = NONE  # (droppers,): positions (m)
     start_point: StartPoint
 
     def __init__(
-        self,
-        data: Any,
-        *,
-        lanes: int,
-        collectors: int,
-        spans: int,
-        numerics: Numerics,
-        runs: Runs,
+        self, data: Any, *, lanes: int, collectors: int, spans: int, numerics: Numerics, runs: Runs
     ) -> None:
         """Build the line for these runs.
 
@@ -103,12 +92,15 @@ class CatenaryModel(Protocol):
 
         Not called for a massless wire, which has no state.
         """
+        return None
 
     def rest_tension(self, lane: int) -> Array:
         """Tension (N), (droppers,), of one lane's droppers at rest."""
+        return NONE
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
         """Present shape of one lane's line from begin to end (m), as far as it is computed there."""
+        return NOTHING
 
 
 class CatenaryKind(NamedTuple):
@@ -116,9 +108,8 @@ class CatenaryKind(NamedTuple):
 
     schema: type[CatenaryData]
     model: type[CatenaryModel]
-    check: Callable[[Any], Any] = lambda data: (
-        None
-    )  # raises InputError where a line with these values cannot exist
+    # Raises InputError where a line with these values cannot exist.
+    check: Callable[[Any], Any] = lambda data: None
     # Spans of a line beyond the last one of a pass that keep its far end from the train; raises InputError
     # where that takes too many.
     clear_spans: Callable[[Any, Numerics, Runs, int], int] = lambda data, numerics, runs, last: CLEAR

@@ -104,16 +104,11 @@ class CatenaryData(Settings):
         """Places (m), share of the wind that blows there (-), and excess of the factor on the uplift over 1
         (-), (3, places), all linear between; no places without tunnels.
         """
-        rows = [
-            (place + side * PORTAL / 2, float(outside), (1 - outside) * (tunnel.factor - 1))
-            for tunnel in self.tunnels
-            for place, side, outside in (
-                (tunnel.begin, -1, 1),
-                (tunnel.begin, 1, 0),
-                (tunnel.end, -1, 0),
-                (tunnel.end, 1, 1),
-            )
-        ]
+        rows = []
+        for tunnel in self.tunnels:
+            (begin, end), half = (tunnel.begin, tunnel.end), PORTAL / 2
+            for place, open_air in ((begin - half, 1), (begin + half, 0), (end - half, 0), (end + half, 1)):
+                rows.append((place, float(open_air), (1 - open_air) * (tunnel.factor - 1)))
         return np.array(rows).reshape(-1, 3).T.copy()
 
     @property
@@ -147,22 +142,18 @@ class CatenaryData(Settings):
         return math.nan, math.nan
 
 
+Frequency = Annotated[float, Between(0.05, 500, "Hz")]
+
+
 class DampingRatio(Settings):
     """Damping by its ratio, which it has at two frequencies."""
 
     ratio: Annotated[float, Between(0, 0.5)] = Field(
         description="of both frequencies to critical damping (-)"
     )
-    frequencies: tuple[
-        Annotated[float, Between(0.05, 500, "Hz")], Annotated[float, Between(0.05, 500, "Hz")]
-    ] = Field(description="at which damping has this ratio (Hz); it is less between them, more beyond")
-
-    @property
-    def of_rayleigh(self) -> dict[str, float]:
-        """Coefficients alpha (1/s) and beta (s): the ratio at omega is alpha / (2 omega) + beta omega / 2."""
-        low, high = (2 * math.pi * each for each in self.frequencies)
-        beta = 2 * self.ratio / (low + high)
-        return {"alpha": beta * low * high, "beta": beta}
+    frequencies: tuple[Frequency, Frequency] = Field(
+        description="at which damping has this ratio (Hz); it is less between them, more beyond"
+    )
 
 
 class Rayleigh(Settings):
@@ -174,12 +165,15 @@ class Rayleigh(Settings):
     @model_validator(mode="before")
     @classmethod
     def _by_ratio(cls, values: Any) -> Any:
-        by_ratio = isinstance(values, Mapping) and not values.keys().isdisjoint(DampingRatio.model_fields)
-        if not by_ratio:
+        if not isinstance(values, Mapping) or values.keys().isdisjoint(DampingRatio.model_fields):
             return values
         if not values.keys().isdisjoint(cls.model_fields):
             raise InputError("Give damping either alpha and beta, or ratio and frequencies, not both.")
-        return parse(DampingRatio, values, "damping").of_rayleigh
+        given = parse(DampingRatio, values, "damping")
+        low, high = (2 * math.pi * each for each in given.frequencies)
+        # The ratio at omega is alpha / (2 omega) + beta omega / 2.
+        beta = 2 * given.ratio / (low + high)
+        return {"alpha": beta * low * high, "beta": beta}
 
 
 LOWEST_TENSION = 500.0  # N

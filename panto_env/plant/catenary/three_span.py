@@ -8,7 +8,6 @@ coordinates follow by least squares.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -24,6 +23,7 @@ from ..state import ENDING
 from .protocol import (
     NOTHING,
     CatenaryKind,
+    CatenaryModel,
     LineView,
     StartPoint,
     advance_wire,
@@ -190,24 +190,11 @@ VIEW_POINTS = 361  # number of points of the three spans in a picture
 TIME_STEP = 2.5e-3  # default time step (s): tests/plant/test_three_span.py shows how figures converge
 
 
-class ThreeSpan:
-    """Paper 2's line; the wire has mass, but neither droppers nor an end."""
-
-    massless: bool = False
-    wires_per_collector: int = 1
-    contact_share: float = 0.0  # its height at mid-step is exact
-    grid: Mapping[str, float] = {}
-    length: float = np.inf  # the line has no end
+class ThreeSpan(CatenaryModel):
+    """Paper 2's line; the wire has mass, but neither droppers nor an end. Its height at mid-step is exact."""
 
     def __init__(
-        self,
-        data: ThreeSpanData,
-        *,
-        lanes: int,
-        collectors: int,
-        spans: int,
-        numerics: Numerics,
-        runs: Runs,
+        self, data: ThreeSpanData, *, lanes: int, collectors: int, spans: int, numerics: Numerics, runs: Runs
     ) -> None:
         """Build the line; there is no grid, and modes propagate exactly over any time step.
 
@@ -231,8 +218,7 @@ class ThreeSpan:
         self.contact_gain = contact_gain(self.line)
         alignment = data.alignment(spans)
         self.usual_end = alignment.length
-        self.supports: Array = alignment.support(np.arange(1, spans))
-        self.droppers: Array = np.zeros(0)
+        self.supports = alignment.support(np.arange(1, spans))
         compliance = float(self.line.at_support[0] ** 2 @ self.line.softness)
         self.start_point = StartPoint(0.0, compliance, 0.0)
 
@@ -241,10 +227,6 @@ class ThreeSpan:
         self.wire.modal[lane, 0] = self.line.at_support[0] * self.line.softness * force
         self.wire.modal[lane, 1] = 0.0
         self.wire.central_span[lane] = 0
-
-    def rest_tension(self, lane: int) -> Array:
-        """No tension: the equivalent wire has no droppers."""
-        return np.zeros(0)
 
     @cached_property
     def _view_shapes(self) -> Array:

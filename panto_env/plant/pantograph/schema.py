@@ -115,7 +115,7 @@ class PantographData(Settings):
         return self
 
     @model_validator(mode="after")
-    def _one_spring_and_damper_a_mass(self) -> Self:
+    def _fits_together(self) -> Self:
         for key in ("stiffnesses", "dampings"):
             given, masses = len(getattr(self, key)), len(self.masses)
             if given != masses:
@@ -139,7 +139,7 @@ class PantographData(Settings):
                 )
         if (self.roll_inertia is None) != (self.spring_distance is None):
             raise ValueError("roll_inertia and spring_distance go together: give both, or neither")
-        if self.roll_inertia is not None and len(self.masses) < 2:
+        if self.rolls and len(self.masses) < 2:
             raise ValueError("a head that rolls stands on springs, so it needs a second mass below it")
         if self.contact_stiffness == "rigid" and self.contact_damping > 0:
             raise ValueError("contact_damping must be 0 where contact_stiffness is 'rigid'")
@@ -270,10 +270,9 @@ def parts(
 
     wires: contact wires side by side, between which the contact's spring and damper are shared.
     """
-    time_step = catenary.time_step
+    time_step, stiffness = catenary.time_step, pantograph.contact_stiffness
     transition, inputs = discretise(pantograph, time_step, reflected)
     rigid = 0.0 if catenary.massless else 1 / STRIP_STIFFNESS
-    stiffness = pantograph.contact_stiffness
     compliance = wires * (rigid if stiffness == "rigid" else 1 / stiffness)
     bearable, gain = STABILITY_MARGIN * compliance, catenary.contact_gain
     share = max(catenary.contact_share, 1.0 - bearable / gain if gain else 0.0)
@@ -290,12 +289,9 @@ def roll(pantograph: PantographData, time_step: float) -> Array:
     """
     if pantograph.roll_inertia is None or pantograph.spring_distance is None:
         return np.zeros(6)
-    inertia, arm = pantograph.roll_inertia, (pantograph.spring_distance / 2) ** 2
-    augmented = np.zeros((3, 3))
-    augmented[0, 1] = time_step
-    augmented[1] = -pantograph.roll_stiffness, -pantograph.dampings[0] * arm, -1.0
-    augmented[1] *= time_step / inertia
-    whole = exponential(augmented)
+    damping = pantograph.dampings[0] * (pantograph.spring_distance / 2) ** 2
+    rates = np.array([-pantograph.roll_stiffness, -damping, -1.0]) * (time_step / pantograph.roll_inertia)
+    whole = exponential(np.array([[0.0, time_step, 0.0], rates, np.zeros(3)]))
     return np.concatenate([whole[:2, :2].ravel(), whole[:2, 2]])
 
 
@@ -310,15 +306,16 @@ def matrices(pantograph: PantographData, reflected: ReflectedMasses = NONE_REFLE
     """State matrix A, (2n, 2n), and inputs [contact, frame, head pair], (2n, 3), of x' = Ax + Bf."""
     n = len(pantograph.masses)
     stiffness, damping = _chain(pantograph.stiffnesses), _chain(pantograph.dampings)
+    forces = np.zeros((n, 3))  # a newton on each: at the contact, on the frame, and on the head and its base
+    forces[0] = -1.0, 0.0, 1.0
+    forces[-1, 1] = 1.0
+    if n > 1:
+        forces[1, 2] = -1.0
     inverse_mass: Array = np.diag(1 / np.array(pantograph.masses))
     if any(reflected):
-        inverse_mass = np.linalg.inv(np.diag(pantograph.masses) + _between_ends(n, reflected))
-    forces = np.zeros((n, 3))
-    forces[0, 0] = -1.0
-    forces[-1, 1] = 1.0
-    forces[0, 2] += 1.0
-    if n > 1:
-        forces[1, 2] -= 1.0
+        ends = forces[:, 1:]  # of each ``Place``, between which an actuator's mass resists
+        moving = [mass * np.outer(end, end) for mass, end in zip(reflected, ends.T, strict=True)]
+        inverse_mass = np.linalg.inv(np.diag(pantograph.masses) + (moving[0] + moving[1]))
     a, b = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 3))
     a[:n, n:] = np.eye(n)
     a[n:, :n], a[n:, n:], b[n:] = -inverse_mass @ stiffness, -inverse_mass @ damping, inverse_mass @ forces
@@ -331,16 +328,6 @@ def _chain(values: tuple[float, ...]) -> Array:
     for i, value in enumerate(values[:-1]):
         matrix[i + 1, i + 1] += value
         matrix[i, i + 1] = matrix[i + 1, i] = -value
-    return matrix
-
-
-def _between_ends(n: int, reflected: ReflectedMasses) -> Array:
-    """Mass matrix, (n, n), of the reflected masses between the two ends of each ``Place``."""
-    frame, head = np.zeros(n), np.zeros(n)
-    frame[-1] = head[0] = 1.0
-    if n > 1:
-        head[1] = -1.0
-    matrix: Array = reflected[0] * np.outer(frame, frame) + reflected[1] * np.outer(head, head)
     return matrix
 
 
@@ -410,15 +397,14 @@ def check_at_rest(pantograph: PantographData) -> None:
 
 def check_compression(name: str, states: Array) -> None:
     """Raise InputError where a spring between two masses gives way in states at rest, (lanes, 2n)."""
-    size = states.shape[1] // 2
-    pressed = np.abs(np.diff(states[:, :size], axis=1))
+    pressed = np.abs(np.diff(states[:, : states.shape[1] // 2], axis=1))
     if pressed.size and pressed.max() > MOST_COMPRESSED:
-        spring = int(pressed.max(axis=0).argmax())
+        spring = int(pressed.max(axis=0).argmax()) + 1
         most = beside(float(pressed.max()), MOST_COMPRESSED, ".3g")
         raise InputError(
-            f"At rest spring {spring + 1} of pantograph '{name}' would be compressed by "
-            f"{most} m, more than {MOST_COMPRESSED:g} m, and no pantograph has that room: give "
-            f"number {spring + 1} of its stiffnesses in N/m (10 N/mm are 10e3), and forces in N."
+            f"At rest spring {spring} of pantograph '{name}' would be compressed by {most} m, more than "
+            f"{MOST_COMPRESSED:g} m, and no pantograph has that room: give number {spring} of its "
+            "stiffnesses in N/m (10 N/mm are 10e3), and forces in N."
         )
 
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from enum import IntEnum
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...backend import NOT_NEGATIVE, constants, inlined, operation
-from ...base.arrays import Array, Index, Lanes
+from ...base.arrays import Array, Index
 from ...base.settings import Settings
 from ..alignment import Alignment, mean_over_own_length
 
@@ -65,11 +65,6 @@ class OdometerErrors(NamedTuple):
     speed: float = 0.0  # rms noise of the speed (m/s)
     blind: bool = False  # whether the position within the span is not known at all
 
-    @property
-    def drawn(self) -> bool:
-        """Whether any of the errors is random."""
-        return any(self[:4])
-
 
 class OdometerRow(IntEnum):
     """Rows of each lane's odometer."""
@@ -105,7 +100,8 @@ class Odometers:
 
     def __init__(self, errors: OdometerErrors, lanes: int, alignment: Alignment) -> None:
         """alignment: of the line."""
-        self.errors, self.drawn, self._lanes, self._alignment = errors, errors.drawn, lanes, alignment
+        self.errors, self._lanes, self._alignment = errors, lanes, alignment
+        self.drawn = any(errors[:4])
         length = alignment.mean_length
         walk = errors.walk * math.sqrt(length / WALK) / length
         self.noise = Noise((walk, errors.mast / length, errors.speed), lanes)
@@ -133,10 +129,6 @@ class Odometers:
         first = self.errors.mast / float(self._alignment.lengths[0]) * mast
         arrays.table[lane] = 0.0, 0.0, first, self.errors.scale * scale
         self.noise.start(arrays, lane, own)
-
-    def prepare(self, arrays: OdometerArrays, skip: Any = None) -> None:
-        """Make sure that all lanes, except those to skip, have the numbers of their next reading."""
-        self.noise.prepare(arrays, skip)
 
 
 @inlined
@@ -171,21 +163,6 @@ class Reading(IntEnum):
 READING = constants(Reading)
 
 
-class SensorArrays(Protocol):
-    """Sensors of all lanes: a named tuple of arrays, whose type picks the sources of the operations."""
-
-    @property
-    def noise(self) -> Array:
-        """Noise of the next readings, (lanes, collectors, times, readings), in their units."""
-
-    @property
-    def noise_used(self) -> Index:
-        """Number of prepared noise values that each lane has used, (lanes,)."""
-
-    def reset(self, lanes: Lanes, samples: Array) -> None:
-        """Fill the past of some lanes with these samples, (collectors, lanes, SAMPLE_ROWS)."""
-
-
 class SensorSettings(Settings, ABC):
     """Settings of a train's sensors."""
 
@@ -200,8 +177,12 @@ class SensorSettings(Settings, ABC):
         return OdometerErrors()
 
     @abstractmethod
-    def arrays(self, time_step: float, control_steps: int, lanes: int, collectors: int) -> SensorArrays:
-        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step."""
+    def arrays(self, time_step: float, control_steps: int, lanes: int, collectors: int) -> Any:
+        """Sensors of all lanes; time_step: of the plant (s); control_steps: its steps per control step.
+
+        A named tuple of arrays, whose type picks the sources of the operations, with the fields ``noise`` and
+        ``noise_used`` and the method ``reset`` of ``DelayedArrays``.
+        """
 
 
 @operation

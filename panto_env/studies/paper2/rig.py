@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...catalog import load_pantograph
 from ...metrics.low_pass import amplitudes
 from ...rig.computer import Pair, compare, load_rig, rms
 from ...rig.margins import with_values
-from ...rig.report import pair_facts, plot_pairs, stability, stability_facts, stability_table
+from ...rig.report import pair_facts, plot_pairs, stability, stability_table
 from ..study import Comparison, Outcome, Report, said
 
 PANTOGRAPH, LINE, SPEED_KMH = "own-two-mass", "en50318-2002", 250.0
@@ -152,5 +153,5 @@ def outcome(report: Report) -> Outcome:
         comparisons=(*statements(pairs), *margins),
         tables=(harmonics_table(pairs), speeds_table(by_speed), limits, *of_stability),
         plots={"fig05-08-rig": plot_pairs(list(pairs.values()))},
-        numbers={"rig": facts, "stability": {name: stability_facts(each) for name, each in found.items()}},
+        numbers={"rig": facts, "stability": {name: asdict(each) for name, each in found.items()}},
     )

@@ -1,9 +1,8 @@
 """Servomotors that act through a gearbox and an arm (paper 2, section 4.3).
 
 Paper 2 turns the arms of the collector head by armature-controlled DC motors with gearboxes, inside the
-joints between pan-head and arms, driven in force mode. ``schema`` defines the data of such a drive,
-``current`` solves the armature and its current loop, ``gear`` is friction, inertia and backlash, ``step``
-joins them in the plant's step, ``power`` gives current, voltage and watts.
+joints between pan-head and arms, driven in force mode. ``schema`` defines the data of such a drive, ``step``
+has its armature, current loop, friction, inertia and backlash.
 
 All motors of a place are alike and count as one. Kernels see them at the point where they act: a force
 e = K i (N) by the current i of each motor, with K = motors * ratio / arm * torque constant, and a speed w

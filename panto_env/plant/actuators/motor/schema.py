@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ....backend import aligned_zeros
-from ....base.arrays import Array
-from ....base.errors import InputError
 from ....base.settings import Between
 from ...state import Place
 from ..base import ActuatorSettings
@@ -49,15 +47,12 @@ class MotorActuator(ActuatorSettings):
     rotor_inertia: Annotated[float, Between(1e-9, 1, "kg m^2")] = Field(  # seen
         142e-7, description="moment of inertia of a motor's rotor (kg m^2)"
     )
-    friction_torque: Annotated[float, Between(0, 10, "N m")] = (
-        Field(  # torque of the no-load current, 137 mA: seen
-            4.1e-3, description="dry friction of a motor's shaft, at any load (N m)"
-        )
+    # Torques of the no-load current, 137 mA, and of the nominal current, 6 A: seen.
+    friction_torque: Annotated[float, Between(0, 10, "N m")] = Field(
+        4.1e-3, description="dry friction of a motor's shaft, at any load (N m)"
     )
-    continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = (
-        Field(  # of the nominal current, 6 A: seen
-            0.181, description="maximum continuous rms torque of a motor (N m)"
-        )
+    continuous_torque: Annotated[float, Between(1e-4, 100, "N m")] = Field(
+        0.181, description="maximum continuous rms torque of a motor (N m)"
     )
     # What the gearbox bears for a moment, 11.3 N m (recalled), through ratio and efficiency; the motor bears
     # more.
@@ -87,13 +82,11 @@ class MotorActuator(ActuatorSettings):
     backlash: Annotated[float, Between(0, 0.2, "rad")] = Field(
         0.0, description="backlash at a gearbox's output, from flank to flank (rad)"
     )
-    gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = (
-        Field(  # own choice: of the size of such gears
-            3000.0,
-            description="stiffness of a gearbox, at its output; counts where there is backlash (N m/rad)",
-        )
+    # Own choice: of the size of such gears, and a tenth of critical damping.
+    gear_stiffness: Annotated[float, Between(10, 1e7, "N m/rad")] = Field(
+        3000.0, description="stiffness of a gearbox, at its output; counts where there is backlash (N m/rad)"
     )
-    gear_damping: Annotated[float, Between(0, 1e5, "N m s/rad")] = Field(  # own choice: a tenth of critical
+    gear_damping: Annotated[float, Between(0, 1e5, "N m s/rad")] = Field(
         1.1, description="damping of a gearbox, at its output; counts where there is backlash (N m s/rad)"
     )
     # Own choice: with it two motors reach 100 N, as published actuators do.
@@ -127,34 +120,23 @@ class MotorActuator(ActuatorSettings):
         return self.gear_ratio / self.arm_length
 
     @property
-    def force_per_ampere(self) -> float:
-        """K: force of all motors per ampere in each, before friction (N/A)."""
-        return self.motors * self.shaft_per_metre * self.torque_constant
-
-    @property
     def shorted_damping(self) -> float:
         """K^2 / (motors R): damping of motors with shorted armatures (N s/m)."""
-        return self.force_per_ampere**2 / (self.motors * self.resistance)
-
-    @property
-    def stall_force(self) -> float:
-        """Force at standstill under the maximum voltage, before friction (N)."""
-        return self.force_per_ampere * self.voltage / self.resistance
+        return self.force_of(self.torque_constant) ** 2 / (self.motors * self.resistance)
 
     @property
     def peak_force(self) -> float:
         """Force at the maximum torque, before friction (N)."""
-        return self.motors * self.shaft_per_metre * self.peak_torque
+        return self.force_of(self.peak_torque)
 
     @property
     def continuous_force(self) -> float:
         """Force at the continuous torque, before friction (N)."""
-        return self.motors * self.shaft_per_metre * self.continuous_torque
+        return self.force_of(self.continuous_torque)
 
-    @property
-    def dry_friction(self) -> float:
-        """Friction of all motors at no load (N)."""
-        return self.motors * self.shaft_per_metre * self.friction_torque
+    def force_of(self, torque: float) -> float:
+        """Force (N) of all motors by a torque of each (N m); by the torque of an ampere it is K (N/A)."""
+        return self.motors * self.shaft_per_metre * torque
 
     @property
     def reflected_mass(self) -> float:
@@ -180,7 +162,7 @@ class MotorActuator(ActuatorSettings):
             continuous_force=self.continuous_force,
             heat_share=1.0 - math.exp(-time_step / self.thermal_time),
             largest_speed=self.largest_speed / self.shaft_per_metre,
-            stall_force=self.stall_force,
+            stall_force=self.force_of(self.torque_constant) * self.voltage / self.resistance,
             shorted_damping=self.shorted_damping,
             armature_time=armature,
             armature_left=math.exp(-time_step / armature),
@@ -189,7 +171,7 @@ class MotorActuator(ActuatorSettings):
             lead=bandwidth * armature,
             decay_halvings=_halvings(bandwidth * time_step, 0.25),
             age_halvings=_halvings(time_step / armature, 0.5),
-            dry_friction=self.dry_friction,
+            dry_friction=self.force_of(self.friction_torque),
             lost_share=1.0 - self.gear_efficiency,
             mass=self.reflected_mass,
             play=self.backlash * self.arm_length,
@@ -200,50 +182,3 @@ class MotorActuator(ActuatorSettings):
 
 def _halvings(value: float, largest: float) -> int:
     return max(0, math.ceil(math.log2(value / largest)))
-
-
-class MotorPower(NamedTuple):
-    """Power of the motors of one place over a run, means of each time step, (n,)."""
-
-    current: Array  # of each motor (A)
-    voltage: Array  # of each motor (V)
-    copper: Array  # loss in all armatures (W)
-    mechanical: Array  # output of all arms (W)
-    electrical: Array  # input of all motors (W), negative where they feed power back
-
-
-def motor_power(motor: MotorActuator, force: Array, speed: Array, time_step: float) -> MotorPower:
-    """Power of motors from a recorded ``force`` (N) and the ``speed`` (m/s) at which their ends moved apart.
-
-    Both are means over time steps of ``time_step`` (s), (n,): a run's ``head_force``, and the velocity of the
-    head minus that of the mass below it; or ``frame_force``, and ``frame_velocity``. The motors' equations
-    are inverted: friction follows the sign of the speed, so a step in which they stick or reverse is only
-    approximate. ``MotorArrays.energy`` has the exact energy, as the kernel counts it.
-
-    Raises InputError for motors with backlash, whose rotors move relative to the arms, and unless force and
-    speed have the same length of at least 2.
-    """
-    if motor.backlash > 0:
-        raise InputError(
-            "The power of motors with backlash does not follow from force and speed, because their rotors "
-            "are loose at times; use MotorArrays.energy, which the plant counts."
-        )
-    if force.ndim != 1 or force.shape != speed.shape or len(force) < 2:
-        raise InputError(
-            f"force and speed must have the same length, at least 2, not {force.shape} and {speed.shape}."
-        )
-    sense, inertia = np.sign(speed), motor.reflected_mass * np.gradient(speed, time_step)
-    # The teeth bear X = e - inertia, and pass on X - sense (dry friction + lost share of |X|) = force -
-    # inertia.
-    borne = force - inertia + sense * motor.dry_friction
-    borne = borne / (1.0 - sense * (1.0 - motor.gear_efficiency) * np.sign(borne))
-    current = (borne + inertia) / motor.force_per_ampere
-    emf = motor.torque_constant * motor.shaft_per_metre * speed
-    voltage = motor.resistance * current + motor.inductance * np.gradient(current, time_step) + emf
-    return MotorPower(
-        current=current,
-        voltage=voltage,
-        copper=motor.motors * motor.resistance * current**2,
-        mechanical=(force - inertia) * speed,
-        electrical=motor.motors * voltage * current,
-    )

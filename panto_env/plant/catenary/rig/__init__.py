@@ -8,8 +8,8 @@ contact to a policy, is as on a line.
 
 from ..protocol import CatenaryKind
 from . import step as step
-from .build import Computer, Cylinder, LoadCell, Rig, RigData, check
+from .build import LINES, Computer, Cylinder, LoadCell, Rig, RigData
 
 __all__ = ["KIND", "Computer", "Cylinder", "LoadCell", "Rig", "RigData"]
 
-KIND = CatenaryKind(RigData, Rig, check)
+KIND = CatenaryKind(RigData, Rig, check=lambda data: LINES[data.line.kind].check(data.line))

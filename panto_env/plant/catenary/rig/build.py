@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -154,28 +153,14 @@ FIT_BOUNDS = ((0.9, 0.4, 0.2), (1.1, 2.5, 5.0))
 """Minimum and maximum coefficients, relative to the assumed ones."""
 
 
-def check(data: RigData) -> None:
-    """Raise InputError where the computed line cannot exist."""
-    LINES[data.line.kind].check(data.line)
+class Rig(CatenaryModel):
+    """A pantograph on a cylinder that follows a line's computed contact point.
 
-
-class Rig:
-    """A pantograph on a cylinder that follows a line's computed contact point."""
-
-    massless = False
-    wires_per_collector = 1
-    contact_share = 0.0
-    contact_gain = 0.0  # the cylinder does not respond to the force within a step
+    The cylinder does not respond to the force within a step, so an explicit contact law is stable.
+    """
 
     def __init__(
-        self,
-        data: RigData,
-        *,
-        lanes: int,
-        collectors: int,
-        spans: int,
-        numerics: Numerics,
-        runs: Runs,
+        self, data: RigData, *, lanes: int, collectors: int, spans: int, numerics: Numerics, runs: Runs
     ) -> None:
         """Build the computed line, and the rig around it.
 
@@ -192,19 +177,13 @@ class Rig:
                 "No wind blows on a rig, nor is it in a tunnel; leave out both, or use another line than "
                 f"'{data.name}'."
             )
+        one_wire = f"The cylinder of rig '{data.name}' follows one contact wire, and its line has"
         if data.line.wires_touched > 1:
-            raise InputError(
-                f"The cylinder of rig '{data.name}' follows one contact wire, and its line has two side by "
-                "side; take one equivalent wire of both."
-            )
+            raise InputError(f"{one_wire} two side by side; take one equivalent wire of both.")
         if getattr(data.line, "overlaps", ()):
-            raise InputError(
-                f"The cylinder of rig '{data.name}' follows one contact wire, and its line has overlaps of "
-                "two; take a line without them."
-            )
+            raise InputError(f"{one_wire} overlaps of two; take a line without them.")
         computer = data.computer
-        interval = runs.whole_part(computer.interval)
-        if abs(interval - computer.interval) > 1e-9:
+        if abs(runs.whole_part(computer.interval) - computer.interval) > 1e-9:
             raise InputError(
                 f"The control interval of {1e3 * runs.control_interval:g} ms must be a whole number of the "
                 f"rig's sampling intervals of {1e3 * computer.interval:g} ms."
@@ -212,22 +191,20 @@ class Rig:
         own_runs = runs._replace(control_interval=computer.interval)
         if numerics.time_step is None and data.line.kind == "three_span":
             numerics = numerics.model_copy(update={"time_step": computer.interval / STEPS})
-        self.model: CatenaryModel = LINES[data.line.kind].model(
+        model: CatenaryModel = LINES[data.line.kind].model(
             data.line, lanes=lanes, collectors=collectors, spans=spans, numerics=numerics, runs=own_runs
         )
-        model = self.model
-        self.time_step = model.time_step
-        self.grid: Mapping[str, float] = model.grid
-        self.wave_speed, self.supports, self.droppers = model.wave_speed, model.supports, model.droppers
+        self.model = model
+        self.time_step, self.grid, self.wave_speed = model.time_step, model.grid, model.wave_speed
+        self.supports, self.droppers = model.supports, model.droppers
         ahead = runs.speeds[1] * (computer.interval + self.time_step)  # the computer's lead
         self.length = model.length - ahead
         self.usual_end = min(model.usual_end, self.length)
         self.line = constants(data, model.line, self.time_step)
         self.wire = at_rest(data, model.wire, lanes, self.time_step)
         start = model.start_point
-        self.start_point = StartPoint(
-            start.height, start.wire_compliance, start.spring_compliance + self.line.yield_per_newton
-        )
+        yielding = start.spring_compliance + self.line.yield_per_newton
+        self.start_point = StartPoint(start.height, start.wire_compliance, yielding)
         self._assumed = assumed(data)
 
     def settle(self, lane: int, drawn: DrawnLine, force: float) -> None:
@@ -335,32 +312,29 @@ def bank(data: RigData) -> Array:
     computer, h = data.computer, data.computer.interval
     if computer.compensation in ("inverse", "adaptive"):
         return np.array([[1, 0, 0, 0], np.array([3, -4, 1, 0]) / (2 * h), np.array([2, -5, 4, -1]) / h**2])
-    weights = np.zeros((TERMS, 1))
-    if computer.compensation == "prediction":
-        total_lead = assumed(data)[1] + outer_lead(data)
-        apart = max(1, round(total_lead / h))
-        weights = np.zeros((TERMS, ORDER * apart + 1))
-        nodes, at = -np.arange(ORDER + 1.0), total_lead / (apart * h)
-        for k in range(ORDER + 1):
-            others = np.delete(nodes, k)
-            weights[0, k * apart] = np.prod((at - others) / (nodes[k] - others))
-        return weights
-    weights[0, 0] = 1.0
+    if computer.compensation == "none":
+        return np.eye(TERMS, 1)
+    total_lead = assumed(data)[1] + outer_lead(data)
+    apart = max(1, round(total_lead / h))
+    weights = np.zeros((TERMS, ORDER * apart + 1))
+    nodes, at = -np.arange(ORDER + 1.0), total_lead / (apart * h)
+    for k in range(ORDER + 1):
+        others = np.delete(nodes, k)
+        weights[0, k * apart] = np.prod((at - others) / (nodes[k] - others))
     return weights
 
 
 def at_rest(data: RigData, wire: Any, lanes: int, time_step: float) -> RigWire:
     """State of the rig in all lanes, at rest."""
-    whole = math.floor(data.computer.delay / time_step + 1e-9)
-    past = bank(data).shape[1]
-    return RigWire(
-        line=wire,
-        table=np.zeros((lanes, len(RigRow))),
-        late=np.zeros((lanes, whole + 2)),
-        past=np.zeros((lanes, past)),
-        coefficients=np.zeros((lanes, TERMS)),
-        fit=np.zeros((lanes, len(FitRow))),
-        fit_past=np.zeros((lanes, past)),
-        covariance=np.zeros((lanes, TERMS, TERMS)),
-        scratch=np.zeros((lanes, 2, TERMS)),
-    )
+    whole, past = math.floor(data.computer.delay / time_step + 1e-9), bank(data).shape[1]
+    of_a_lane = {
+        "table": (len(RigRow),),
+        "late": (whole + 2,),
+        "past": (past,),
+        "coefficients": (TERMS,),
+        "fit": (len(FitRow),),
+        "fit_past": (past,),
+        "covariance": (TERMS, TERMS),
+        "scratch": (2, TERMS),
+    }
+    return RigWire(wire, **{name: np.zeros((lanes, *shape)) for name, shape in of_a_lane.items()})

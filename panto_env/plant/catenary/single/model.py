@@ -1,42 +1,43 @@
-"""A single wire or a rail for a number of lanes: its shape at rest, its window, what it refuses."""
+"""A single wire or a rail for a number of lanes: its elements, window, shape at rest, and what it refuses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import math
+import warnings
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....backend import python_function
 from ....base.arrays import Array, one_thread
-from ....base.errors import InputError
+from ....base.errors import AccuracyWarning, InputError
 from ...line_condition import DrawnLine, LineCondition
 from ...numerics import Numerics, Runs
 from ..flexible.shape import GRAVITY, solve_band
-from ..protocol import NOTHING, LineView, StartPoint, check_speeds
-from .resolution import step_and_elements, window_of
+from ..protocol import NOTHING, CatenaryModel, LineView, StartPoint, check_speeds
+from ..schema import CLEAR
 from .schema import SingleData, check_sag
 from .step import SingleLine, SingleWire, stiffness_terms
 
+STEPS = {"full": 1e-3, "fast": 2e-3}  # time steps (s)
+FREQUENCY, PER_WAVE = 60.0, 4.0
+"""Frequency (Hz) of the shortest wave ahead of the train that elements carry, and their number in it. The
+wire then yields to a contact force as a real one, and turns as sharply at its supports."""
+FEWEST, COARSEST, FINEST = 8, 1.0, 0.05  # elements of a span; lengths of elements (m)
+NEAR, LAYER, STRONGEST = 90.0, 90.0, 15.0
+"""Length of the window between the train and each damping layer, and of a layer (m), and damping at a layer's
+end (1/s): sigma is within 1 % of that with 300 m each, on rails and on soft supports too."""
+SHORT = 10  # what a shorter window costs (%)
 
-class Single:
+
+class Single(CatenaryModel):
     """A beam under tension on point supports; a run starts at the line's first anchor, where it is held."""
 
-    massless = False
-    wires_per_collector = 1
-    contact_gain = 0.0  # a contact of any stiffness is stable
-    contact_share = 1.0  # the implicit midpoint rule: a force's work is then exact
-    grid: Mapping[str, float]
+    contact_share = 1.0  # the implicit midpoint rule: a force's work is exact, any contact stable
 
     def __init__(
-        self,
-        data: SingleData,
-        *,
-        lanes: int,
-        collectors: int,
-        spans: int,
-        numerics: Numerics,
-        runs: Runs,
+        self, data: SingleData, *, lanes: int, collectors: int, spans: int, numerics: Numerics, runs: Runs
     ) -> None:
         """Build the line.
 
@@ -52,14 +53,21 @@ class Single:
         refuse_conditions(data, runs.conditions)
         self.wave_speed = data.wave_speed
         check_speeds(data.name, self.wave_speed, runs.speeds)
-        self.time_step, elements = step_and_elements(data, numerics, runs)
+        self.time_step = numerics.time_step or runs.carried_step(STEPS[numerics.accuracy])
         runs.check_wave(self.time_step)
+        longest = numerics.spacing or spacing(data, runs.speeds[1])
+        elements = max(math.ceil(data.longest_span / longest - 1e-9), 2)
         travelling = window_of(data, numerics.window, runs)
-        window, about_one = travelling.spans_of(spans)
-        self.grid = {"spacing": data.longest_span / elements, "window": about_one}
+        window = travelling.about_one + travelling.train
+        whole = not travelling.ahead or window >= spans
+        window = spans if whole else window
+        self.grid = {"spacing": data.longest_span / elements, "window": 0 if whole else travelling.about_one}
         self.alignment = alignment = data.alignment(spans)
-        alpha, beta = data.damping.alpha, data.damping.beta
-        wire = data.contact_wire
+        wire, damping = data.contact_wire, data.damping
+        # Additional damping (1/s) of the window's elements towards both its ends.
+        x = (np.arange(window * elements) + 0.5) / elements
+        near = np.minimum(x, window - x)
+        layer = STRONGEST * np.maximum(1 - near / max(travelling.layers, 1), 0.0) ** 2
         line = SingleLine(
             alignment=alignment.arrays,
             elements=elements,
@@ -70,10 +78,10 @@ class Single:
             mass=wire.mass,
             tension=wire.tension,
             bending=wire.bending_stiffness,
-            alpha=alpha,
-            beta=beta,
+            alpha=damping.alpha,
+            beta=damping.beta,
             support=np.array([data.support.stiffness, data.support.damping]),
-            layer=travelling.layer(elements, window),
+            layer=layer,
             rest=np.zeros((0, 2)),
             free_uplift=data.free_uplift,
         )
@@ -93,8 +101,7 @@ class Single:
         )
         self.length = alignment.length
         self.usual_end = alignment.support(spans - 1)  # the anchor of the last span reflects waves
-        self.supports: Array = alignment.support(np.arange(1, spans))
-        self.droppers: Array = np.zeros(0)
+        self.supports = alignment.support(np.arange(1, spans))
         # The anchor does not yield: the pantograph is at rest there exactly.
         self.start_point = StartPoint(float(self.line.rest[0, 0]), 0.0, 0.0)
 
@@ -103,10 +110,6 @@ class Single:
         self.wire.first[lane] = -1
         for each in (self.wire.moved, self.wire.rate, self.wire.mean):
             each[lane] = 0.0
-
-    def rest_tension(self, lane: int) -> Array:
-        """No tension: there are no droppers."""
-        return np.zeros(0)
 
     def view(self, lane: int, begin: float, end: float) -> LineView:
         """Present shape of one lane's line within the window about the train."""
@@ -191,3 +194,64 @@ def at_rest(line: SingleLine, lengths: Array) -> Array:
         band[k, held[1:] - k] = 0.0
     with one_thread():
         return solve_band(band, load).reshape(-1, 2)
+
+
+class Window(NamedTuple):
+    """Spans that are computed about a train."""
+
+    behind: int
+    ahead: int  # 0 for the whole line
+    train: int  # by which a train's length makes it longer
+    layers: int  # of the damping layer at each end
+
+    @property
+    def about_one(self) -> int:
+        """Spans about one pantograph."""
+        return self.behind + 1 + self.ahead
+
+
+def window_of(data: SingleData, given: int | None, runs: Runs) -> Window:
+    """The window of these runs, or with a given number of spans."""
+    shortest = min(data.span_lengths, default=data.span_length)
+    train, layers = math.ceil(runs.train_length / shortest), math.ceil(LAYER / shortest)
+    if given is None:
+        side = math.ceil(NEAR / shortest) + layers
+        return Window(side, side, train, layers)
+    behind = max(given - 1, 0) // 2
+    return Window(behind, given // 2, train, min(layers, behind))
+
+
+def spacing(data: SingleData, speed: float) -> float:
+    """Length of elements (m) that carry the waves ahead of a train at a speed (m/s)."""
+    wire = data.contact_wire
+    # (2 pi f + k v)^2 = (T k^2 + EI k^4) / m: the wave that keeps its distance from the train.
+    shaken, squared = 2 * math.pi * FREQUENCY, wire.tension / wire.mass - speed**2
+    roots = np.roots([wire.bending_stiffness / wire.mass, 0, squared, -2 * speed * shaken, -(shaken**2)])
+    real = roots.real[(roots.real > 0) & (np.abs(roots.imag) < 1e-6 * np.abs(roots.real))]
+    k = float(real.max(initial=1e-9))  # none at a speed that is refused later
+    return min(max(2 * math.pi / k / PER_WAVE, FINEST), COARSEST, data.longest_span / FEWEST)
+
+
+def clear_spans(data: SingleData, numerics: Numerics, runs: Runs, last: int) -> int:
+    """Spans beyond the last one of a pass that keep the line's end outside its window."""
+    return max(CLEAR, window_of(data, numerics.window, runs).ahead + 1)
+
+
+def warn_if_short(data: SingleData, numerics: Numerics, runs: Runs) -> None:
+    """Warn where a given window is shorter, or elements are longer, than costs 1 % of sigma."""
+    needed = spacing(data, runs.speeds[1])
+    if numerics.spacing and numerics.spacing > 1.5 * needed:
+        warnings.warn(
+            f"Elements of {numerics.spacing:g} m are coarser than line '{data.name}' needs at this speed "
+            f"({needed:.2g} m): standard deviation and extremes may be wrong by more than 1 %.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+    given, enough = numerics.window, window_of(data, None, runs).about_one
+    if given and given < enough:
+        warnings.warn(
+            f"A window of {given} spans is short on line '{data.name}', where {enough} are usual: standard "
+            f"deviation and extremes may be wrong by up to about {SHORT} %; leave out window.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
