@@ -18,7 +18,7 @@ from panto_env.studies.en50318.reference import in_use
 
 from . import simulation, twin
 from .differences import at_rest
-from .figures import Figures, Run, draw
+from .figures import Run, draw
 from .figures import figures as figures_of
 from .sections import Section, sections
 from .trains import cases
@@ -29,29 +29,29 @@ OURS = (Numerics(), Numerics(spacing=0.125, time_step=2.5e-4, window=0, precisio
 FINITE_ELEMENTS = ((1.0, 1e-3), (0.5, 5e-4), (0.25, 2.5e-4))  # element (m), time step (s)
 
 
-def cells(*values: float) -> list[str]:
-    return [f"{value:.2f}" for value in values]
-
-
-def forces(found: Figures) -> list[str]:
-    return cells(found.mean, found.std, found.maximum, found.minimum)
-
-
 def main() -> None:
     """Print the figures of spans 5 and 6 at 250 and 300 km/h, by default and converged."""
     line, pantograph = load_catenary(NAME), load_pantograph(NAME)
     table = Table("km/h", "model", "grid (m)", "step (ms)", "F_m (N)", "σ (N)", "max (N)", "min (N)")
     for speed in (250.0, 300.0):
         for numerics in (in_use(each, speed) for each in OURS):
-            ours = simulate(NAME, NAME, speed, distance=361.0, **numerics.model_dump()).summary((5, 6))
-            grid = f"{numerics.spacing:.3g}", f"{1e3 * numerics.time_step:.3g}"
-            row = cells(ours.mean, ours.std, ours.max, ours.min)
-            table.add_row(f"{speed:g}", "finite differences", *grid, *row)
+            figures = simulate(NAME, NAME, speed, distance=361.0, **numerics.model_dump()).summary((5, 6))
+            values = (figures.mean, figures.std, figures.max, figures.min)
+            row = (f"{value:.2f}" for value in values)
+            table.add_row(
+                f"{speed:g}",
+                "finite differences",
+                f"{numerics.spacing:.3g}",
+                f"{1e3 * numerics.time_step:.3g}",
+                *row,
+            )
         for element, step in FINITE_ELEMENTS:
             result = simulation.simulate(
                 line, pantograph, speed, element=element, time_step=step, distance=6.1 * line.span_length
             )
-            row = forces(figures_of(result))
+            theirs = figures_of(result)
+            values = (theirs.mean, theirs.std, theirs.maximum, theirs.minimum)
+            row = (f"{value:.2f}" for value in values)
             table.add_row(f"{speed:g}", "finite elements", f"{element:g}", f"{1e3 * step:g}", *row)
         table.add_section()
     Console().print(table)
@@ -79,7 +79,9 @@ def compare_sections(only: str, folder: Path) -> None:
         runs = make()
         for model, run in runs.items():
             found = figures_of(run, spans)
-            table.add_row(name, model, *forces(found), " ".join(f"{each:.1f}" for each in found.uplifts_mm))
+            values = (found.mean, found.std, found.maximum, found.minimum)
+            uplifts = " ".join(f"{each:.1f}" for each in found.uplifts_mm)
+            table.add_row(name, model, *(f"{value:.2f}" for value in values), uplifts)
         table.add_section()
         draw({model: [run] for model, run in runs.items()}, spans, folder / f"{name}.png")
     Console().print(table)
@@ -100,9 +102,10 @@ def compare_trains(folder: Path, element: float | None = None) -> None:
         for number, own in enumerate(case.collectors):
             for model, run in runs.items():
                 found = figures_of(run[number], case.spans)
+                values = (found.mean, found.std, found.maximum, found.minimum, found.loss_percent)
                 uplifts = "" if number else " ".join(f"{each:.1f}" for each in found.uplifts_mm)
-                row = *forces(found), *cells(found.loss_percent), uplifts
-                table.add_row(name, f"{number + 1}: {own.pantograph.name}", model, *row)
+                whose = f"{number + 1}: {own.pantograph.name}"
+                table.add_row(name, whose, model, *(f"{value:.2f}" for value in values), uplifts)
         table.add_section()
         draw(runs, case.spans, folder / f"{name}.png")
     Console().print(table)
@@ -116,7 +119,7 @@ def compare_twins() -> None:
     for speed, spacing in twin.CASES:
         one = twin.section(speed, spacing)
         both = replace(one, line=twin.mirrored(twin.two_wires(one.line)))
-        twins = twin.along_twins(one)
+        twins = twin.along_twins(one, twin.ALTERNATING)
         by_wire = twin.shared(twins, one.spans)
         own = (f"{by_wire.std:.2f}", f"{by_wire.first:.1f}", f"{by_wire.alone:.1f}")
         rows = {
@@ -127,8 +130,9 @@ def compare_twins() -> None:
         }
         for model, (run, more) in rows.items():
             found = figures_of(run, one.spans)
-            row = *forces(found), f"{found.uplift_mm:.1f}", *more
-            table.add_row(f"{speed:g}", f"{spacing:g}", model, *row)
+            values = (found.mean, found.std, found.maximum, found.minimum)
+            forces = (f"{value:.2f}" for value in values)
+            table.add_row(f"{speed:g}", f"{spacing:g}", model, *forces, f"{found.uplift_mm:.1f}", *more)
         table.add_section()
     Console().print(table)
 

@@ -66,7 +66,12 @@ def uniform_load(nodes: Array, load: float) -> Array:
 
 def shape_functions(s: float, h: float) -> tuple[Array, Array]:
     """Values (-, m) and slopes (1/m, -) of an element's four functions at ``s`` in [0, 1]."""
-    values = [1 - s * s * (3 - 2 * s), h * s * (1 - s) ** 2, s * s * (3 - 2 * s), h * s * s * (s - 1)]
+    values = [
+        1 - s * s * (3 - 2 * s),
+        h * s * (1 - s) ** 2,
+        s * s * (3 - 2 * s),
+        h * s * s * (s - 1),
+    ]
     slopes = [6 * s * (s - 1) / h, 1 - s * (4 - 3 * s), 6 * s * (1 - s) / h, s * (3 * s - 2)]
     return np.array(values), np.array(slopes)
 

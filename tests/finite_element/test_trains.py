@@ -1,8 +1,9 @@
-"""Several collectors on one line: the simulator beside the judge.
+"""Several collectors on one line: the judge itself, and the simulator beside it.
 
 ``python -m tests.finite_element --trains`` prints what is compared here, and draws it.
 """
 
+import numpy as np
 import pytest
 
 from panto_env.catalog import load_catenary, load_pantograph
@@ -10,12 +11,17 @@ from panto_env.catalog import load_catenary, load_pantograph
 from ..marks import some_in_proofs
 from . import __main__ as comparison
 from .contacts import Collector
+from .energy import balance
 from .figures import figures
+from .sections import line_of, overlap
+from .simulation import ride, ride_together
+from .system import build
 from .trains import Case, cases
 
 REFERENCE, DSA = load_pantograph("en50318-2002"), load_pantograph("dsa380")
+LINE = load_catenary("en50318-2002").model_copy(update={"spans": 5})
 SHORT = Case(
-    load_catenary("en50318-2002").model_copy(update={"spans": 8}),
+    LINE.model_copy(update={"spans": 8}),
     (Collector(REFERENCE), Collector(DSA, 80.0)),
     250.0,
     spans=(3, 5),
@@ -25,10 +31,83 @@ SHORT = Case(
 CASES = cases()
 
 
+@pytest.fixture(scope="module")
+def system():
+    return build(LINE, LINE.spans, 1.0)
+
+
+def share(pantograph, part):
+    """A pantograph of which several make up one."""
+    scaled = {
+        key: tuple(part * value for value in getattr(pantograph, key))
+        for key in ("masses", "stiffnesses", "dampings")
+    }
+    single = ("static_force", "aerodynamic_coefficient", "contact_stiffness", "contact_damping")
+    return pantograph.model_copy(update=scaled | {key: part * getattr(pantograph, key) for key in single})
+
+
+@pytest.mark.slow
+def test_unequal_parts_side_by_side_are_one_pantograph(system):
+    """What a contact's force does to another within the step, droppers slack or not, contact lost or not."""
+    whole = DSA.model_copy(update={"contact_damping": 150.0, "aerodynamic_coefficient": 0.0})
+    pieces = [Collector(share(whole, part)) for part in (0.2, 0.5, 0.3)]
+    one = ride(system, whole, 350.0, 1e-3, distance=270.0)
+    parts = ride_together(system, pieces, 350.0, 1e-3, distance=270.0)
+    for own, part in zip(parts, (0.2, 0.5, 0.3), strict=True):
+        np.testing.assert_allclose(own.contact_force, part * one.contact_force, atol=1e-4)
+        for key in ("head", "wire", "uplift", "position"):
+            np.testing.assert_allclose(getattr(own, key), getattr(one, key), atol=1e-8)
+    assert (one.dropper_tension == 0).any()
+    assert (one.contact_force == 0).any()
+
+
+@pytest.mark.slow
+def test_a_collector_that_waits_is_at_rest_and_then_runs_as_if_it_had_been_the_first(system):
+    """720 steps of 69 mm are 50 m."""
+    first, later = ride(system, DSA, 250.0, 1e-3), ride_together(system, [Collector(DSA, 50.0)], 250.0, 1e-3)
+    (later,) = later
+    assert later.position[0] == -50.0
+    np.testing.assert_allclose(later.contact_force[:721], first.contact_force[0], atol=1e-9)
+    np.testing.assert_allclose(later.head[:721], first.head[0], atol=1e-12)
+    assert (later.uplift[:721] == 0).all()
+    steps = later.time.size - 720
+    for key in ("contact_force", "wire", "position"):
+        np.testing.assert_allclose(getattr(later, key)[720:], getattr(first, key)[:steps], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_first_collector_feels_the_second_only_once_that_is_on_the_line(system):
+    alone = ride(system, REFERENCE, 250.0, 1e-3)
+    first, second = ride_together(system, [Collector(REFERENCE), Collector(DSA, 50.0)], 250.0, 1e-3)
+    np.testing.assert_allclose(first.contact_force[:721], alone.contact_force[:721], atol=1e-9)
+    assert abs(first.contact_force - alone.contact_force)[1500:].max() > 2.0
+    assert np.ptp(second.contact_force[:721]) < 1e-9
+    assert np.array_equal(first.uplift, second.uplift)
+    # The second one meets a wire that moves: it does not run as a first one does.
+    itself = ride(system, DSA, 250.0, 1e-3).contact_force[: second.time.size - 720]
+    assert abs(second.contact_force[720:] - itself)[1500:].max() > 20.0
+
+
+@pytest.mark.slow
+def test_energy_is_balanced_under_two_collectors_through_an_overlap():
+    """The first has both wires above it before the second has. The error is of second order in the step."""
+    line = line_of("re330", overlap(2, 0.1, 0.5) | {"sequence": [{}] * 5})
+    train = [Collector(DSA), Collector(REFERENCE, 40.0)]
+    coarse, fine = (balance(line, train, 280.0, distance=260.0, step=step) for step in (1e-3, 2.5e-4))
+    assert fine.steps_with_slack > 0
+    assert (fine.wire_forces > 0).all(axis=2).any(axis=0).all()
+    assert fine.error < 3e-4 * fine.turnover
+    assert fine.error < coarse.error / 9  # droppers that slacken make single halvings give 2.9 to 4.9
+
+
+@pytest.mark.slow
+def test_contact_force_and_uplift_of_two_pantographs_are_those_of_finite_elements():
+    agrees(SHORT)
+
+
 @pytest.mark.parametrize("name", some_in_proofs(CASES, ["unlike-330"]))
 def test_every_train_agrees_with_finite_elements(name):
-    case = CASES[name]
-    near(case.by_simulator(), case.by_finite_elements(), case, 0.02)
+    agrees(CASES[name])
 
 
 @pytest.mark.study
@@ -52,6 +131,10 @@ def test_both_codes_are_printed_and_drawn_train_by_train(monkeypatch, tmp_path, 
     )
     assert ours == pytest.approx(theirs, abs=1.5)
     assert (tmp_path / "pictures" / "short.png").read_bytes().startswith(b"\x89PNG")
+
+
+def agrees(case):
+    near(case.by_simulator(), case.by_finite_elements(), case, 0.02)
 
 
 def near(ours, theirs, case, sigma):

@@ -12,7 +12,7 @@ from ..marks import some_in_proofs
 from .contacts import Collector
 from .figures import figures
 from .trains import Case
-from .twin import mirrored, paired, section, train_along_twins, two_wires
+from .twin import ALTERNATING, mirrored, paired, section, train_along_twins, two_wires
 
 BEHIND = 100.0  # m, of the second of two pantographs
 CASES = {
@@ -37,7 +37,7 @@ def made(name):
     behind = (BEHIND,) * (count - 1)
     collectors = tuple(Collector(one.pantograph, each) for each in (0.0, *behind))
     ours = Case(mirrored(two_wires(one.line)), collectors, speed, one.spans).by_simulator()
-    return one, ours, train_along_twins(one, behind, time_step=5e-4)
+    return one, ours, train_along_twins(one, ALTERNATING, behind, time_step=5e-4)
 
 
 @pytest.mark.parametrize("name", some_in_proofs(CASES, IN_PROOFS))

@@ -51,7 +51,9 @@ class Case:
         """The pass by the simulator, one trace a collector; numerics: settings besides the whole line."""
         first, *others = self.collectors
         train = Train.of(
-            first.pantograph, *(own.pantograph for own in others), distances=[own.behind for own in others]
+            first.pantograph,
+            *(own.pantograph for own in others),
+            distances=[own.behind for own in others],
         )
         speed = self.speed_kmh / 3.6
         plant = Plant(

@@ -24,6 +24,8 @@ from .sections import Section
 from .simulation import Result, ride_together
 from .system import LineSystem, joined, of_pair
 
+ALTERNATING, IN_PAIRS = "alternating", "in pairs"
+"""Every second dropper holds the same wire; or two droppers at each place, each half of the line's."""
 SPANS = 10
 CASES = ((120.0, 5.0), (160.0, 5.0), (200.0, 5.0), (160.0, 7.5))
 """Speeds (km/h) and distances between droppers (m) that are printed."""
@@ -93,10 +95,8 @@ def halved(wire: Wire) -> Wire:
     return wire.model_copy(update={key: getattr(wire, key) / 2 for key in keys})
 
 
-def halves(line: FlexibleCatenaryData, element: float) -> list[LineSystem]:
+def halves(line: FlexibleCatenaryData, kind: str, element: float) -> list[LineSystem]:
     """Each contact wire under its half of the messenger, in elements up to ``element`` (m).
-
-    Every second dropper holds the same wire.
 
     Raises ValueError where nodes are not the same, because these do not divide the droppers' distances.
     """
@@ -104,7 +104,7 @@ def halves(line: FlexibleCatenaryData, element: float) -> list[LineSystem]:
     wires = halved(line.wires[0]), halved(line.wires[1])
     found = []
     for first in (0, 1):
-        spans = [_half(span, first) for span in pair.spans]
+        spans = [_half(span, kind, first) for span in pair.spans]
         above = np.zeros(sum(len(span.droppers.sag) for span in spans))
         rest = pair_at_rest(replace(pair, spans=spans, above=above), wires, element)
         found.append(of_pair(rest, wires, line.damping))
@@ -114,17 +114,22 @@ def halves(line: FlexibleCatenaryData, element: float) -> list[LineSystem]:
     return found
 
 
-def _half(span: Span, first: int) -> Span:
-    """What one wire has of a span: half of all, and every second dropper from ``first`` on."""
+def _half(span: Span, kind: str, first: int) -> Span:
+    """What one wire has of a span: of all its droppers half, or every second dropper from ``first`` on."""
 
     def share(part: object, *keys: str) -> dict[str, float]:
         return {key: getattr(part, key) / 2 for key in keys}
 
     droppers, arm, support = span.droppers, span.steady_arm, span.support
-    table = {key: getattr(droppers, key)[first::2] for key in ("positions", "sag")}
+    if kind == IN_PAIRS:
+        keys = "stiffness", "mass", "messenger_clamp_mass", "contact_clamp_mass"
+        own = droppers.model_copy(update=share(droppers, *keys))
+    else:
+        table = {key: getattr(droppers, key)[first::2] for key in ("positions", "sag")}
+        own = droppers.model_copy(update=table)
     return span.model_copy(
         update={
-            "droppers": droppers.model_copy(update=table),
+            "droppers": own,
             "steady_arm": arm.model_copy(update=share(arm, "mass", "stiffness")),
             "support": support.model_copy(update=share(support, "stiffness", "damping")),
         }
@@ -183,15 +188,25 @@ def shared(run: Result, spans: tuple[int, int]) -> Shared:
     )
 
 
-def along_twins(one: Section) -> Result:
+def along_twins(one: Section, kind: str, element: float | None = None) -> Result:
     """A pass of a section along its line with two contact wires; uplifts of the first, then of the other."""
-    (result,) = train_along_twins(one, time_step=1e-3 * one.element)
+    (result,) = train_along_twins(one, kind, element=element)
     return result
 
 
-def train_along_twins(one: Section, behind: Sequence[float] = (), *, time_step: float) -> list[Result]:
-    """The same of several like pantographs; behind: distances of further ones from the first (m)."""
-    system = tied(*halves(one.line, one.element))
+def train_along_twins(
+    one: Section,
+    kind: str,
+    behind: Sequence[float] = (),
+    element: float | None = None,
+    time_step: float | None = None,
+) -> list[Result]:
+    """The same of several like pantographs; behind: distances of further ones from the first (m).
+
+    time_step: s, by default as many milliseconds as elements have metres.
+    """
+    element = element or one.element
+    system = tied(*halves(one.line, kind, element))
     collectors = [Collector(on_both(one.pantograph), each) for each in (0.0, *behind)]
     distance = one.distance + max(behind, default=0.0)
-    return ride_together(system, collectors, one.speed_kmh, time_step, distance)
+    return ride_together(system, collectors, one.speed_kmh, time_step or 1e-3 * element, distance)
