@@ -191,3 +191,20 @@ def test_an_environment_behind_the_guard_does_what_the_guarded_policy_does():
 def test_the_environment_behind_the_guard_keeps_gymnasiums_rules():
     env = gymnasium.make("panto_env:Pantograph-v0", distance=300.0).unwrapped
     check_env(GuardedEnv(env), skip_render_check=True)
+
+
+RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rules", "case"),
+    [
+        (RULES, ("ln2", "dsa250", 220.0, "guarded:pd")),
+        ([*RULES, "SHIFT"], ("sweden-st15", "dsa250", 160.0, "guarded:agent-any-line")),
+    ],
+)
+def test_without_its_rules_it_fails(rules, case, monkeypatch):
+    for name in rules:
+        monkeypatch.setattr(guarded, name, np.inf)
+    assert max(changes(*case)) > 15.0

@@ -183,3 +183,47 @@ def test_margins_are_where_a_policy_meets_the_passive_pantograph():
     assert table.headings == ("policy", "delay (ms)", "gain")
     assert table.cells == [("p", f"{20 + 20 * 10 / 15:.3g}", "> 2")]
     assert margins_table("track", [{"case": "d"}], compare(rows)) is None
+
+
+CHEATS = '''
+import numpy as np
+from panto_baselines.policies.repetitive import Repetitive
+
+class Early(Repetitive):
+    """Acts up to the end of the early window only."""
+    def reset(self, context):
+        super().reset(context)
+        self.step = 0
+    def acts(self, step):
+        return step < 1460
+    def act(self, observation):
+        self.step += 1
+        action = super().act(observation)
+        return action if self.acts(self.step) else np.zeros_like(action)
+
+class Late(Early):
+    """Acts from the late window on only."""
+    def acts(self, step):
+        return step > 2100
+'''
+
+
+@pytest.mark.slow
+def test_who_acts_in_one_window_alone_is_not_ranked_or_loses(tmp_path):
+    """At 280 km/h a span of 60 m takes 77 control steps."""
+    file = tmp_path / "cheats.py"
+    file.write_text(CHEATS)
+    given = asked(
+        policies=["repetitive", f"{file}:Early", f"{file}:Late"],
+        lines=[{"speeds_kmh": [280]}],
+        seeds=2,
+        line_condition="as-built",
+        late_spans=(30, 39),
+    )
+    _, honest, early, late = benchmark.run(given).standings
+    assert honest.rank == 1
+    assert early.rank is None
+    assert "grows along the line" in early.disqualified
+    assert early.early == pytest.approx(honest.early, abs=1.0)
+    assert late.change > honest.change + 5
+    assert late.early == pytest.approx(0, abs=0.5)

@@ -3,7 +3,7 @@
 import json
 import math
 import tomllib
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -322,3 +322,21 @@ def test_kinds_that_are_joined_have_spans_and_droppers_of_their_own():
         assert sum(a != b for a, b in pairwise(firsts)) == len(set(firsts)) - 1
         alone = plain.draw(np.random.default_rng(seed))[0]
         assert len({span.droppers.positions[0] for span in alone.layout().spans}) == 1
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("name", NAMES)
+def test_seeds_give_lines_that_differ_widely(name):
+    """Not one line with a little noise: in number of spans, in each span's length, in bridges."""
+    lines = [drawn(name, seed) for seed in range(20)]
+    lengths = [np.array([span.span_length for span in line.layout().spans]) for line in lines]
+    assert len({len(each) for each in lengths}) >= 6
+    apart, alike = [], []
+    for a, b in combinations(lengths, 2):
+        n = min(len(a), len(b))
+        apart.append(np.abs(a[:n] / a.max() - b[:n] / b.max()).mean())
+        alike.append(np.corrcoef(a[:n], b[:n])[0, 1])
+    assert min(apart) > 0.04
+    assert abs(np.mean(alike)) < 0.1
+    lowest = [int(np.argmin([item["encumbrance"] for item in line.sequence])) for line in lines]
+    assert len(set(lowest)) > 8

@@ -226,3 +226,28 @@ def test_groups_step_on_several_threads_as_on_one(settings, monkeypatch):
             np.testing.assert_array_equal(ours[k], theirs[k])
     assert ends > 8
     assert cores() == 1 or many.unwrapped._lanes._threads._pool
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("settings", "limits"),
+    [
+        (FAMILY, lambda wave_speed: (0.45 * wave_speed, min(350, 0.7 * wave_speed))),
+        (SECTION, lambda wave_speed: (120, 160)),
+    ],
+    ids=["family", "section"],
+)
+def test_each_episode_has_a_line_of_its_own(settings, limits):
+    env = make(**settings)
+    lines, space = [], env.observation_space
+    for seed in (4, None, None, 4):
+        observation, info = env.reset(seed=seed)
+        assert observation in space
+        context = env.unwrapped.context
+        lines.append(values_of(context))
+        slowest, fastest = limits(3.6 * context.catenary.contact_wire.wave_speed)
+        assert slowest <= info["speed_kmh"] <= fastest
+        run_to_end(env)
+    assert lines[0] == lines[3]
+    assert len(set(lines)) == 3
+    assert lines[0] == line_of(4, **settings).model_dump_json(exclude={"sources"})

@@ -262,3 +262,44 @@ def test_unstable_step_is_refused(spacing):
     """Also on a grid so fine that only waves of middle length would grow."""
     with pytest.raises(InputError, match=rf"unstable on a grid of {spacing} m"):
         simulate(spacing=spacing, time_step=1e-3)
+
+
+@pytest.mark.slow
+@PRECISIONS
+def test_force_travelling_along_a_string_matches_the_closed_form(precision):
+    """From an anchor, d'Alembert and one image give w(vt, t) = F v t / (m c (c + v))."""
+    line = undamped(load_catenary("en50318-2002"))
+    string = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
+    limp = line.droppers.model_copy(update={"stiffness": 1e-6})
+    alone = line.model_copy(update={"contact_wire": string, "droppers": limp})
+    step, speed, force = 1e-3, 300 / 3.6, 100.0
+    built = constants_of(alone, 10, Numerics(spacing=0.25, time_step=step, window=0, precision=precision))
+    bare = built._replace(shape=np.zeros_like(built.shape))
+    wire = at_rest(bare, 1, 1)
+    steps = 3000  # before the far anchor's reflection
+    heights = np.zeros(steps)
+    travel(bare, wire, 0.0, speed * step, force, heights, np.zeros(3))
+    time = step * (np.arange(steps) + 0.5)
+    wave = np.sqrt(string.tension / string.mass)
+    exact = force * speed * time / (string.mass * wave * (wave + speed))
+    assert np.abs(heights - exact).max() < 0.005 * exact.max()
+    assert (along(wire.displacement[0])[:, [PAD, -PAD]] == 0).all()  # the anchors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "pantograph", "speed"),
+    [
+        ("benchmark-2015", "benchmark-2015", 300.0),
+        ("shinkansen-simple", "identified-2dof", 300.0),
+        ("beijing-tianjin", "dsa380", 300.0),
+    ],
+)
+def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
+    data = load_catenary(line)
+    panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
+    distance = 6.1 * data.span_length
+    fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
+    ours = simulate(line, panto, speed, **fine).summary((5, 6))
+    other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
+    assert ours.std == pytest.approx(finite_element.figures(other).std, rel=0.02)

@@ -179,3 +179,19 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_presses_less_hard(tmp_p
     print(moved, ratios)
     assert max(ratios) < 0.87
     assert abs(moved[0]) < 0.5 * moved[1]
+
+
+def test_a_tape_of_actions_is_worth_little_in_another_episode():
+    """It was worth as much as the policy while every episode was the same one."""
+    env, pd = gymnasium.make(NAME, distance=400.0), find_policy("pd")
+    ratios = []
+    for seed in range(4):
+        _, _, tape = play(env, pd, seed=seed + 100)
+        passive, own, played = (
+            play(env, policy, seed, actions)[1][-1]["figures"]["std"]
+            for policy, actions in ((None, None), (pd, None), (None, tape))
+        )
+        ratios.append((own / passive, played / passive))
+    own, played = np.mean(ratios, axis=0)
+    assert own < 0.95
+    assert played > own + 0.04

@@ -295,3 +295,26 @@ def test_the_table_of_conditions_has_every_preset_and_is_of_simulated_passes(mon
     sigmas = [simulate(**given, seed=seed).summary().std for seed in range(2)]
     assert worn.std == pytest.approx((np.mean(sigmas), np.std(sigmas)))
     assert worn.change == pytest.approx(100 * (worn.std[0] / checks[0].std[0] - 1))
+
+
+LEVELS = ("smooth", "fair", "worn")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "pantograph", "speed"),
+    [("en50318-2002", "en50318-2002", 250.0), ("sweden-st15", "dsa250", 160.0), ("re330", "dsa380", 330.0)],
+)
+def test_a_fair_line_is_worse_than_a_smooth_one_and_a_worn_one_than_both(line, pantograph, speed):
+    """By percents of sigma, not by tenths of one."""
+
+    def sigma(level, seed=0):
+        run = simulate(line, pantograph, speed, seed=seed, line_condition=level, record_droppers=False)
+        return run.summary().std
+
+    new = sigma("new")
+    smooth, fair, worn = (np.mean([sigma(level, seed) for seed in range(4)]) / new - 1 for level in LEVELS)
+    assert abs(smooth) < 0.01
+    assert 0.015 < fair < 0.12
+    assert 0.08 < worn < 0.4
+    assert worn > 2 * fair

@@ -281,3 +281,17 @@ def test_default_window_agrees_with_the_whole_line(case):
     assert abs(check.std) < bound
     assert max(abs(check.max), abs(check.min)) < bound  # % of the mean force
     assert abs(check.uplift) < 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "speed"), [(4, 0.62), (4, 0.7), (8, 0.62), (16, 30.0), (20, 0.5)])
+def test_lines_outside_the_catalogue_are_as_accurate(seed, speed):
+    """Wires without bending stiffness, under trams and light trains: sigma was wrong by 1.0 to 1.8 %.
+
+    In the last two the maximum was, by 1.8 and 1.1 % of the mean force. speed: km/h, or a share of the wave
+    speed.
+    """
+    (case,) = (c for c in lines.drawn_cases(seed) if pytest.approx(speed) in (c.share, c.speed_kmh))
+    (check,) = lines.check_case(case)
+    assert not check.warned
+    assert_within_bounds(check)

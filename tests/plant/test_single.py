@@ -296,3 +296,20 @@ def test_lanes_of_an_environment_do_not_touch_each_other():
         seen, *_ = lanes.step(command)
     assert (seen[0] == seen[2]).all()
     assert (seen[0] != seen[1]).any()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Line 'en50318-2002'")  # of its stiff droppers
+@pytest.mark.parametrize(("speed", "apart"), [(50.0, 0.04), (70.0, 0.02)])
+def test_a_flexible_line_hung_at_its_supports_alone_is_nearly_a_single_wire(speed, apart):
+    """Its messenger stands still; droppers 0.25 m from a support turn the contact wire there by half each."""
+    wire = TRAM.contact_wire.model_dump()
+    hung = changed(
+        load_catenary("en50318-2002"), span_length=30.0, spans=24, contact_wire=wire,
+        messenger_wire={"mass": 0.05, "tension": 200e3, "bending_stiffness": 100.0},
+        droppers={"positions": [0.25, 29.75], "sag": [0.0, 0.0], "stiffness": 1e7},
+        support={"stiffness": 1e7, "damping": 50.0}, damping={"alpha": 0.05, "beta": 1e-4},
+    )  # fmt: skip
+    alone = changed(TRAM, support__stiffness=1e7)
+    ours, theirs = (simulate(data, "own-tram", speed, spans=24).summary((13, 21)) for data in (alone, hung))
+    assert ours.std == pytest.approx(theirs.std, rel=apart)

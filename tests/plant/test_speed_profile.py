@@ -15,6 +15,8 @@ from panto_env.metrics.low_pass import low_pass
 from panto_env.plant.speed import DRIFT_ROWS, SpeedProfile, ahead, gain
 
 from ..command import panto as run_panto
+from ..finite_element.contacts import Collector
+from ..finite_element.energy import balance
 from ..lanes import check_lanes_are_singles
 
 SIMPLE = {"catenary": "periodic-stiffness", "pantograph": "three-mass"}
@@ -160,3 +162,14 @@ def test_the_command_prints_them():
     assert done.returncode == 0
     assert "at 210 to 235 km/h" in done.stdout
     assert "by the train's speed" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_judge_s_energy_is_balanced_while_the_train_brakes():
+    """What lift and train give, F v y' with the speed of each step, is stored and lost."""
+    line, pantograph = load_catenary("en50318-2002"), load_pantograph("en50318-2002")
+    line = line.model_copy(update={"spans": 6})
+    motion = finite_element.Motion(*SpeedProfile(points=[(0, 250), (60, 250), (290, 220)]).knots)
+    found = balance(line, [Collector(pantograph)], 250.0, distance=290.0, motion=motion)
+    assert found.steps_with_slack > 0
+    assert found.error < 1e-3 * found.turnover

@@ -315,3 +315,25 @@ def test_a_line_is_drawn_below_the_last_dropper_of_each_span():
     assert len(alike.headings) == len(made.headings) - 1 == 6
     assert "sag (mm)" in alike.headings
     assert "stretch at rest (mm)" in alike.headings
+
+
+def test_string_hangs_in_a_parabola_between_its_droppers():
+    line = load_catenary("en50318-2002")
+    limp = line.contact_wire.model_copy(update={"bending_stiffness": 0.0})
+    shape = static_shape.solve(line.model_copy(update={"contact_wire": limp}))
+    a, b = line.droppers.positions[4:6]
+    deepest = limp.mass * static_shape.GRAVITY * (b - a) ** 2 / (8 * limp.tension)
+    assert shape.contact.height(np.array([(a + b) / 2]))[0] == pytest.approx(-deepest, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", UNIFORM)
+def test_in_equilibrium(name):
+    """Droppers and steady arm carry the contact wire's weight; tensions are positive."""
+    line = load_catenary(name)
+    shape = static_shape.solve(line)
+    weight = line.contact_wire.mass * static_shape.GRAVITY * line.span_length
+    clamps = static_shape.GRAVITY * (shape.dropper_mass / 2 + line.droppers.contact_clamp_mass)
+    assert (shape.dropper_tension - clamps).sum() + shape.arm_force == pytest.approx(weight)
+    assert shape.dropper_tension.min() > 0
+    sag = -np.array(line.droppers.sag)
+    assert shape.contact.height(np.array(line.droppers.positions)) == pytest.approx(sag, abs=1e-9)

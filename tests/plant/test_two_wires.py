@@ -305,3 +305,11 @@ def test_what_is_not_computed_with_two_wires_is_refused(changes, message):
 def test_defects_of_the_contact_wire_itself_are_refused(own):
     with pytest.raises(InputError, match=r"'ca-160' has two contact wires, on which hard_spots and worn_"):
         simulate("ca-160", DSA, 160.0, line_condition=own)
+
+
+def test_a_window_about_the_train_gives_what_the_whole_line_does():
+    runs = [
+        simulate(FAR, DSA, 160.0, distance=1320.0, window=window).summary((10, 19)) for window in (0, None)
+    ]
+    for name in ("mean", "std", "max", "min", "max_uplift"):
+        assert getattr(runs[1], name) == pytest.approx(getattr(runs[0], name), rel=0.01), name

@@ -6,9 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.signal import lsim
 
 from panto_env import InputError, simulate
 from panto_env.base.errors import AccuracyWarning
+from panto_env.catalog import load_catenary, load_pantograph
 from panto_env.control import Task
 from panto_env.control.settings import run_settings
 from panto_env.diagnosis.passes import estimated_force
@@ -148,3 +150,49 @@ def test_an_estimate_from_motion_is_said_to_lack_the_wind_s_lift():
     inside = windy.inside("all")
     missing = np.mean(windy.contact_force[inside] - force[inside])
     assert missing == pytest.approx(more, abs=1.0)
+
+
+def test_the_contact_force_is_the_linear_pantograph_s_under_that_lift():
+    """On an even spring, against SciPy's integration of the equations, and its variance's closed form."""
+    line = load_catenary("periodic-stiffness").model_copy(update={"stiffness_variation": 0.0})
+    pantograph, speed = load_pantograph("three-mass"), 200 / 3.6
+    settings = {"catenary": line, "distance": 550.0, "line_condition": {"wind": 12.0, "turbulence": 0.1}}
+    task = Task(run_settings(SIMPLE | settings))
+    task.reset(0, np.random.default_rng(5))
+    rows, step = task.plant.run.wind[0].copy(), task.plant.time_step
+    task.run_passively()
+    run = task.trajectory(0)
+
+    def chain(values):
+        """Matrix of springs or dampers, each below its mass, the last to the ground."""
+        below, above = np.array(values), np.array([0.0, *values[:-1]])
+        return np.diag(below + above) - np.diag(values[:-1], 1) - np.diag(values[:-1], -1)
+
+    mass = np.diag(pantograph.masses)
+    stiffness, damping = chain(pantograph.stiffnesses), chain(pantograph.dampings)
+    contact = line.mean_stiffness  # its strip is rigid there
+    stiffness[0, 0] += contact
+    nothing, one = np.zeros((3, 3)), np.eye(3)
+    a = np.block([[nothing, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+    b = np.append(np.zeros(3), np.linalg.solve(mass, np.array([0, 0, 1.0])))[:, None]
+    times = step * np.arange(len(run.time))
+    middle = np.arange(len(run.time)) + 0.5
+    air = speed + winds_at(rows, speed * step * middle, middle) / step
+    lift = pantograph.static_force + COEFFICIENT * air**2
+    gust = np.sum(rows[1::3] * np.cos(2 * np.pi * rows[3::3])) / step
+    still = pantograph.static_force + COEFFICIENT * (speed + 12.0 + gust) ** 2
+    rest = np.append(np.linalg.solve(stiffness, [0, 0, still]), np.zeros(3))
+    _, force, _ = lsim((a, b, contact * np.eye(1, 6), [[0.0]]), lift, times, X0=rest, interp=False)
+    between = 0.5 * (force[1:] + force[:-1])  # ours are means over a step
+    np.testing.assert_allclose(run.contact_force[:-1], between, atol=0.15)
+    assert np.ptp(between) > 5
+    # Small gusts: each cosine passes the pantograph's transfer function, and variances add up.
+    omega = 2 * np.pi * rows[2::3] * (speed + 12.0)
+    passed = [np.linalg.solve(stiffness + 1j * w * damping - w**2 * mass, [0, 0, 1.0])[0] for w in omega]
+    gusts = 2 * COEFFICIENT * (speed + 12.0) * rows[1::3] / step
+    long = simulate(**SIMPLE | settings | {"distance": 8000.0, "spans": 165, "seed": 5})
+    share = np.abs(contact * np.array(passed) * gusts) ** 2 / 2
+    assert np.std(long.contact_force) == pytest.approx(np.sqrt(share.sum()), rel=0.05)
+    steady = np.linalg.solve(stiffness, [0, 0, 1.0])[0] * contact
+    still = long.nominal_force + COEFFICIENT * (24.0 * speed + 12.0**2 + resolved() * 1.2**2)
+    assert np.mean(long.contact_force) == pytest.approx(steady * still, rel=0.01)

@@ -278,3 +278,22 @@ def test_what_a_moment_says_of_its_task():
     later = moment(driven(300, **STIFFNESS))  # at 167 m, of which the last 65 m are shown
     assert later.position - 65.0 <= later.places.min() < later.position - 65.0 + gaps[0]
     assert len(later.places) == len(later.force) == len(later.filtered)
+
+
+@pytest.mark.slow
+def test_record_video_writes_an_episode(tmp_path):
+    pytest.importorskip("moviepy")
+    env = gymnasium.make(
+        "Pantograph-v0", render_mode="rgb_array", render_size=SIZE, distance=60.0, run_in=0.0, settle=0.0
+    )
+    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), disable_logger=True)
+    env.reset(seed=0)
+    steps, ended = 0, False
+    while not ended:
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        steps, ended = steps + 1, terminated or truncated
+    env.close()
+    (film,) = tmp_path.glob("*.mp4")
+    meta, number = read(film)
+    assert meta["fps"] == 100
+    assert number == steps + 1
