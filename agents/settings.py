@@ -168,6 +168,8 @@ def _check(training: Training) -> None:
                 f"on a device an agent acts alone, on one line; leave out {', '.join(given)}, or device. The "
                 "environment has a washout of its own"
             )
+    if any("id" in changes for changes in training.variants):
+        raise InputError("variants change arguments of one environment; its id stands in [environment]")
     if training.lanes % max(1, len(training.variants)):
         raise InputError(
             f"{training.lanes} lanes cannot be shared equally by {len(training.variants)} variants"

@@ -154,6 +154,7 @@ def test_each_variant_is_evaluated_at_its_own_speeds_unless_they_are_given():
         ({"start_from": "pd"}, "start_from and variants exclude each other"),
         ({"variants": [{"pantograph": "nobody"}]}, "nobody"),
         ({"variants": [{"panto": "dsa250"}]}, "panto"),
+        ({"variants": [{"id": "PantographStiffness-v0"}]}, "its id stands in"),
         (
             {
                 "environment": {"observation": "full"},

@@ -219,10 +219,11 @@ REFUSED = [
     (("fb+ff:reading='printed'",), {}, "only with one gain"),
     (("agent-any-line-five",), {}, "export one member"),
     (("pd", "7up"), {}, "is not a name in C"),
-    (
+    pytest.param(
         ("agent-any-line",),
         {"actuator": "head-motor:place='head'"},
         "trained with an actuator on place 'frame'",
+        marks=pytest.mark.slow,
     ),
     (("pd",), {"observation": "full"}, "it sees the observation 'full', which no train reads"),
 ]

@@ -164,6 +164,7 @@ def test_estimators_know_what_the_height_adds(tmp_path):
     assert run.lift_by_height[-1] > 40.0
 
 
+@pytest.mark.slow
 def test_the_estimator_among_the_sensors_knows_it_too():
     settings = {"catenary": line_over((0.5,) * 12), "pantograph": DSA250, "speed_kmh": 100.0}
     task = Task(run_settings(settings | {"observation": "estimated", "sensors": "ideal", "accuracy": "fast"}))

@@ -17,19 +17,21 @@ NAME = "panto_env:Pantograph-v0"
 STILL = np.zeros(1, np.float32)
 
 
-def play(env, policy=None, seed=0):
-    """Observations and infos of an episode under a policy, or under none."""
+def play(env, policy=None, seed=0, tape=None):
+    """Observations, infos and actions of an episode under a policy, a tape of actions, or none."""
     observation, info = env.reset(seed=seed)
     if policy is not None:
         policy.reset(env.unwrapped.context)
-    seen, infos, ended = [observation], [info], False
+    seen, infos, done, ended = [observation], [info], [], False
+    left = iter(tape or ())
     while not ended:
-        action = STILL if policy is None else policy.act(observation).astype(np.float32)
+        action = next(left, STILL) if policy is None else policy.act(observation).astype(np.float32)
         observation, _, *ends, info = env.step(action)
         ended = any(ends)
         seen.append(observation)
         infos.append(info)
-    return np.array(seen), infos
+        done.append(action)
+    return np.array(seen), infos, done
 
 
 def test_two_seeds_give_two_episodes():
@@ -58,7 +60,7 @@ def test_entries_have_a_mean_near_0_and_a_spread_near_1():
 
 def test_the_force_is_read_relative_to_the_nominal_one():
     env = gymnasium.make(NAME, **BARE | {"observation": "centred", "distance": 120.0})
-    seen, infos = play(env)
+    seen, infos, _ = play(env)
     layout = env.unwrapped.context.layout
     read = [layout.read(observation, "contact force") for observation in seen]
     assert read == pytest.approx([info["contact_force"] for info in infos], rel=1e-5, abs=1e-3)
@@ -87,7 +89,7 @@ def test_the_bare_form_is_what_simulate_runs():
 
 def test_run_in_is_no_part_of_the_episode_s_figures():
     env = gymnasium.make(NAME, **BARE | {"run_in": 2.0, "distance": 120.0, "actuator": {"force_limit": 50.0}})
-    seen, infos = play(env, find_policy("p"), seed=3)
+    seen, infos, _ = play(env, find_policy("p"), seed=3)
     start, figures = infos[0]["position"], infos[-1]["figures"]
     assert 0 < start <= 120
     assert infos[-1]["position"] == pytest.approx(start + 120.0, abs=1.0)
@@ -106,7 +108,7 @@ def test_run_in_is_no_part_of_the_episode_s_figures():
 def test_run_in_leaves_an_episode_on_a_short_line():
     env = gymnasium.make(NAME, **BARE | {"run_in": 5.0, "spans": 3})
     for seed in range(5):
-        _, infos = play(env, seed=seed)
+        _, infos, _ = play(env, seed=seed)
         assert len(infos) > 1
         assert infos[-1]["position"] <= 180.0
 

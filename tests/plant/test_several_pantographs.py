@@ -15,7 +15,6 @@ from panto_env.plant.state import Row
 from panto_env.plant.train import Train
 
 from ..finite_element.sections import sections
-from ..marks import some_at_once
 
 LINE = load_catenary("en50318-2002")
 ONE, OTHER = load_pantograph("en50318-2002"), load_pantograph("dsa250")
@@ -48,7 +47,8 @@ def part(pantograph, share):
     return pantograph.model_copy(update=shared | {name: share * getattr(pantograph, name) for name in names})
 
 
-@pytest.mark.parametrize("name", some_at_once(["en50318-2002", "overlap-2002"], ["en50318-2002"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["en50318-2002", "overlap-2002"])
 def test_parts_of_a_pantograph_at_one_place_are_the_pantograph(name, monkeypatch):
     """But for what each knows of its own force only: the wire after the step, and what the grid lacks."""
     monkeypatch.setattr(FlexibleCatenary, "contact_share", 0.0)

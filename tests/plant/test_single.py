@@ -266,6 +266,7 @@ def test_a_ramp_is_where_the_head_starts_and_leaves_the_rest_as_it_was():
     assert run.position[-1] > 199.0
 
 
+@pytest.mark.slow
 def test_a_second_pantograph_meets_the_waves_of_the_first():
     """Alone and with another 20 m before it: a rail carries waves from one to the other."""
     alone = simulate(RAIL, "dsa380", 120.0, spans=48, distance=300.0)

@@ -153,6 +153,7 @@ def test_ice_is_on_each_wire_and_a_broken_dropper_lowers_the_one_that_it_held():
     assert 0 < rises[0] < 0.01  # the messenger rises, as it carries less there
 
 
+@pytest.mark.slow
 @PULSES
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     data = undamped(changed(FAR, steady_arm={"mass": 1.0, "stiffness": 0.0}))

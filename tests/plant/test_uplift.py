@@ -120,6 +120,17 @@ def test_a_run_that_begins_in_a_tunnel_is_at_rest_there():
     np.testing.assert_allclose(run.contact_force, expected, rtol=1e-6)
 
 
+def test_a_short_tunnel_and_two_close_to_each_other_have_a_factor_everywhere():
+    """Portals 20 m apart share the place half-way between them."""
+    settings = tunnels((50.0, 70.0, 1.5), (90.0, 150.0, 1.5))
+    places, _, excess = settings["catenary"].tunnel_rows
+    assert places.tolist() == [40.0, 60.0, 80.0, 100.0, 140.0, 160.0]
+    assert excess.tolist() == [0.0, 0.5, 0.0, 0.5, 0.5, 0.0]
+    run = simulate(**settings | {"distance": 200.0})
+    assert np.isfinite(run.contact_force).all()
+    assert not run.terminated
+
+
 def test_a_mean_force_is_set_in_the_open_and_an_estimator_knows_no_tunnel():
     through = line({"tunnels": [{"begin": 200.0, "end": 400.0, "factor": 1.6}]}, like="periodic-stiffness")
     settings = SIMPLE | {"pantograph": LAW, "mean_force": 95.0}

@@ -179,6 +179,7 @@ def test_a_rig_without_faults_is_the_line_itself_the_closer_the_shorter_the_time
         assert over_step[0] > 1.4 * over_step[1] > 1.4**2 * over_step[2]
 
 
+@pytest.mark.slow
 def test_the_rig_as_it_stands_follows_the_flexible_line_within_a_tenth_to_20_hz():
     dt = 2.5e-4
     usual = error(rig(), dt)

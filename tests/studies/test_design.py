@@ -17,7 +17,7 @@ from panto_env.cli import make_app
 pytest.importorskip("optuna")
 
 from panto_env.studies.design import Design, read_design, search
-from panto_env.studies.design.check import candidates_of, check, text_of
+from panto_env.studies.design.check import candidates_of, check, text_of, tornado_table
 from panto_env.studies.design.search import TRIED, arguments_of, best_of, in_words, tried
 from panto_env.studies.design.study import RETROFITTED, file_of
 
@@ -153,6 +153,15 @@ catenary = "benchmark-2015"
 pantograph = "dsa380"
 distance = 600
 """
+
+
+@pytest.mark.slow
+def test_a_variable_that_moves_into_what_is_refused_comes_first(monkeypatch):
+    monkeypatch.setattr(
+        f"{tornado_table.__module__}.tornado", lambda *_: [("a", 0.2, 0.3), ("b", math.nan, 0.2)]
+    )
+    rows = tornado_table(None, {}).rows
+    assert [*rows] == [("b", "–", "0.200"), ("a", "0.200", "0.300")]
 
 
 @pytest.mark.slow

@@ -108,7 +108,8 @@ class CatenaryData(Settings):
         for tunnel in self.tunnels:
             (begin, end), half = (tunnel.begin, tunnel.end), PORTAL / 2
             for place, open_air in ((begin - half, 1), (begin + half, 0), (end - half, 0), (end + half, 1)):
-                rows.append((place, float(open_air), (1 - open_air) * (tunnel.factor - 1)))
+                if not rows or place > rows[-1][0]:  # two portals PORTAL apart have one place in the middle
+                    rows.append((place, float(open_air), (1 - open_air) * (tunnel.factor - 1)))
         return np.array(rows).reshape(-1, 3).T.copy()
 
     @property

@@ -11,6 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ...analysis.plots import save
 from ...analysis.pool import in_threads
 from ...base.errors import InputError
@@ -118,8 +120,8 @@ def values_table(design: Design, candidates: Mapping[str, Mapping[str, float]]) 
 
 def tornado_table(design: Design, values: Mapping[str, float]) -> Table:
     """The effect of each variable at the optimum."""
-    rows = [(name, number(low, 3), number(high, 3)) for name, low, high in tornado(design, values)]
-    rows.sort(key=lambda row: -abs(float(row[1]) - float(row[2])))
+    moved = sorted(tornado(design, values), key=lambda row: -np.nan_to_num(abs(row[1] - row[2]), nan=np.inf))
+    rows = [(name, number(low, 3), number(high, 3)) for name, low, high in moved]
     return Table("σ/F_m with a variable moved by 5 % of its range", ("variable", "less", "more"), rows)
 
 
