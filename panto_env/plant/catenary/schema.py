@@ -104,7 +104,7 @@ class CatenaryData(Settings):
         """Places (m), share of the wind that blows there (-), and excess of the factor on the uplift over 1
         (-), (3, places), all linear between; no places without tunnels.
         """
-        rows = []
+        rows: list[tuple[float, float, float]] = []
         for tunnel in self.tunnels:
             (begin, end), half = (tunnel.begin, tunnel.end), PORTAL / 2
             for place, open_air in ((begin - half, 1), (begin + half, 0), (end - half, 0), (end + half, 1)):

@@ -140,10 +140,11 @@ def read_standard(path: str | Path) -> Standard:
 def compare(standard: Standard, report: Callable[[str], None] = lambda _: None) -> Compared:
     """Compute all lines and passes. Raises InputError, naming the test, where one is not valid."""
     checks: list[tuple[str, Check]] = []
-    for test in (*standard.lines, *standard.tests):
+    every: tuple[LineTest | RunTest, ...] = (*standard.lines, *standard.tests)
+    for test in every:
         report(test.name)
         try:
-            found = _at_rest(test) if isinstance(test, LineTest) else _of_run(standard, test)
+            found = _of_run(standard, test) if isinstance(test, RunTest) else _at_rest(test)
             checks += [(test.name, each) for each in found]
         except InputError as error:
             raise InputError(f"{test.name}: {error}") from error
