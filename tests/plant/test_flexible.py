@@ -284,22 +284,3 @@ def test_force_travelling_along_a_string_matches_the_closed_form(precision):
     exact = force * speed * time / (string.mass * wave * (wave + speed))
     assert np.abs(heights - exact).max() < 0.005 * exact.max()
     assert (along(wire.displacement[0])[:, [PAD, -PAD]] == 0).all()  # the anchors
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("line", "pantograph", "speed"),
-    [
-        ("benchmark-2015", "benchmark-2015", 300.0),
-        ("shinkansen-simple", "identified-2dof", 300.0),
-        ("beijing-tianjin", "dsa380", 300.0),
-    ],
-)
-def test_agrees_with_finite_elements_on_other_lines(line, pantograph, speed):
-    data = load_catenary(line)
-    panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
-    distance = 6.1 * data.span_length
-    fine = {"spacing": 0.125, "time_step": 1.25e-4, "distance": distance} | WHOLE
-    ours = simulate(line, panto, speed, **fine).summary((5, 6))
-    other = finite_element.simulate(data, panto, speed, element=0.25, time_step=2.5e-4, distance=distance)
-    assert ours.std == pytest.approx(finite_element.figures(other).std, rel=0.02)
