@@ -73,6 +73,7 @@ def test_it_learns_to_do_most_of_what_its_teacher_does(tmp_path):
     assert sum(each.size for each in (*actor.weights, *actor.biases)) < 500
 
 
+@pytest.mark.slow
 def test_round_by_round_it_comes_nearer_to_its_teacher():
     hyperparameters = {"teacher": TEACHER, "learning_rate": 1e-2, "net_arch": [8], "updates": 40}
     training, told, ends = settings(lanes=2, hyperparameters=hyperparameters | {"recurrent_units": 4}), [], []

@@ -49,6 +49,7 @@ def native(lanes=2, **more):
     return gymnasium.make_vec(NAME, num_envs=lanes, **SHORT | more)
 
 
+@pytest.mark.slow
 def test_a_pass_of_it_has_the_washout_of_its_training(tmp_path):
     mine = str(tmp_path / "mine.safetensors")
     save_policy(trained(PPO, bare(), n_steps=64).learn(64), mine)

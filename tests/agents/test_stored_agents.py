@@ -125,6 +125,7 @@ def test_agent_trailing_alone_lacks_what_the_one_in_front_measured_and_nothing_e
     assert alone == seeing
 
 
+@pytest.mark.slow
 def test_they_need_no_torch():
     code = (
         "import sys, panto_env, panto_agents.command\n"

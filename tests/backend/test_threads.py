@@ -95,6 +95,7 @@ def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_forked_process_steps_on_and_sees_what_its_parent_sees():
     """A child has none of the threads that helped its parent: it waited for them for ever."""

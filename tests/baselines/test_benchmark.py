@@ -96,6 +96,7 @@ def test_default_spans_leave_out_the_run_in_and_the_end():
     assert done.as_dict()["cells"][1]["figures"]["max_uplift"] is None
 
 
+@pytest.mark.slow
 def test_trainings_run_by_themselves_and_are_ranked_as_their_method(tmp_path):
     given = settings(policies=["passive"], trainings={"p's": [P, "p:gain=0.2"]})
     done = benchmark.run(given, workers=1)

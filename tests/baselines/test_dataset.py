@@ -207,6 +207,7 @@ def test_a_hub_reads_the_head_of_the_card(made):
     assert (folder / one.dataset_id / config["data_files"]).is_file()
 
 
+@pytest.mark.slow
 def test_the_same_is_made_again_to_the_last_byte_and_kept_where_it_is(made, tmp_path):
     _, one = made
     (again,) = make_episodes(settings(), tmp_path, workers=1)

@@ -131,6 +131,7 @@ def test_tracks_of_lines_that_nobody_fitted_have_two_windows():
         assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)
 
 
+@pytest.mark.slow
 def test_a_case_changes_the_runs_of_its_line_and_keeps_its_rows_apart():
     line = {"catenary": "en50318-2002", "speeds_kmh": [280], "distance": 900.0, "spans": (5, 12)}
     cases = [line, line | {"case": "weak", "run": {"faults": "actuator-weak"}}]
@@ -156,6 +157,7 @@ def test_a_case_changes_no_setting_that_names_its_row(run):
         asked(lines=[{"case": "a", "run": run}])
 
 
+@pytest.mark.slow
 def test_kilometres_are_compared_one_by_one():
     line = {"speeds_kmh": [280], "distance": 2900.0, "case": "long"}
     given = asked(policies=["pd:washout=1"], lines=[line], late_spans=None, by_kilometre=True)

@@ -68,6 +68,7 @@ def read(result):
     return parse_result(result.as_dict(), "the outcome")
 
 
+@pytest.mark.slow
 def test_every_policy_has_the_mean_of_its_episodes_at_the_speeds_of_the_result_in_turn(read):
     at_any = {name: value for name, value in SHORT.items() if name != "speed_kmh"}
     found = returns(read, episodes=3, arguments=at_any, workers=1)

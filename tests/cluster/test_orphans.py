@@ -91,6 +91,7 @@ def ended(command, begun, number, folder):
             os.kill(child, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_workers_end_with_their_parent(tmp_path):
     (tmp_path / "jobs.py").write_text(JOBS)
     begun = [tmp_path / "begun-0", tmp_path / "begun-1"]

@@ -268,6 +268,7 @@ def test_broken_droppers_are_found_and_named_and_a_healthy_line_is_healthy(healt
     assert changed + sum(each.changed for each in controls) <= 2
 
 
+@pytest.mark.slow
 def test_lost_tension_changes_the_whole_line(healthy_runs):
     defect = draw_defect(TRACK, TENSION, 0.05, 15, np.random.default_rng(0))
     found = diagnose([drive(TRACK, 60, (defect,))], healthy_runs)

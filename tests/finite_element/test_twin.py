@@ -12,6 +12,7 @@ from .twin import ALTERNATING, CASES, IN_PAIRS, along_twins, halves, section, sh
 SHORT = section(160.0)
 
 
+@pytest.mark.slow
 def test_two_wires_whose_droppers_hang_in_pairs_are_one_wire():
     short = Section(SHORT.line, SHORT.pantograph, 160.0, spans=(2, 2))
     twins, whole = along_twins(short, IN_PAIRS, 2.5), short.by_finite_elements(2.5)

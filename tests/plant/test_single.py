@@ -103,6 +103,7 @@ def frequency(data, span):
     return 0.5 * (len(exact) - 1) / (line.time_step * (exact[-1] - exact[0]))
 
 
+@pytest.mark.slow
 def test_a_rail_swings_at_a_beam_s_frequency_and_a_wire_at_a_string_s():
     wire, length = RAIL.contact_wire, 8.0
     expected = np.pi / (2 * length**2) * np.sqrt(wire.bending_stiffness / wire.mass)

@@ -88,6 +88,7 @@ def transfer_function(cylinder):
     return [[0, 1], [-(omega**2), -2 * ratio * omega]], [[0], [omega**2]], np.eye(2), np.zeros((2, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 def test_the_cylinder_is_its_transfer_function_behind_the_delay():
     """Of 2.4 steps; within a step a command that changes counts by its mean."""

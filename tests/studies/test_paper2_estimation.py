@@ -36,6 +36,7 @@ def test_the_ways_rank_as_told(monkeypatch):
     assert errors[ONE, "unknown input"] > 2 * errors[ONE, "inertia-corrected"]
 
 
+@pytest.mark.slow
 def test_more_noise_is_a_later_estimate(trajectory, monkeypatch):
     monkeypatch.setattr(estimation, "NOISES", (1e-5, 1e-4))
     scores = estimation.over_noise(trajectory)
@@ -54,6 +55,7 @@ def test_a_pass_tells_the_frame_but_not_head_nor_scale():
     assert told.scale > 0.5
 
 
+@pytest.mark.slow
 def test_figures_are_drawn(trajectory, tmp_path):
     motion, known = measure(trajectory, seed=0), estimation.known_pantograph(0)
     forces = {each: METHODS["filter, random-walk"](motion, known, each) for each in OBSERVATIONS}
