@@ -74,12 +74,12 @@ notebook: $(READY)
 
 # The films that the documentation shows.
 REAL := --actuator realistic --sensors realistic
-SMALL := --seconds 2.4 --size 800 450
+SMALL := --seconds 2.4 --size 560 320
 films: $(READY)
 	mkdir -p docs/films
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 880 660 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 720 540 \
 	  --output docs/films/passive-and-agent.mp4
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 800 600 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.2 --slow-motion 2 --size 640 480 \
 	  --output docs/films/passive-and-agent.gif
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \
