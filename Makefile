@@ -74,12 +74,12 @@ notebook: $(READY)
 
 # The films that the documentation shows.
 REAL := --actuator realistic --sensors realistic
-SMALL := --seconds 2.4 --size 560 320
+SMALL := --seconds 2.4 --size 800 450
 films: $(READY)
 	mkdir -p docs/films
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 720 540 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 2.4 --size 880 660 \
 	  --output docs/films/passive-and-agent.mp4
-	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.2 --slow-motion 2 --size 640 480 \
+	$(BIN)/panto film passive agent-known-line $(REAL) --line-condition fair --seconds 1.44 --slow-motion 2 --size 800 600 \
 	  --output docs/films/passive-and-agent.gif
 	$(BIN)/panto film agent-known-line $(REAL) --line-condition as-built $(SMALL) --output docs/films/pantograph.mp4
 	$(BIN)/panto film pd --catenary periodic-stiffness --pantograph three-mass $(SMALL) \
@@ -95,7 +95,7 @@ urls:
 
 # Slow proofs: more lines against finite elements, longer trainings, random environments, and, from the command line only,
 # COMMANDS=, NONSENSE= and FILES= of command lines, lines and damaged files. They take the best part of an hour on two
-# cores; PART=0/8 runs an eighth of them.
+# cores; PART=0/16 runs a sixteenth of them.
 CASES := 2000
 PART := 0/1
 proofs: $(READY)

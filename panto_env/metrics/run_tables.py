@@ -21,8 +21,7 @@ from .by_span import by_span, by_speed, by_stretch, moving_droppers
 from .compliance import Criterion
 from .figures import HEADINGS, LABELS, NUMBER, SpanChoice, in_words
 from .low_pass import low_pass
-from .stored_run import follower_columns
-from .trajectory import Trajectory
+from .trajectory import Trajectory, follower_columns
 
 FILTERED = "contact_force_filtered"
 RUN = ("catenary", "pantograph", "speed_kmh", "policy", "seed")

@@ -24,7 +24,7 @@ from ..base.settings import Between, Settings, explain
 from ..plant.alignment import Alignment
 from ..plant.catenary.schema import PowerSystem
 from .compliance import LineFacts
-from .trajectory import OF_TWO_WIRES, OUTPUTS, SERIES, Trajectory
+from .trajectory import OF_TWO_WIRES, OUTPUTS, SERIES, Trajectory, follower_columns
 
 FORMAT = 3
 OF_FOLLOWERS = ("pantograph", "nominal_force", "target_mean", "policy", "design", "reached")
@@ -107,15 +107,6 @@ def write(run: Trajectory, path: str | Path) -> None:
     table = pa.table(columns, metadata={KEY: json.dumps(with_checksum(facts, columns))})
     with write_whole(path) as temporary:
         write_table(table, temporary, write_page_checksum=True)
-
-
-def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
-    """Series of a collector behind the first, by name, (rows,); nan before it came onto the line.
-
-    number: of the collector, counted from 1.
-    """
-    before = np.full(rows - len(follower.time), np.nan)
-    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in follower.series}
 
 
 def read(path: str | Path) -> Trajectory:

@@ -419,3 +419,12 @@ class Trajectory:
         from .stored_run import read
 
         return read(path)
+
+
+def follower_columns(follower: Trajectory, number: int, rows: int) -> dict[str, Array]:
+    """Series of a collector behind the first, by name, (rows,); nan before it came onto the line.
+
+    number: of the collector, counted from 1.
+    """
+    before = np.full(rows - len(follower.time), np.nan)
+    return {f"{name}@{number}": np.concatenate([before, getattr(follower, name)]) for name in follower.series}

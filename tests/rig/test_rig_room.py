@@ -152,7 +152,8 @@ def test_an_uncompensated_mass_is_in_the_loop():
 
 @pytest.mark.parametrize("name", ["rig", pytest.param("rig-flexible", marks=pytest.mark.slow)])
 def test_frequency_response_and_simulation_agree_on_the_delay_that_is_borne(name, monkeypatch):
-    monkeypatch.setattr(growth, "PLACES", 12)
+    if name == "rig":  # it has no droppers, between which a loop would be worst
+        monkeypatch.setattr(growth, "PLACES", 12)
     rig = load_catenary(name)
     delay = Loop(rig, PANTOGRAPH, SPEED).margins().delay
     assert 0.005 < delay < 0.01
