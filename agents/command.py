@@ -14,7 +14,7 @@ from panto_env.analysis.options import print_criteria, with_settings
 from panto_env.base.errors import InputError
 from panto_env.base.extras import require
 from panto_env.base.files import check_output, make_folder
-from panto_env.base.table import Table
+from panto_env.base.table import Table, number
 from panto_env.cluster import RayAddress
 from panto_env.metrics.compliance import worst
 from panto_env.metrics.figures import FIRST_SETTLED, LABELS
@@ -24,7 +24,6 @@ from panto_env.terminal import (
     announce_overwriting,
     console,
     counting,
-    number,
     print_json,
     print_table,
     progress_console,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import shlex
@@ -179,11 +178,6 @@ def print_table(table: Table) -> None:
         styled = (Text(cell, ALARM) if isinstance(cell, Alarm) else cell for cell in cells)
         shown.add_row(*styled, end_section=row in table.section_ends)
     console.print(shown)
-
-
-def number(value: float, digits: int = 1) -> str:
-    """A number for a table, with no sign where it is rounded to 0; a dash where it is not finite."""
-    return f"{value:z.{digits}f}" if math.isfinite(value) else "–"
 
 
 @contextmanager

@@ -21,8 +21,6 @@ from panto_env.analysis.line_check import check, elasticity_table
 from panto_env.base.table import Table
 from panto_env.catalog import available, load_catenary
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
-from panto_env.plant.catenary.flexible.as_run import elasticity
-from panto_env.plant.catenary.flexible.parts import index_at
 from panto_env.plant.catenary.flexible.spans import parabola
 
 KGF = 9.80665  # N
@@ -118,9 +116,8 @@ def made(name: str, arm: bool, both: bool = False) -> FlexibleCatenaryData:
 
 def yields(name: str, arm: bool, both: bool = False) -> tuple[float, float]:
     """Elasticity at 100 N in mid-span and at a support (mm/N)."""
-    line = made(name, arm, both)
-    places, lifts = elasticity(line, 100.0)
-    return 1e3 * float(lifts[index_at(places, line.span_length / 2)]), 1e3 * float(lifts[0])
+    middle, end = check(made(name, arm, both), 100.0).in_span
+    return 1e3 * middle, 1e3 * end
 
 
 def uplift(name: str, arm: bool, pantographs: int, both: bool = False) -> float:

@@ -8,8 +8,7 @@ from itertools import groupby
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from panto_env.base.table import Table
-from panto_env.terminal import number
+from panto_env.base.table import Table, number
 
 from .overall import Standing, by_rank, method_of, next_in_ranking, why, with_feedback
 from .report import as_rich, spans_in_words

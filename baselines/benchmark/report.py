@@ -17,10 +17,10 @@ from rich.text import Text
 from panto_env.analysis.plots import fit_force_axis, mark_supports_of_run
 from panto_env.base.plotting import LIMIT, POSITION, series_line
 from panto_env.base.table import Table as TextTable
+from panto_env.base.table import number
 from panto_env.metrics import compliance as en50367
 from panto_env.metrics.figures import LABELS, in_words
 from panto_env.metrics.low_pass import zero_phase_low_pass
-from panto_env.terminal import number
 
 from .harm import MOST_GROWN, MOST_WORSE, WORSE
 from .overall import Standing, method_of, next_in_ranking, with_feedback

@@ -145,9 +145,9 @@ class Row(Placed):
 
     def as_dict(self) -> dict[str, Any]:
         """What identifies the pass, and its figures, in one table."""
-        names = "policy catenary pantograph case speed_kmh seed nominal_force terminated"
+        names = ("policy", "catenary", "pantograph", "case", "speed_kmh", "seed", "nominal_force")
         kilometres = {f"km_{number}": change for number, change in enumerate(self.kilometres, start=1)}
-        return {name: getattr(self, name) for name in names.split()} | self.numbers | kilometres
+        return {name: getattr(self, name) for name in (*names, "terminated")} | self.numbers | kilometres
 
 
 class Pass(NamedTuple):

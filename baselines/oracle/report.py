@@ -9,10 +9,9 @@ import numpy as np
 
 from panto_env.analysis.plots import mark_supports_of_run
 from panto_env.base.plotting import BLUE, POSITION, legend_above, panels
-from panto_env.base.table import Table
+from panto_env.base.table import Table, number
 from panto_env.metrics.figures import in_words
 from panto_env.plant.actuators import ACTUATOR_PRESETS, actuator_settings
-from panto_env.terminal import number
 
 from .search import STARTS, Oracle
 
@@ -79,8 +78,8 @@ def summary(oracles: Sequence[Oracle]) -> Table:
                 number(figures.contact_loss, 2),
             )
         )
-    headings = "pass, passive mean (N), σ (N), oracle mean (N), σ (N), change (%), spread of starts (N)"
-    return Table("Oracles", (*headings.split(", "), "CL (%)"), rows)
+    means = ("passive mean (N)", "σ (N)", "oracle mean (N)", "σ (N)")
+    return Table("Oracles", ("pass", *means, "change (%)", "spread of starts (N)", "CL (%)"), rows)
 
 
 def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
@@ -105,8 +104,8 @@ def stored_table(cells: Sequence[Mapping[str, Any]]) -> Table:
                 f"{min(changes):.1f} to {max(changes):.1f}" if len(changes) > 1 else "–",
             )
         )
-    headings = "line, actuator, km/h, spans, passive σ (N), oracle σ (N), change (%), by seed (%)"
-    return Table("Stored oracles", tuple(headings.split(", ")), rows, text_columns=2)
+    sigmas = ("passive σ (N)", "oracle σ (N)", "change (%)", "by seed (%)")
+    return Table("Stored oracles", ("line", "actuator", "km/h", "spans", *sigmas), rows, text_columns=2)
 
 
 def plot(oracle: Oracle) -> Figure:

@@ -9,8 +9,7 @@ from statistics import mean
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
-from panto_env.base.table import Table
-from panto_env.terminal import number
+from panto_env.base.table import Table, number
 
 from ..benchmark.overall import Standing, next_in_ranking, why, with_feedback
 from ..benchmark.report import FIGURES, kilometre_tables, margins_table

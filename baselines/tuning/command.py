@@ -17,21 +17,12 @@ from panto_env.analysis.pool import Progress
 from panto_env.base.checksums import __version__, read_checked, write_checked
 from panto_env.base.errors import InputError
 from panto_env.base.files import alone_in, check_output, write_text
-from panto_env.base.table import Table
+from panto_env.base.table import Table, number
 from panto_env.catalog.loader import content_unless_catalogue
 from panto_env.cluster import RayAddress, identity, make_parts, open_parts, remove_parts
 from panto_env.control.lines import draws_line, line_name
 from panto_env.control.settings import RunSettings, run_settings
-from panto_env.terminal import (
-    Force,
-    Json,
-    counting_on,
-    number,
-    print_json,
-    print_table,
-    this_command,
-    written_last,
-)
+from panto_env.terminal import Force, Json, counting_on, print_json, print_table, this_command, written_last
 
 from ..benchmark.settings import TRAINING
 from ..line import CONDITIONS, OPTIONS, as_toml

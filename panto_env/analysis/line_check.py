@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 import numpy as np
 
 from ..base.arrays import Array, one_thread, to_kmh
-from ..base.table import Alarm, Table
+from ..base.table import Alarm, Table, number
 from ..catalog.family import SOURCE, LineFamily, gradient_limits, gradients, highest_speed
 from ..catalog.section import LineSection
 from ..control.lines import line_generator, line_of_seed
@@ -28,7 +28,6 @@ from ..plant.catenary.flexible.static import RestingDropper, droppers_at_rest, h
 from ..plant.catenary.single import SingleData
 from ..plant.catenary.single.model import Single, lower_diagonals
 from ..plant.numerics import Numerics, Runs
-from ..terminal import number
 from .pool import Progress, in_processes
 from .simulation import simulate
 
@@ -61,6 +60,12 @@ class LineCheck:
     places: Array  # of the elasticities, along the line or, where spans are alike, in one (m), (n,)
     elasticities: Array  # m/N, (n,)
     force: float  # with which they are computed (N)
+
+    @property
+    def in_span(self) -> tuple[float, float]:
+        """Elasticity in mid-span and at a support (m/N), where spans are all alike."""
+        middle = index_at(self.places, self.line.span_length / 2)
+        return float(self.elasticities[middle]), float(self.elasticities[0])
 
     @property
     def largest_gradient(self) -> float:
@@ -148,9 +153,9 @@ def span_tables(spans: Sequence[SpanCheck], name: Callable[[int], str] = str) ->
 def elasticity_table(checks: Sequence[LineCheck]) -> Table:
     """Elasticity of lines whose spans are all alike, with published figures in brackets."""
     rows = []
-    for line, places, found in ((each.line, each.places, each.elasticities) for each in checks):
-        middle = 1e3 * found[index_at(places, line.span_length / 2)]
-        end, uneven = 1e3 * found[0], non_uniformity(found)
+    for each in checks:
+        line, uneven = each.line, non_uniformity(each.elasticities)
+        middle, end = (1e3 * elasticity for elasticity in each.in_span)
         told = [getattr(line.published, key, None) or 0 for key in ("mid_span", "support", "non_uniformity")]
         pairs = zip((middle, end, uneven), np.multiply(told, (1e3, 1e3, 1)), strict=True)
         cells = (f"{own:#.3g} ({other:g})" if other else f"{own:#.3g}" for own, other in pairs)

@@ -20,9 +20,9 @@ from bokeh.server.server import Server
 from jinja2 import Environment, StrictUndefined
 
 from ..base.errors import InputError
+from ..base.table import number
 from ..metrics.compliance import limits_in_words, value_in_words
 from ..metrics.figures import LABELS, in_words
-from ..terminal import number
 from .charts import LEGEND, Charts
 from .choice import PASSIVE, TITLES, Choice, Seen, look, offered
 

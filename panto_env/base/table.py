@@ -17,6 +17,11 @@ _NOTHING = re.compile(r"(?<![\w.])[-−](?=0(?:\.0+)?(?![\w.]))")
 """The sign of a number that was rounded to 0."""
 
 
+def number(value: float, digits: int = 1) -> str:
+    """A number for a table, with no sign where it is rounded to 0; a dash where it is not finite."""
+    return f"{value:z.{digits}f}" if math.isfinite(value) else "–"
+
+
 class Alarm(str):
     """A cell that reports a problem: a terminal shows it in red."""
 

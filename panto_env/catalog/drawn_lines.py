@@ -45,19 +45,14 @@ Share = Annotated[float, Between(0, 1)]
 Length = Annotated[float, Between(0, LONGEST_SPAN, "m")]
 
 
-def meaning(text: str) -> Any:
-    """A field with this description and no default."""
-    return Field(description=text)
-
-
 class PlanRanges(Settings):
     """Stagger, and steady arms by their length, in the place of those with a stiffness."""
 
-    stagger: Range[Annotated[float, Between(0.05, 0.6, "m")]] = meaning(
-        "of the contact wire, to the right and to the left in turn, in a curve to its outside (m)"
+    stagger: Range[Annotated[float, Between(0.05, 0.6, "m")]] = Field(
+        description="of the contact wire, to the right and to the left in turn, in a curve to its outside (m)"
     )
-    arm_length: Range[Annotated[float, Between(0.3, 5, "m")]] = meaning("of steady arms (m)")
-    arm_mass: Range[Annotated[float, Between(0, 50, "kg")]] = meaning("of steady arms (kg)")
+    arm_length: Range[Annotated[float, Between(0.3, 5, "m")]] = Field(description="of steady arms (m)")
+    arm_mass: Range[Annotated[float, Between(0, 50, "kg")]] = Field(description="of steady arms (kg)")
 
     def draw(self, random: np.random.Generator, curvature: Array) -> dict[str, Any]:
         """Values of a line with these curvatures of its spans, without their side (1/m), (spans,).
@@ -81,11 +76,11 @@ class PlanRanges(Settings):
 class WireRanges(Settings):
     """A wire by its section and stress, from which its mass, tension and bending stiffness follow."""
 
-    section: Range[Annotated[float, Between(1e-6, 1e-3, "m^2")]] = meaning("area (m^2)")
-    stress: Range[Annotated[float, Between(1e6, 2e9, "Pa")]] = meaning("tension per area (Pa)")
-    density: Annotated[float, Between(500, 20_000, "kg/m^3")] = meaning("mass per volume (kg/m^3)")
-    modulus: Annotated[float, Between(1e8, 1e12, "Pa")] = meaning(
-        "E of the bending stiffness E A^2 / (4 pi), that of a solid round wire (Pa)"
+    section: Range[Annotated[float, Between(1e-6, 1e-3, "m^2")]] = Field(description="area (m^2)")
+    stress: Range[Annotated[float, Between(1e6, 2e9, "Pa")]] = Field(description="tension per area (Pa)")
+    density: Annotated[float, Between(500, 20_000, "kg/m^3")] = Field(description="mass per volume (kg/m^3)")
+    modulus: Annotated[float, Between(1e8, 1e12, "Pa")] = Field(
+        description="E of the bending stiffness E A^2 / (4 pi), that of a solid round wire (Pa)"
     )
 
     def draw(self, random: np.random.Generator) -> dict[str, float]:
@@ -101,16 +96,18 @@ class WireRanges(Settings):
 class DropperRanges(Settings):
     """Droppers of a span, symmetric about its middle, at even distances between the outer two."""
 
-    first: Range[Share] = meaning(
-        "distance of the first dropper from the support, as a share of the span (-)"
+    first: Range[Share] = Field(
+        description="distance of the first dropper from the support, as a share of the span (-)"
     )
-    distance: Range[Annotated[float, Between(1, LONGEST_SPAN, "m")]] = meaning(
-        "between droppers (m), approximately, which gives their number"
+    distance: Range[Annotated[float, Between(1, LONGEST_SPAN, "m")]] = Field(
+        description="between droppers (m), approximately, which gives their number"
     )
-    shortest: Length = meaning("minimum length of a dropper (m)")
-    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = meaning("stiffness in tension (N/m)")
-    mass: Range[Annotated[float, Between(0, 5, "kg/m")]] = meaning("mass per length (kg/m)")
-    clamp_mass: Range[Annotated[float, Between(0, 10, "kg")]] = meaning("each clamp (kg)")
+    shortest: Length = Field(description="minimum length of a dropper (m)")
+    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = Field(
+        description="stiffness in tension (N/m)"
+    )
+    mass: Range[Annotated[float, Between(0, 5, "kg/m")]] = Field(description="mass per length (kg/m)")
+    clamp_mass: Range[Annotated[float, Between(0, 10, "kg")]] = Field(description="each clamp (kg)")
 
     def draw(self, random: np.random.Generator, span: float, pre_sag: float) -> dict[str, Any]:
         """Values of ``Droppers``. span: m. pre_sag: of the contact wire in the middle of the span (m)."""
@@ -130,32 +127,38 @@ class DropperRanges(Settings):
 class PreSagRange(Settings):
     """How far the contact wire hangs below its height at the supports, in the middle of the span."""
 
-    chance: Share = meaning("share of lines that have any; on the others the wire is flat (-)")
-    share: Range[Annotated[float, Between(0, 0.01)]] = meaning("as a share of the span (-)")
+    chance: Share = Field(description="share of lines that have any; on the others the wire is flat (-)")
+    share: Range[Annotated[float, Between(0, 0.01)]] = Field(description="as a share of the span (-)")
 
 
 class SteadyArmRanges(Settings):
     """Steady arms, which some lines have in the model and others do not."""
 
-    chance: Share = meaning("share of lines that have any (-)")
-    mass: Range[Annotated[float, Between(0, 50, "kg")]] = meaning(
-        "mass that moves with the contact wire (kg)"
+    chance: Share = Field(description="share of lines that have any (-)")
+    mass: Range[Annotated[float, Between(0, 50, "kg")]] = Field(
+        description="mass that moves with the contact wire (kg)"
     )
-    stiffness: Range[Annotated[float, Between(0, 1e6, "N/m")]] = meaning("vertical stiffness (N/m)")
+    stiffness: Range[Annotated[float, Between(0, 1e6, "N/m")]] = Field(description="vertical stiffness (N/m)")
 
 
 class SupportRanges(Settings):
     """What holds the messenger wire at a mast."""
 
-    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = meaning("vertical stiffness (N/m)")
-    damping: Range[Annotated[float, Between(0, 1e6, "N s/m")]] = meaning("vertical damping (N s/m)")
+    stiffness: Range[Annotated[float, Between(100, 1e8, "N/m")]] = Field(
+        description="vertical stiffness (N/m)"
+    )
+    damping: Range[Annotated[float, Between(0, 1e6, "N s/m")]] = Field(description="vertical damping (N s/m)")
 
 
 class DampingRanges(Settings):
     """Damping matrix alpha M + beta K."""
 
-    alpha: Range[Annotated[float, Between(0, 50, "1/s")]] = meaning("mass-proportional damping (1/s)")
-    beta: Range[Annotated[float, Between(0, 0.1, "s")]] = meaning("stiffness-proportional damping (s)")
+    alpha: Range[Annotated[float, Between(0, 50, "1/s")]] = Field(
+        description="mass-proportional damping (1/s)"
+    )
+    beta: Range[Annotated[float, Between(0, 0.1, "s")]] = Field(
+        description="stiffness-proportional damping (s)"
+    )
 
 
 DRAWN = ("family", "section")
@@ -167,14 +170,16 @@ Speeds: TypeAlias = tuple[float, float]
 class Bands(Settings):
     """What a passive run and the elasticity of a drawn line may be; `panto family` checks it."""
 
-    pantograph: str = meaning("of that run, which is at the highest speed of the line's trains")
-    force_deviation: Range[Share] = meaning("standard deviation of the contact force over its mean (-)")
-    uplift: Range[Length] = meaning("maximum uplift at a support (m)")
-    elasticity: Range[Annotated[float, Between(0, 0.1, "m/N")]] = meaning(
-        "maximum static uplift per newton along a span (m/N)"
+    pantograph: str = Field(description="of that run, which is at the highest speed of the line's trains")
+    force_deviation: Range[Share] = Field(
+        description="standard deviation of the contact force over its mean (-)"
     )
-    non_uniformity: Range[Annotated[float, Between(0, 100, "%")]] = meaning(
-        "EN 50119's non-uniformity of the elasticity (%)"
+    uplift: Range[Length] = Field(description="maximum uplift at a support (m)")
+    elasticity: Range[Annotated[float, Between(0, 0.1, "m/N")]] = Field(
+        description="maximum static uplift per newton along a span (m/N)"
+    )
+    non_uniformity: Range[Annotated[float, Between(0, 100, "%")]] = Field(
+        description="EN 50119's non-uniformity of the elasticity (%)"
     )
 
 
@@ -185,8 +190,8 @@ class DrawnLines(Settings):
     """Draws after which a description counts as one without lines; one in two or three draws is taken."""
 
     kind: str
-    name: str = meaning("name in the catalogue")
-    description: str = meaning("what the lines are and how the ranges were chosen")
+    name: str = Field(description="name in the catalogue")
+    description: str = Field(description="what the lines are and how the ranges were chosen")
     sources: dict[str, str] = Field(default_factory=dict, description="source of each value")
 
     @property

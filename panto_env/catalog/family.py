@@ -27,7 +27,6 @@ from .drawn_lines import (
     SupportRanges,
     WireRanges,
     in_words,
-    meaning,
 )
 
 GRADIENTS = (
@@ -78,20 +77,22 @@ class LineFamily(DrawnLines):
     most_draws: ClassVar[int] = 1000
 
     kind: Literal["family"] = "family"
-    speed_share: Range[Share] = meaning(
-        "speeds of trains, as shares of the wave speed of the contact wire (-)"
+    speed_share: Range[Share] = Field(
+        description="speeds of trains, as shares of the wave speed of the contact wire (-)"
     )
-    max_speed_kmh: Annotated[float, Between(1, 2000, "km/h")] = meaning("maximum speed of trains (km/h)")
+    max_speed_kmh: Annotated[float, Between(1, 2000, "km/h")] = Field(
+        description="maximum speed of trains (km/h)"
+    )
     system: PowerSystem = Field("AC", description="power supply of the lines, as of a single line")
-    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = meaning("default number of spans")
-    span_length: Range[Annotated[float, Between(2, LONGEST_SPAN, "m")]] = meaning(
-        "distance between supports (m)"
+    spans: Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)] = Field(description="default number of spans")
+    span_length: Range[Annotated[float, Between(2, LONGEST_SPAN, "m")]] = Field(
+        description="distance between supports (m)"
     )
-    encumbrance: Range[Share] = meaning(
-        "height of messenger over contact wire at support, as a share of the span (-)"
+    encumbrance: Range[Share] = Field(
+        description="height of messenger over contact wire at support, as a share of the span (-)"
     )
-    tension_ratio: Range[Annotated[float, Between(0, 100)]] = meaning(
-        "tension of the messenger over that of the contact wire (-); others are drawn again"
+    tension_ratio: Range[Annotated[float, Between(0, 100)]] = Field(
+        description="tension of the messenger over that of the contact wire (-); others are drawn again"
     )
     contact_wire: WireRanges
     messenger_wire: WireRanges

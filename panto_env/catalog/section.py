@@ -19,7 +19,7 @@ from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.parts import CLOSEST
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHORTEST_SPAN, SpanLength
-from .drawn_lines import Bands, DrawnLines, Length, PlanRanges, Range, Share, Speeds, in_words, meaning
+from .drawn_lines import Bands, DrawnLines, Length, PlanRanges, Range, Share, Speeds, in_words
 from .family import ROUNDING, LineFamily, gradient_limits, gradients
 
 Radius: TypeAlias = Annotated[float, Between(50, 100_000, "m")]
@@ -33,12 +33,12 @@ class Curves(Settings):
     Between the radii of the table, and up to straight track, the longest span is linear in the curvature.
     """
 
-    chance: Share = meaning("share of stretches that are curves; the others are straight (-)")
-    stretch: Range[Annotated[float, Between(10, 100_000, "m")]] = meaning(
-        "length of a stretch, straight or with one radius (m)"
+    chance: Share = Field(description="share of stretches that are curves; the others are straight (-)")
+    stretch: Range[Annotated[float, Between(10, 100_000, "m")]] = Field(
+        description="length of a stretch, straight or with one radius (m)"
     )
-    radius: Range[Radius] = meaning("of a curve, drawn evenly in its curvature (m)")
-    straight: SpanLength = meaning("longest span on straight track (m)")
+    radius: Range[Radius] = Field(description="of a curve, drawn evenly in its curvature (m)")
+    straight: SpanLength = Field(description="longest span on straight track (m)")
     longest: tuple[tuple[Radius, SpanLength], ...] = Field(
         min_length=1, description="radius (m) and the longest span there (m), from the widest curve on"
     )
@@ -81,8 +81,8 @@ class Curves(Settings):
 class Obstacles(Settings):
     """Spans that are shorter than they could be, for roads, culverts, points and signals."""
 
-    chance: Share = meaning("share of spans (-)")
-    share: Range[Share] = meaning("length over the longest possible one (-)")
+    chance: Share = Field(description="share of spans (-)")
+    share: Range[Share] = Field(description="length over the longest possible one (-)")
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
         """Share of the longest possible length of each span (-), (count,)."""
@@ -93,17 +93,17 @@ class Obstacles(Settings):
 class Masts(Settings):
     """Where masts are planned, and how far off they stand as built."""
 
-    step: Annotated[float, Between(0.1, 20, "m")] = meaning(
-        "planned lengths of spans are multiples of this (m)"
+    step: Annotated[float, Between(0.1, 20, "m")] = Field(
+        description="planned lengths of spans are multiples of this (m)"
     )
-    difference: Annotated[float, Between(0.1, LONGEST_SPAN, "m")] = meaning(
-        "maximum planned difference of the lengths of two spans side by side (m)"
+    difference: Annotated[float, Between(0.1, LONGEST_SPAN, "m")] = Field(
+        description="maximum planned difference of the lengths of two spans side by side (m)"
     )
-    position_error: Annotated[float, Between(0, 5, "m")] = meaning(
-        "maximum error of a mast's place along the track as built (m)"
+    position_error: Annotated[float, Between(0, 5, "m")] = Field(
+        description="maximum error of a mast's place along the track as built (m)"
     )
-    height_error: Annotated[float, Between(0, 0.2, "m")] = meaning(
-        "maximum error of the height of a messenger's support as built (m)"
+    height_error: Annotated[float, Between(0, 0.2, "m")] = Field(
+        description="maximum error of the height of a messenger's support as built (m)"
     )
 
     def planned(self, longest: Array) -> Array:
@@ -121,12 +121,13 @@ class Masts(Settings):
 class Overlaps(Settings):
     """Where one pair of wires ends and the next begins, and how they rise out of reach."""
 
-    distance: Range[Annotated[float, Between(100, 5000, "m")]] = meaning(
-        "from the middle of one overlap to that of the next, and from the line's start (m)"
+    distance: Range[Annotated[float, Between(100, 5000, "m")]] = Field(
+        description="from the middle of one overlap to that of the next, and from the line's start (m)"
     )
-    spans: Literal[1, 3, 5] = meaning("number of spans of an overlap: 1, 3 or 5")
-    rise: Range[Annotated[float, Between(0.02, 1, "m")]] = meaning(
-        "of the wire out of use at the support beside the middle span (m); on from there it is straight"
+    spans: Literal[1, 3, 5] = Field(description="number of spans of an overlap: 1, 3 or 5")
+    rise: Range[Annotated[float, Between(0.02, 1, "m")]] = Field(
+        description="of the wire out of use at the support beside the middle span (m); on from there it is "
+        "straight"
     )
 
     def draw(self, random: np.random.Generator, lengths: Array, free: Any) -> list[dict[str, Any]]:
@@ -169,12 +170,14 @@ class Bridge(NamedTuple):
 class Bridges(Settings):
     """Bridges over the line, under which both wires are lower, and the ramps of the contact wire to them."""
 
-    count: Range[Annotated[int, Between(0, 100)]] = meaning("number of bridges")
-    span_length: Range[SpanLength] = meaning("longest span under a bridge (m)")
-    encumbrance: Range[Length] = meaning("at the supports on both sides of a bridge (m)")
-    lowering: Range[Annotated[float, Between(0, 2, "m")]] = meaning("of the contact wire under a bridge (m)")
-    slope: Range[Annotated[float, Between(0.01, 1)]] = meaning(
-        "gradient of the ramps, over the one that EN 50119 allows at the highest speed (-)"
+    count: Range[Annotated[int, Between(0, 100)]] = Field(description="number of bridges")
+    span_length: Range[SpanLength] = Field(description="longest span under a bridge (m)")
+    encumbrance: Range[Length] = Field(description="at the supports on both sides of a bridge (m)")
+    lowering: Range[Annotated[float, Between(0, 2, "m")]] = Field(
+        description="of the contact wire under a bridge (m)"
+    )
+    slope: Range[Annotated[float, Between(0.01, 1)]] = Field(
+        description="gradient of the ramps, over the one that EN 50119 allows at the highest speed (-)"
     )
 
     def draw(self, random: np.random.Generator, spans: int) -> list[Bridge]:
@@ -232,23 +235,25 @@ REPLACED = ("spans", "droppers.positions", "droppers.sag")
 class DropperRule(Settings):
     """How droppers are set in a span of any length."""
 
-    spacing: Range[Annotated[float, Between(1, LONGEST_SPAN, "m")]] = meaning(
-        "distance between droppers (m), approximately, which gives their number"
+    spacing: Range[Annotated[float, Between(1, LONGEST_SPAN, "m")]] = Field(
+        description="distance between droppers (m), approximately, which gives their number"
     )
-    first: Range[Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")]] = meaning(
-        "distance of the outer droppers from the supports (m)"
+    first: Range[Annotated[float, Between(CLOSEST, LONGEST_SPAN, "m")]] = Field(
+        description="distance of the outer droppers from the supports (m)"
     )
-    pre_sag: Range[Annotated[float, Between(0, 0.01)]] = meaning(
-        "how far the contact wire hangs below its outer droppers, as a share of the span (-)"
+    pre_sag: Range[Annotated[float, Between(0, 0.01)]] = Field(
+        description="how far the contact wire hangs below its outer droppers, as a share of the span (-)"
     )
-    shortest: Length = meaning("minimum length of a dropper (m)")
+    shortest: Length = Field(description="minimum length of a dropper (m)")
 
 
 class Kinds(Settings):
     """Kinds of line that are joined one after the other: each has its longest span and its droppers."""
 
-    spans: Range[Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)]] = meaning("number of spans of one kind")
-    share: Range[Share] = meaning("longest span of a kind over the base line's span (-)")
+    spans: Range[Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)]] = Field(
+        description="number of spans of one kind"
+    )
+    share: Range[Share] = Field(description="longest span of a kind over the base line's span (-)")
 
     def draw(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.intp], Array]:
         """Number of each span's kind, (count,), and the share of each kind's longest span, (kinds,)."""
@@ -266,14 +271,14 @@ class LineSection(DrawnLines):
     most_draws: ClassVar[int] = 100  # each takes a hundredth of a second
 
     kind: Literal["section"] = "section"
-    base: FlexibleCatenaryData | LineFamily = meaning(
-        "line whose wires, supports, steady arms and damping it has: a name of the catalogue, a "
+    base: FlexibleCatenaryData | LineFamily = Field(
+        description="line whose wires, supports, steady arms and damping it has: a name of the catalogue, a "
         "TOML file, or a family to draw it from, such as family:high-speed; no span is longer than its own"
     )
-    speed_kmh: Range[Annotated[float, Between(1, 2000, "km/h")]] = meaning(
-        "speeds of trains (km/h); gradients are those that EN 50119 allows at the highest one"
+    speed_kmh: Range[Annotated[float, Between(1, 2000, "km/h")]] = Field(
+        description="speeds of trains (km/h); gradients are those that EN 50119 allows at the highest one"
     )
-    spans: Range[Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)]] = meaning("number of spans")
+    spans: Range[Annotated[int, Between(FEWEST_SPANS, MOST_SPANS)]] = Field(description="number of spans")
     curves: Curves
     obstacles: Obstacles
     masts: Masts

@@ -8,7 +8,8 @@ import signal
 import sys
 import warnings
 from contextlib import suppress
-from typing import Annotated, Any
+from types import FrameType
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer import Abort, Option
@@ -38,7 +39,7 @@ def _run() -> int:
     """Exit status of the command."""
     stopped: list[int] = []
 
-    def stop(number: int, _: Any) -> None:
+    def stop(number: int, _: FrameType | None) -> None:
         """Turn the first SIGTERM into an interrupt; a second one kills."""
         signal.signal(number, signal.SIG_DFL)
         stopped.append(number)
@@ -78,8 +79,8 @@ def _show_warning(
     category: type[Warning],
     filename: str,
     lineno: int,
-    file: Any = None,
-    line: Any = None,
+    file: TextIO | None = None,
+    line: str | None = None,
 ) -> None:
     """Write our own warnings without the place in our sources, which does not help the user."""
     if issubclass(category, AccuracyWarning | PlugInWarning | UnusualWarning):

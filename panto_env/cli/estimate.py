@@ -12,7 +12,7 @@ from ..analysis.plots import save
 from ..base.arrays import from_kmh
 from ..base.errors import InputError
 from ..base.settings import parse
-from ..base.table import TABLES, Alarm, Sheet, Table, write_table
+from ..base.table import TABLES, Alarm, Sheet, Table, number, write_table
 from ..catalog import load_pantograph
 from ..estimation.estimate import BANDS, Estimate, Score, plot_estimate, score
 from ..estimation.estimate import estimate as run
@@ -23,17 +23,7 @@ from ..estimation.motion import Motion, read_motion, rezeroed
 from ..metrics.figures import LABELS, statistics
 from ..metrics.low_pass import low_pass
 from ..plant.pantograph.schema import PantographData
-from ..terminal import (
-    Json,
-    Plot,
-    alert,
-    into_file,
-    number,
-    print_json,
-    print_table,
-    progress_console,
-    written_last,
-)
+from ..terminal import Json, Plot, alert, into_file, print_json, print_table, progress_console, written_last
 from .identify import pairs
 
 TUNED = ("force_model.intensity", "frame_intensity", "displacement_noise")

@@ -27,6 +27,7 @@ from ..analysis.plots import plot_run, save
 from ..base.errors import InputError
 from ..base.extras import require
 from ..base.table import Table as TextTable
+from ..base.table import number
 from ..metrics.by_span import SPEED_HEADINGS, by_speed
 from ..metrics.figures import LABELS, SpanChoice, in_words
 from ..metrics.run_tables import save_droppers, save_figures
@@ -39,7 +40,6 @@ from ..terminal import (
     bars,
     console,
     into_file,
-    number,
     print_json,
     print_table,
     say,
@@ -161,13 +161,17 @@ def _shown(
         yield lambda share: progress.update(bar, completed=share), None
 
 
-FACTS = "catenary pantograph speed_kmh policy seed terminated ending nominal_force target_mean settings"
-OWN_FACTS = "pantograph policy nominal_force target_mean"
-"""What JSON has of a run, and of a pantograph behind the first."""
+OWN_FACTS = ("pantograph", "policy", "nominal_force", "target_mean")
+"""What JSON has of a pantograph behind the first."""
+FACTS = (
+    *("catenary", "pantograph", "speed_kmh", "policy", "seed", "terminated", "ending"),
+    *("nominal_force", "target_mean", "settings"),
+)
+"""What it has of a run."""
 
 
-def _facts(run: Trajectory, names: str = FACTS) -> dict[str, Any]:
-    return {name: getattr(run, name) for name in names.split()}
+def _facts(run: Trajectory, names: tuple[str, ...] = FACTS) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in names}
 
 
 MOST = 4

@@ -19,7 +19,7 @@ from ..analysis.plots import save
 from ..base.checksums import with_checksum
 from ..base.errors import InputError
 from ..base.files import finite, make_folder
-from ..base.table import Table
+from ..base.table import Table, number
 from ..catalog import load_catenary, load_pantograph
 from ..rig import report
 from ..rig.computer import compare, load_rig
@@ -37,7 +37,6 @@ from ..terminal import (
     announce_overwriting,
     bars,
     console,
-    number,
     print_json,
     print_table,
     progress_console,
@@ -118,13 +117,20 @@ def validate(
                     print_criteria(criteria, f"Requirements at {run.speed_kmh:g} km/h, {run.line.system}")
             for table in others:
                 print_table(table)
-            if validation.passed:
-                verdict = f"EN 50318:2002, {len(validation.checks)} figures at two speeds: all inside."
-                console.print(verdict if brief else "All figures inside.")
-            else:
-                alert("Not all figures are inside.")
+            inside = f"EN 50318:2002, {len(validation.checks)} figures at two speeds: all inside."
+            _print_verdict(validation.passed, inside if brief else ALL_INSIDE)
     if not validation.passed:
         raise typer.Exit(1)
+
+
+ALL_INSIDE = "All figures inside."
+
+
+def _print_verdict(passed: bool, inside: str = ALL_INSIDE) -> None:
+    if passed:
+        console.print(inside)
+    else:
+        alert("Not all figures are inside.")
 
 
 def _compare(path: Path, json: bool) -> None:
@@ -135,10 +141,7 @@ def _compare(path: Path, json: bool) -> None:
         print_json(compared.as_dict())
     else:
         print_table(compared.table)
-        if compared.passed:
-            console.print("All figures inside.")
-        else:
-            alert("Not all figures are inside.")
+        _print_verdict(compared.passed)
     if not compared.passed:
         raise typer.Exit(1)
 

@@ -25,7 +25,7 @@ from ..analysis.sweep_plots import pantographs_of, plot_sweep
 from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.files import PAGES, make_folder
-from ..base.table import TABLES
+from ..base.table import TABLES, number
 from ..catalog import load_catenary
 from ..cluster import RayAddress
 from ..control.record import plain
@@ -36,18 +36,7 @@ from ..studies.design.search import best_of, read_design, search
 from ..studies.permissible import USUAL, Scan, scan
 from ..studies.permissible.scan import VERIFIED_FROM
 from ..studies.permissible.study import NOTES, answers_table, plot_scan, reasons, write_page
-from ..terminal import (
-    Json,
-    Plot,
-    bars,
-    console,
-    counting,
-    into_file,
-    number,
-    print_json,
-    print_table,
-    written_last,
-)
+from ..terminal import Json, Plot, bars, console, counting, into_file, print_json, print_table, written_last
 
 COLUMNS = ("mean", "std", "max", "min", "contact_loss", "max_uplift")
 """Figures that the table shows."""

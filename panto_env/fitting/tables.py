@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.plotting import POSITION, legend_above, mark_supports, series_colour, stacked
-from ..base.table import Alarm, Table
-from ..terminal import number
+from ..base.table import Alarm, Table, number
 from .fit import INTERVAL, WHITE, Fit, Found, slack_droppers
 from .stored import GOES_ON, doubts
 from .values import FREE

@@ -15,10 +15,9 @@ from ..base.errors import InputError
 from ..base.files import check_output, write_text
 from ..base.plotting import BLUE, ORANGE, stacked
 from ..base.settings import ranges_of
-from ..base.table import Alarm, Table
+from ..base.table import Alarm, Table, number
 from ..catalog.values import in_toml
 from ..plant.pantograph.schema import PantographData
-from ..terminal import number
 from .model import HEAD, PLATE, SUPPORT, UNITS, Fit, Parameters, matrices
 from .record import Record
 from .response import contact_force, fitted_response, force_matrices

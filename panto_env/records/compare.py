@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from ..base.arrays import METRES_PER_SECOND, Array, to_kmh
 from ..base.errors import InputError
-from ..base.table import Table
+from ..base.table import Table, number
 from ..metrics.compliance import Criterion, criteria_table
 from ..metrics.figures import LABELS, STATISTICS, statistics
 from ..metrics.low_pass import low_pass, zero_phase_low_pass
 from ..metrics.trajectory import Trajectory
-from ..terminal import number
 from .likeness import SUM, UNLIKE, check_period, check_reading, doubts
 from .record import Piece, Record, Samples, Shift, find_shift
 

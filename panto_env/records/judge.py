@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, from_kmh, to_kmh
 from ..base.errors import InputError
-from ..base.table import Table
+from ..base.table import Table, number
 from ..metrics.compliance import Criterion, LineFacts, compliance, criteria_table, remarks
 from ..metrics.figures import ARC, HEADINGS, LABELS, Figures, arcing, contact_loss, statistics
 from ..metrics.low_pass import amplitudes
@@ -23,7 +23,6 @@ from ..plant.alignment import Alignment
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import CatenaryData
 from ..plant.catenary.single import SingleData
-from ..terminal import number
 from .likeness import check_period
 from .record import ABOVE, Record, Samples
 

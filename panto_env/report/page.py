@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from ..base.checksums import __version__
 from ..base.errors import InputError
 from ..base.files import PAGES, check_output, write_text
+from ..base.table import number
 from ..catalog.values import values_of
 from ..metrics.compliance import limits_in_words, margin_in_words, value_in_words
 from ..metrics.figures import LABELS, in_words
 from ..metrics.trajectory import Trajectory
-from ..terminal import number
 from . import charts
 from .findings import Findings
 

@@ -76,8 +76,8 @@ class Outcome:
 Study = Callable[[Report], Outcome]
 """A study of one part of a paper: run it, on all cores where it takes long."""
 Cell = str | Callable[[Any], str | float]  # of an entry: a format such as "{.std:.2f}", or a function
-Columns = Sequence[str | tuple[str, Cell]]
-"""Headings and the cells under them; a text has several columns, as "line: {.line} | km/h: {.speed:g}"."""
+Columns = Sequence[tuple[str, Cell]]
+"""Headings, and the cells under them."""
 
 
 @cache
@@ -97,19 +97,6 @@ def said(key: str, ours: float, **names: Any) -> Comparison:
     return Comparison(quantity, unit, ours, *others)
 
 
-def columns_of(columns: Columns) -> list[tuple[str, Cell]]:
-    """Heading and cell of each column."""
-    found: list[tuple[str, Cell]] = []
-    for each in columns:
-        if isinstance(each, str):
-            found += [
-                (heading, cell) for heading, _, cell in (text.partition(": ") for text in each.split(" | "))
-            ]
-        else:
-            found.append(each)
-    return found
-
-
 def tabled(
     title: str,
     columns: Columns,
@@ -118,7 +105,7 @@ def tabled(
     section: Callable[[Any], Any] | None = None,
 ) -> Table:
     """A row for each entry, columns by heading, and a line after entries that ``section`` groups together."""
-    headings, cells = zip(*columns_of(columns), strict=True)
+    headings, cells = zip(*columns, strict=True)
     rows = [
         tuple(cell.format(each) if isinstance(cell, str) else cell(each) for cell in cells)
         for each in entries

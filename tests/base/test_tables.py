@@ -15,10 +15,10 @@ from panto_env import InputError
 from panto_env.base import table as table_file
 from panto_env.base.errors import listed
 from panto_env.base.record_columns import LENGTHS, TIME, Column, read_columns
-from panto_env.base.table import TABLES, Alarm, Sheet, Table, write_rows, write_table
+from panto_env.base.table import TABLES, Alarm, Sheet, Table, number, write_rows, write_table
 from panto_env.estimation.motion import read_motion
 from panto_env.identification.record import read_record
-from panto_env.terminal import PlainConsole, number, print_table
+from panto_env.terminal import PlainConsole, print_table
 
 from ..command import panto
 from ..fuzz.lines import SHORT

@@ -12,7 +12,7 @@ from rich.console import Console
 from panto_baselines.benchmark.brief import MOST_LINES, brief, headline
 from panto_baselines.benchmark.run import read_result
 from panto_baselines.benchmark.settings import Windows
-from panto_env.terminal import number
+from panto_env.base.table import number
 
 from ..documents import ROOT
 from ..marks import some_at_once

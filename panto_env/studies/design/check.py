@@ -18,12 +18,11 @@ from ...analysis.pool import in_threads
 from ...base.errors import InputError
 from ...base.files import write_text
 from ...base.plotting import LIMIT, series_colour, stacked
-from ...base.table import Alarm, Table
+from ...base.table import Alarm, Table, number
 from ...catalog import load_catenary
 from ...catalog.values import in_toml
 from ...metrics.compliance import STD_OF_MEAN
 from ...plant.catenary.flexible import FlexibleCatenaryData
-from ...terminal import number
 from ..permissible.scan import PASSIVE, VERIFIED_FROM
 from ..study import Columns, tabled
 from .search import Design, Found, arguments_of, best_of, passes, tornado, worst
@@ -99,7 +98,8 @@ def checked_table(checked: Sequence[Checked]) -> Table:
         return Alarm(words) if found.broken or found.refused else words
 
     columns: Columns = (
-        "design: {.design} | control: {.policy}",
+        ("design", "{.design}"),
+        ("control", "{.policy}"),
         ("searched", lambda one: ratio(one.searched)),
         ("held out", lambda one: ratio(one.held_out)),
         ("as built", lambda one: ratio(one.as_built)),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...analysis.simulation import simulate
-from ...base.arrays import Array, from_kmh
+from ...base.arrays import from_kmh
 from ...metrics.trajectory import Trajectory
 from ...plant.line_condition import LINE_CONDITIONS, LineCondition
 from ...plant.numerics import Numerics
@@ -28,38 +28,53 @@ DISCRETISATIONS = (
 )
 SPEED_KMH = 300.0
 SEEDS = 10
-SPANS = (4, 9)  # to the end of a run on the reference line
+SPANS = (4, 9)
+"""To the end of a run on the reference line."""
+
+Spread = tuple[float, float]
+"""Mean and standard deviation over SEEDS."""
 
 
-FIVE = ("std", "max", "min", "raw_max", "contact_loss")
-"""Figures over seeds, each a mean and a standard deviation: N, the first three low-passed at 20 Hz, and %."""
+@dataclass(frozen=True)
+class WearCheck:
+    """Figures on a worn line with one grid and step."""
+
+    wavelength: float  # of the wear waves (m)
+    depth: float  # of the wear waves (m)
+    spacing: float | None  # grid (m)
+    time_step: float  # s
+    steps: float  # per wear wave
+    std: Spread  # N; this, max and min low-passed at 20 Hz
+    max: Spread  # N
+    min: Spread  # N
+    raw_max: Spread  # N
+    contact_loss: Spread  # %
 
 
 def five_figures(run: Trajectory, spans: tuple[int, int] | None = None) -> tuple[float, ...]:
-    """``FIVE`` of a run."""
+    """Standard deviation, maximum, minimum, raw maximum and contact loss of a run."""
     figures, raw = run.summary(spans), run.contact_force[run.inside(spans)]
     return figures.std, figures.max, figures.min, raw.max(), figures.contact_loss
 
 
-def check_wear(condition: LineCondition, numerics: Numerics) -> SimpleNamespace:
-    """``FIVE`` of the reference model on worn lines with one grid and step, over SPANS, one line per seed."""
+def check_wear(condition: LineCondition, numerics: Numerics) -> WearCheck:
+    """Runs of the reference model over SPANS at SPEED_KMH, one line per seed."""
     used = in_use(numerics, SPEED_KMH, condition)
     settings: dict[str, Any] = {"line_condition": condition, "spans": LINE_SPANS, "record_droppers": False}
-    settings |= used.model_dump()
-    runs = [simulate(REFERENCE_MODEL, REFERENCE_MODEL, SPEED_KMH, seed=k, **settings) for k in range(SEEDS)]
-    rows, time_step = [five_figures(run, SPANS) for run in runs], runs[0].time_step
-    return SimpleNamespace(
-        wavelength=condition.wear_wavelength,  # of the wear waves (m)
-        depth=condition.wear_depth,  # of the wear waves (m)
-        spacing=used.spacing,  # grid (m)
-        time_step=time_step,  # s
-        steps=condition.wear_wavelength / (from_kmh(SPEED_KMH) * time_step),  # per wear wave
-        **_spreads(np.mean(rows, axis=0), np.std(rows, axis=0, ddof=1)),
+    runs = [
+        simulate(REFERENCE_MODEL, REFERENCE_MODEL, SPEED_KMH, seed=seed, **settings, **used.model_dump())
+        for seed in range(SEEDS)
+    ]
+    rows = [five_figures(run, SPANS) for run in runs]
+    time_step = runs[0].time_step
+    return WearCheck(
+        condition.wear_wavelength,
+        condition.wear_depth,
+        used.spacing,
+        time_step,
+        condition.wear_wavelength / (from_kmh(SPEED_KMH) * time_step),
+        *zip(np.mean(rows, axis=0).tolist(), np.std(rows, axis=0, ddof=1).tolist(), strict=True),
     )
-
-
-def _spreads(means: Array, deviations: Array) -> dict[str, Any]:
-    return dict(zip(FIVE, zip(means.tolist(), deviations.tolist(), strict=True), strict=True))
 
 
 CASES = (
@@ -72,24 +87,37 @@ CASES = (
 LEVEL_SEEDS = 8
 
 
-def check_conditions(catenary: str, pantograph: str, speed_kmh: float) -> list[SimpleNamespace]:
-    """``FIVE`` of passive runs over the default spans in every named condition; a new line has no seeds."""
-    checks: list[SimpleNamespace] = []
+@dataclass(frozen=True)
+class ConditionCheck:
+    """Figures over the default spans on lines in one condition: means over the seeds, and their spreads."""
+
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+    condition: str
+    seeds: int
+    worse: int  # seeds with a larger standard deviation of the force than a new line's
+    change: float  # of the mean of that from a new line's (%)
+    std: Spread  # N; this, max and min low-passed at 20 Hz
+    max: Spread  # N
+    min: Spread  # N
+    raw_max: Spread  # N
+    contact_loss: Spread  # %
+
+
+def check_conditions(catenary: str, pantograph: str, speed_kmh: float) -> list[ConditionCheck]:
+    """Passive runs in every named condition; a new line has no seeds."""
+    checks: list[ConditionCheck] = []
     for name, condition in LINE_CONDITIONS.items():
         settings: dict[str, Any] = {"line_condition": condition, "record_droppers": False}
-        seeds = range(LEVEL_SEEDS if condition.random else 1)
-        rows = [five_figures(simulate(catenary, pantograph, speed_kmh, seed=k, **settings)) for k in seeds]
-        spreads = _spreads(np.mean(rows, axis=0), np.std(rows, axis=0))
-        new = (checks[0] if checks else SimpleNamespace(**spreads)).std[0]
-        check = SimpleNamespace(
-            catenary=catenary,
-            pantograph=pantograph,
-            speed_kmh=speed_kmh,
-            condition=name,
-            seeds=len(rows),
-            worse=sum(row[0] > new for row in rows),  # seeds with a larger σ than a new line's
-            change=100 * (spreads["std"][0] / new - 1),  # of the mean of σ from a new line's (%)
-            **spreads,
-        )
-        checks.append(check)
+        rows = [
+            five_figures(simulate(catenary, pantograph, speed_kmh, seed=seed, **settings))
+            for seed in range(LEVEL_SEEDS if condition.random else 1)
+        ]
+        means, deviations = np.mean(rows, axis=0).tolist(), np.std(rows, axis=0).tolist()
+        new = checks[0].std[0] if checks else means[0]
+        worse, change = sum(row[0] > new for row in rows), 100 * (means[0] / new - 1)
+        spreads = zip(means, deviations, strict=True)
+        case = catenary, pantograph, speed_kmh, name, len(rows)
+        checks.append(ConditionCheck(*case, worse, change, *spreads))
     return checks

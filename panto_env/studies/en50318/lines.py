@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from functools import cache
 from math import ceil
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -34,10 +32,13 @@ from ...plant.pantograph.schema import PantographData
 from .reference import REFERENCE_MODEL, WHOLE_LINE
 
 SPEEDS_KMH = (30.0, 100.0, 200.0, 250.0, 300.0, 350.0, 400.0)
-HIGHEST = 0.95  # share of the wave speed up to which a line is run
-SEEDS = range(1, 21)  # of the drawn lines
+HIGHEST = 0.95
+"""Share of the wave speed up to which a line is run."""
+SEEDS = range(1, 21)
+"""Of the drawn lines."""
 DRAWN_SPEEDS_KMH = (30.0, 100.0)
-DRAWN_SHARES = (0.5, 0.62, 0.7, 0.78, 0.86, HIGHEST)  # speeds on drawn lines, as shares of the wave speed
+DRAWN_SHARES = (0.5, 0.62, 0.7, 0.78, 0.86, HIGHEST)
+"""Speeds on drawn lines, as shares of the wave speed."""
 FAMILIES = (Path(__file__).parent / "ordinary.toml", "high-speed")
 """Families of the drawn lines, of even and of odd seeds."""
 LIMP, LIMP_BOTH = 4, 8
@@ -45,21 +46,28 @@ LIMP, LIMP_BOTH = 4, 8
 GRID, SLOW_GRID, SLOW_SHARE = 0.05, 0.1, 0.4
 """Spacing (m) of the figures that are taken as converged, and up to a share of the wave speed, where a finer
 grid takes minutes and changes nothing."""
-LONGEST_STEP = 1.25e-4  # their maximum time step (s)
+LONGEST_STEP = 1.25e-4
+"""Their maximum time step (s)."""
 ACCURACIES = (Numerics(), Numerics(accuracy="fast"))
 OWN_PANTOGRAPH = {"benchmark-2015": "benchmark-2015"}
 """Pantographs that lines come with; all others are run with that of EN 50318."""
 SPANS = (4, 9)
 SLOW_KMH, SLOW_SPANS = 50.0, (2, 4)
 """Speed (km/h) below which fewer spans are evaluated, since they take long, and these spans."""
-WINDOW = 12  # spans about the train, of all runs: the window's error is not looked at here
+WINDOW = 12
+"""Spans about the train, of all runs: the window's error is not looked at here."""
 
-WINDOWS = (5, 8, 12, 16, None)  # spans computed about the train; None: by default
+
+WINDOWS = (5, 8, 12, 16, None)
+"""Spans computed about the train; None: by default."""
 WINDOW_SPEEDS_KMH = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0)
-COMPARED = (FIRST_SETTLED, LAST_USUAL)  # spans on which windows are compared
+COMPARED = (FIRST_SETTLED, LAST_USUAL)
+"""Spans on which windows are compared."""
 START_SPEEDS_KMH = (100.0, 150.0, 200.0, 250.0, 300.0, 350.0)
-FIRST_SPANS = (1, 4, 7, FIRST_SETTLED)  # where an evaluation might begin; each goes on to LAST_USUAL
-SETTLED = (33, 62)  # spans of a long run that σ is compared with
+FIRST_SPANS = (1, 4, 7, FIRST_SETTLED)
+"""Where an evaluation might begin; each goes on to LAST_USUAL."""
+SETTLED = (33, 62)
+"""Spans of a long run that σ is compared with."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +147,12 @@ def draw(seed: int) -> tuple[FlexibleCatenaryData, PantographData]:
     if seed % LIMP_BOTH == 0:
         line = line.model_copy(update={"messenger_wire": line.messenger_wire.model_copy(update=limp)})
     entries = {name: load_pantograph(name) for name in available("pantograph")}
-    soft = [k for k, e in entries.items() if e.contact_stiffness != "rigid" and not e.hard_contact]
-    return line, _applied(soft[random.integers(len(soft))])
+    names = [
+        name
+        for name, entry in entries.items()
+        if entry.contact_stiffness != "rigid" and not entry.hard_contact
+    ]
+    return line, _applied(names[random.integers(len(names))])
 
 
 def _applied(name: str) -> PantographData:
@@ -158,8 +170,7 @@ def check_case(case: LineCase) -> list[LineCheck]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             used = resolution(case.line, given, Runs((speed, speed)))
-        ours = _run(case, given)
-        changes: dict[str, Any] = {}
+        ours, changes = _run(case, given), {}
         if not (ours.terminated or true.terminated):
             a, b = (run.summary(spans) for run in (ours, true))
             highest, lowest = _extremes(ours, spans)
@@ -172,10 +183,19 @@ def check_case(case: LineCase) -> list[LineCheck]:
                 "min": 100 * (lowest - true_lowest) / b.mean,
                 "contact_loss": a.contact_loss - b.contact_loss,
             }
-        warned = any(issubclass(each.category, AccuracyWarning) for each in caught)
-        which = case.name, case.pantograph.name, case.speed_kmh, case.share, case.drawn
-        how = numerics.accuracy, used.spacing, used.time_step, warned
-        checks.append(LineCheck(*which, *how, **changes))
+        check = LineCheck(
+            case.name,
+            case.pantograph.name,
+            case.speed_kmh,
+            case.share,
+            case.drawn,
+            numerics.accuracy,
+            used.spacing,
+            used.time_step,
+            any(issubclass(each.category, AccuracyWarning) for each in caught),
+            **changes,
+        )
+        checks.append(check)
     return checks
 
 
@@ -196,9 +216,15 @@ def _spans(speed_kmh: float) -> tuple[int, int]:
 
 def _run(case: LineCase, numerics: Numerics) -> Trajectory:
     distance = case.line.alignment().support(_spans(case.speed_kmh)[1] + 1)
-    given: dict[str, Any] = {"distance": distance, "record_droppers": False} | numerics.model_dump()
     with warnings.catch_warnings(action="ignore"):
-        return simulate(case.line, case.pantograph, case.speed_kmh, **given)
+        return simulate(
+            case.line,
+            case.pantograph,
+            case.speed_kmh,
+            distance=distance,
+            record_droppers=False,
+            **numerics.model_dump(),
+        )
 
 
 def _extremes(run: Trajectory, spans: Spans) -> tuple[float, float]:
@@ -213,6 +239,21 @@ def _extremes(run: Trajectory, spans: Spans) -> tuple[float, float]:
     return max(inside), min(inside)
 
 
+@dataclass(frozen=True)
+class WindowCheck:
+    """A travelling window beside the whole line, changes relative to the whole line."""
+
+    catenary: str
+    speed_kmh: float
+    asked: int | None  # None: by default
+    window: int  # spans
+    std: float  # of sigma (%)
+    max: float  # of the maximum (% of the mean force)
+    min: float  # of the minimum (% of the mean force)
+    uplift: float  # of the largest uplift (%)
+    rms: float  # difference of the low-passed contact force, rms (N)
+
+
 def window_cases() -> Iterator[LineCase]:
     """Each flexible line of the catalogue at each of WINDOW_SPEEDS_KMH."""
     for speed in WINDOW_SPEEDS_KMH:
@@ -221,8 +262,8 @@ def window_cases() -> Iterator[LineCase]:
                 yield LineCase(name, line, pantograph, speed)
 
 
-def check_windows(case: LineCase, windows: Sequence[int | None] = WINDOWS) -> list[SimpleNamespace]:
-    """Travelling windows on a line of the catalogue beside the whole line, over COMPARED."""
+def check_windows(case: LineCase, windows: Sequence[int | None] = WINDOWS) -> list[WindowCheck]:
+    """Windows on a line of the catalogue beside the whole line, over COMPARED."""
 
     def run(window: int | None) -> Trajectory:
         with warnings.catch_warnings(action="ignore"):  # of short windows: what they cost is the question
@@ -235,28 +276,39 @@ def check_windows(case: LineCase, windows: Sequence[int | None] = WINDOWS) -> li
         travelling = run(window)
         figures = travelling.summary(COMPARED)
         difference = low_pass(travelling.contact_force - whole.contact_force, whole.time_step)[inside]
-        check = SimpleNamespace(
-            catenary=case.name,
-            speed_kmh=case.speed_kmh,
-            asked=window,  # None: by default
-            window=travelling.identity.window or WHOLE_LINE,  # spans
-            std=100 * (figures.std / true.std - 1),  # change of σ (%)
-            max=100 * (figures.max - true.max) / true.mean,  # change of the maximum (% of the mean force)
-            min=100 * (figures.min - true.min) / true.mean,  # change of the minimum (% of the mean force)
-            uplift=100 * (figures.max_uplift / true.max_uplift - 1),  # change of the largest uplift (%)
-            rms=float(np.sqrt(np.mean(difference**2))),  # difference of the low-passed contact force, rms (N)
+        checks.append(
+            WindowCheck(
+                catenary=case.name,
+                speed_kmh=case.speed_kmh,
+                asked=window,
+                window=travelling.identity.window or WHOLE_LINE,
+                std=100 * (figures.std / true.std - 1),
+                max=100 * (figures.max - true.max) / true.mean,
+                min=100 * (figures.min - true.min) / true.mean,
+                uplift=100 * (figures.max_uplift / true.max_uplift - 1),
+                rms=float(np.sqrt(np.mean(difference**2))),
+            )
         )
-        checks.append(check)
     return checks
 
 
-def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> list[SimpleNamespace]:
-    """Error (%) of σ from each first span on beside that of a long run, over all lines that bear the speed.
+@dataclass(frozen=True)
+class StartCheck:
+    """σ over spans ``first`` to ``last`` beside that of a long run, over all flexible lines at one speed."""
 
-    The reference pantograph runs on all flexible lines of the catalogue.
-    """
+    speed_kmh: float
+    lines: int
+    first: int
+    last: int
+    rms: float  # error (%)
+    worst: float  # error (%)
+
+
+def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> list[StartCheck]:
+    """One check for each first span: the reference pantograph on all flexible lines that bear this speed."""
+    entries = [load_catenary(name) for name in available("catenary")]
     limit, errors_of_lines = from_kmh(speed_kmh) / HIGHEST, []
-    for line in map(load_catenary, available("catenary")):
+    for line in entries:
         if not isinstance(line, FlexibleCatenaryData) or line.ends or line.contact_wires > 1:
             continue  # one that ends does not go on for as long as is required
         if line.contact_wire.tension / line.contact_wire.mass <= limit**2:
@@ -266,10 +318,14 @@ def check_start(speed_kmh: float, first_spans: Sequence[int] = FIRST_SPANS) -> l
         true = run.summary(SETTLED).std
         errors_of_lines.append([100 * (run.summary((k, LAST_USUAL)).std / true - 1) for k in first_spans])
     errors = np.array(errors_of_lines)
-    rms = [float(np.sqrt(np.mean(errors[:, k] ** 2))) for k in range(len(first_spans))]
-    worst = np.abs(errors).max(axis=0).tolist()
-    given = {"speed_kmh": speed_kmh, "lines": len(errors)}
     return [
-        SimpleNamespace(**given, first=first, last=LAST_USUAL, rms=rms[k], worst=worst[k])
+        StartCheck(
+            speed_kmh=speed_kmh,
+            lines=len(errors),
+            first=first,
+            last=LAST_USUAL,
+            rms=float(np.sqrt(np.mean(errors[:, k] ** 2))),
+            worst=float(np.abs(errors[:, k]).max()),
+        )
         for k, first in enumerate(first_spans)
     ]

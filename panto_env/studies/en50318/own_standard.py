@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from ...analysis.line_check import check as line_at_rest
@@ -15,61 +14,87 @@ from ...analysis.simulation import simulate
 from ...base.errors import InputError
 from ...base.files import read_toml
 from ...base.settings import Between, Settings, parse
-from ...base.table import Alarm, Table
+from ...base.table import Table
 from ...catalog import load_catenary
 from ...control.settings import RunSettings
-from ...metrics.figures import LABELS
+from ...metrics.figures import LABELS, Label
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
-from ...terminal import number
+from ..study import Columns, tabled
 from .reference import Check
 
-Accepted = Annotated[dict[str, tuple[float, float]], Field(min_length=1)]
 AT_REST = {
-    "mid_span": ("elasticity in mid-span", "mm/N"),
-    "support": ("elasticity at a support", "mm/N"),
-    "non_uniformity": ("non-uniformity of the elasticity", "%"),
-    "pre_sag": ("maximum pre-sag", "mm"),
-    "smallest_dropper_force": ("minimum force of a dropper", "N"),
-    "largest_dropper_force": ("maximum force of a dropper", "N"),
+    "mid_span": Label("elasticity in mid-span", "mid-span", "mm/N"),
+    "support": Label("elasticity at a support", "support", "mm/N"),
+    "non_uniformity": Label("non-uniformity of the elasticity", "non-uniformity", "%"),
+    "pre_sag": Label("maximum pre-sag", "pre-sag", "mm"),
+    "smallest_dropper_force": Label("minimum force of a dropper", "minimum", "N"),
+    "largest_dropper_force": Label("maximum force of a dropper", "maximum", "N"),
 }
-"""Name and unit of each figure of a line at rest."""
+"""Figures of a line at rest."""
 
 
 class _Form(Settings):
-    name: str = Field(min_length=1, description="name in the table")
-    accepted: Accepted = Field(description="smallest and largest accepted value by figure")
+    figures: ClassVar[Collection[str]]  # that it knows
 
-    def refuse_unknown(self, figures: Any) -> None:
+    name: str = Field(min_length=1, description="name in the table")
+    accepted: Annotated[dict[str, tuple[float, float]], Field(min_length=1)] = Field(
+        description="smallest and largest accepted value by figure"
+    )
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
         for figure, (low, high) in self.accepted.items():
-            if figure not in figures:
-                raise ValueError(f"accepted has '{figure}'; its figures are {', '.join(figures)}")
+            if figure not in self.figures:
+                raise ValueError(f"accepted has '{figure}'; its figures are {', '.join(self.figures)}")
             if not low <= high:
                 raise ValueError(f"accepted.{figure} must be the smaller value first, not {[low, high]}")
+        return self
 
 
 class LineTest(_Form):
     """A line at rest."""
 
+    figures = AT_REST
+
     catenary: str = Field(description="line of the catalogue, or TOML file")
     force: Annotated[float, Between(1, 1000, "N")] = Field(100.0, description="force of the elasticity (N)")
 
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        self.refuse_unknown(AT_REST)
-        return self
+    def checks(self, _: Mapping[str, Any]) -> list[Check]:
+        """Its figures. Raises InputError for a line without droppers or, for some figures, unlike spans."""
+        line = load_catenary(self.catenary)
+        if not isinstance(line, FlexibleCatenaryData):
+            raise InputError(f"{line.name} has no droppers; give a flexible line, or a test with a run.")
+        rest = line_at_rest(line, self.force)
+        values = {each.key: each.value for each in rest.criteria()}
+        if not line.sequence:
+            values |= zip(("mid_span", "support"), (1e3 * each for each in rest.in_span), strict=True)
+        if unknown := [name for name in self.accepted if name not in values]:
+            raise InputError(
+                f"{unknown[0]} is for a line whose spans are all alike, and {line.name} has others."
+            )
+        return [
+            Check(name, AT_REST[name].unit, 0.0, float(values[name]), *ends)
+            for name, ends in self.accepted.items()
+        ]
 
 
 class RunTest(_Form):
     """A pass without control."""
 
+    figures = LABELS
+
     spans: tuple[int, int] | None = Field(None, description="first and last span that count")
     pantograph_number: Annotated[int, Between(1, 8)] = Field(1, description="pantograph of the train, from 1")
     run: dict[str, Any] = Field({}, description="settings as `simulate` takes them, beside those of all")
 
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        self.refuse_unknown(LABELS)
-        return self
+    def checks(self, settings: Mapping[str, Any]) -> list[Check]:
+        """Its figures; settings: of all passes. Raises InputError for what is not valid."""
+        train = simulate(**{**settings, **self.run}, record_droppers=False).train
+        if self.pantograph_number > len(train):
+            raise InputError(
+                f"pantograph_number is {self.pantograph_number}, and the train has {len(train)}."
+            )
+        return Check.of(train[self.pantograph_number - 1], self.spans, self.accepted)
 
 
 class Standard(Settings):
@@ -105,28 +130,19 @@ class Compared:
     @property
     def table(self) -> Table:
         """For people."""
-        rows, ends = [], []
-        for place, (name, check) in enumerate(self.checks):
-            value = number(check.value, 2)
-            rows.append(
-                (
-                    name,
-                    check.figure,
-                    value if check.inside else Alarm(f"{value} outside"),
-                    f"{number(check.lowest, 2)} to {number(check.highest, 2)}",
-                )
-            )
-            if name != dict(enumerate(self.checks)).get(place + 1, ("",))[0]:
-                ends.append(place)
-        return Table(self.title, ("test", "figure", "ours", "accepted"), rows, 2, tuple(ends))
+        labels = AT_REST | LABELS
+        columns: Columns = (
+            ("test", "{[0]}"),
+            ("figure", lambda each: labels[each[1].figure].heading),
+            ("ours", lambda each: each[1].cells(2)[0]),
+            ("accepted", lambda each: each[1].cells(2)[1]),
+        )
+        return tabled(self.title, columns, self.checks, 2, section=lambda each: each[0])
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "title": self.title,
-            "passed": self.passed,
-            "checks": [{"test": name} | check.as_dict() for name, check in self.checks],
-        }
+        checks = [{"test": name} | check.as_dict() for name, check in self.checks]
+        return {"title": self.title, "passed": self.passed, "checks": checks}
 
 
 def read_standard(path: str | Path) -> Standard:
@@ -144,37 +160,7 @@ def compare(standard: Standard, report: Callable[[str], None] = lambda _: None) 
     for test in every:
         report(test.name)
         try:
-            found = _of_run(standard, test) if isinstance(test, RunTest) else _at_rest(test)
-            checks += [(test.name, each) for each in found]
+            checks += [(test.name, each) for each in test.checks(standard.run)]
         except InputError as error:
             raise InputError(f"{test.name}: {error}") from error
     return Compared(standard.title, checks)
-
-
-def _at_rest(test: LineTest) -> Iterator[Check]:
-    line = load_catenary(test.catenary)
-    if not isinstance(line, FlexibleCatenaryData):
-        raise InputError(f"{line.name} has no droppers; give a flexible line, or a test with a run.")
-    rest = line_at_rest(line, test.force)
-    values = {each.key: each.value for each in rest.criteria()}
-    if not line.sequence:
-        middle = int(np.argmin(np.abs(rest.places - line.span_length / 2)))
-        values |= {"mid_span": 1e3 * rest.elasticities[middle], "support": 1e3 * rest.elasticities[0]}
-    for name, (low, high) in test.accepted.items():
-        if name not in values:
-            raise InputError(f"{name} is for a line whose spans are all alike, and {line.name} has others.")
-        label, unit = AT_REST[name]
-        yield Check(f"{label} ({unit})", unit, 0.0, float(values[name]), low, high)
-
-
-def _of_run(standard: Standard, test: RunTest) -> Iterator[Check]:
-    run = simulate(**standard.run | test.run, record_droppers=False)
-    if test.pantograph_number > len(run.train):
-        raise InputError(
-            f"pantograph_number is {test.pantograph_number}, and the train has {len(run.train)}."
-        )
-    figures = run.train[test.pantograph_number - 1].summary(test.spans).as_dict()
-    for name, (low, high) in test.accepted.items():
-        label = LABELS[name]
-        value = label.scale * figures[name]
-        yield Check(label.heading, label.unit, run.speed_kmh, value, low, high)

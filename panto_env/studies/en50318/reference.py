@@ -8,15 +8,16 @@ and no claim.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from ...analysis.plots import plot_forces
 from ...analysis.simulation import simulate
 from ...base.arrays import from_kmh
+from ...base.table import Alarm, number
 from ...catalog import load_catenary
-from ...metrics.figures import LABELS
+from ...metrics.figures import LABELS, SpanChoice
 from ...metrics.trajectory import Trajectory
 from ...plant.catenary.flexible.resolution import resolution
 from ...plant.catenary.flexible.schema import FlexibleCatenaryData
@@ -54,10 +55,27 @@ class Check:
     lowest: float
     highest: float
 
+    @classmethod
+    def of(
+        cls, run: Trajectory, spans: SpanChoice, accepted: Mapping[str, tuple[float, float]]
+    ) -> list[Self]:
+        """Figures of a run over spans, by name, beside the smallest and largest accepted value of each."""
+        figures = run.summary(spans).as_dict()
+        return [
+            cls(name, LABELS[name].unit, run.speed_kmh, LABELS[name].scale * figures[name], *ends)
+            for name, ends in accepted.items()
+        ]
+
     @property
     def inside(self) -> bool:
         """Whether the value is accepted."""
         return self.lowest <= self.value <= self.highest
+
+    def cells(self, digits: int) -> tuple[str, str]:
+        """Value and accepted range, this with so many digits, as a table shows them."""
+        value = number(self.value, 2)
+        low, high = (number(end, digits) for end in (self.lowest, self.highest))
+        return value if self.inside else Alarm(f"{value} outside"), low if low == high else f"{low} to {high}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -74,10 +92,7 @@ def check(runs: list[Trajectory]) -> list[Check]:
     """Every figure of the standard's table for the runs of ``reference_runs``."""
     checks = []
     for place, run in enumerate(runs):
-        figures = run.summary(SPANS)
-        for name, ranges in ACCEPTED.items():
-            value = LABELS[name].scale * getattr(figures, name)
-            checks.append(Check(name, LABELS[name].unit, run.speed_kmh, value, *ranges[place]))
+        checks += Check.of(run, SPANS, {name: ranges[place] for name, ranges in ACCEPTED.items()})
     return checks
 
 
@@ -88,8 +103,10 @@ def plot_reference(runs: Sequence[Trajectory]) -> Figure:
 
 
 NEW = LINE_CONDITIONS["new"]
-WHOLE_LINE = 0  # the window that computes all spans
-CONVERGENCE_KMH = (*SPEEDS_KMH, 350.0)  # 350 km/h lies beyond the standard's table, at 80 % of the wave speed
+WHOLE_LINE = 0
+"""The window that computes all spans."""
+CONVERGENCE_KMH = (*SPEEDS_KMH, 350.0)
+"""350 km/h lies beyond the standard's table, at 80 % of the wave speed."""
 DISCRETISATIONS = (
     Numerics(spacing=0.125, time_step=2.5e-4, window=WHOLE_LINE, precision="double"),
     Numerics(spacing=0.25, time_step=5e-4, window=WHOLE_LINE, precision="double"),
@@ -136,9 +153,24 @@ KINDS = (
 """Kind, line, pantograph and speeds (km/h)."""
 
 
-def check_kind(kind: str, catenary: str, pantograph: str, speed_kmh: float) -> dict[str, Any]:
-    """SI figures of a passive run over the default spans; forces low-passed at 20 Hz, but for losses."""
+@dataclass(frozen=True)
+class KindCheck:
+    """Figures of one passive run over the default spans; forces low-passed at 20 Hz, but for losses."""
+
+    line_kind: str
+    catenary: str
+    pantograph: str
+    speed_kmh: float
+    mean: float  # N
+    std: float  # N
+    max: float  # N
+    min: float  # N
+    max_uplift: float  # at a support (m)
+    contact_loss: float  # %
+
+
+def check_kind(kind: str, catenary: str, pantograph: str, speed_kmh: float) -> KindCheck:
+    """A passive run on a line of a kind."""
     found = simulate(catenary, pantograph, speed_kmh, record_droppers=False).summary()
-    which = {"line_kind": kind, "catenary": catenary, "pantograph": pantograph, "speed_kmh": speed_kmh}
-    names = ("mean", "std", "max", "min", "max_uplift", "contact_loss")
-    return which | {name: getattr(found, name) for name in names}
+    figures = (found.mean, found.std, found.max, found.min, found.max_uplift, found.contact_loss)
+    return KindCheck(kind, catenary, pantograph, speed_kmh, *figures)

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby, product
-from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
-from ...base.table import Alarm, Table
+from ...base.table import Table, number
 from ...metrics.compliance import Criterion
 from ...metrics.figures import LABELS
 from ...metrics.trajectory import Trajectory
-from ...terminal import number
 from ..study import Cell, Columns, tabled
 from . import conditions, lines, reference
 
-Report = Callable[[str], None]  # called with what is being run
+Report = Callable[[str], None]
+"""Called with what is being run."""
 ERRORS = ("std", "max", "min", "contact_loss")
 ERROR_HEADINGS = (
     f"{LABELS['std'].short}\n(%)",
@@ -24,6 +23,10 @@ ERROR_HEADINGS = (
     f"{LABELS['contact_loss'].short}\n(points)",
 )
 """Of errors: of sigma, of maximum and minimum, of contact loss."""
+
+
+def _figures(*names: str, digits: int = 1) -> Columns:
+    return [(LABELS[name].column, f"{{.{name}:.{digits}f}}") for name in names]
 
 
 def _spread(name: str, digits: int = 1) -> Cell:
@@ -37,32 +40,35 @@ def _largest(checks: Sequence[Any], name: str) -> str:
 
 def checks_table(checks: Sequence[reference.Check]) -> Table:
     """The standard's table."""
+    headings = ["figure"]
+    for speed in reference.SPEEDS_KMH:
+        headings += [f"{speed:g} km/h", "accepted"]
     rows: list[tuple[str, ...]] = []
     for name in reference.ACCEPTED:
         cells = [LABELS[name].heading]
         for check in (check for check in checks if check.figure == name):
-            value, low, high = number(check.value, 2), number(check.lowest, 0), number(check.highest, 0)
-            cells.append(value if check.inside else Alarm(f"{value} outside"))
-            cells.append(low if low == high else f"{low} to {high}")
+            cells += check.cells(0)
         rows.append(tuple(cells))
-    headings = (cell for speed in reference.SPEEDS_KMH for cell in (f"{speed:g} km/h", "accepted"))
     title = "EN 50318:2002 reference model, spans 5 and 6, low-passed at 20 Hz"
-    return Table(title, ("figure", *headings), rows)
+    return Table(title, tuple(headings), rows)
 
 
-def kinds_table(checks: Sequence[dict[str, Any]]) -> Table:
+def kinds_table(checks: Sequence[reference.KindCheck]) -> Table:
     """Figures of lines of several kinds."""
     return tabled(
         "Lines of the kinds that EN 50318:2018 asks for; its own lines, and DC ones, were in no source",
         (
-            "kind: {[line_kind]} | line: {[catenary]} | pantograph: {[pantograph]} | km/h: {[speed_kmh]:g}",
-            *((LABELS[name].column, f"{{[{name}]:.1f}}") for name in ("mean", "std", "max", "min")),
-            ("uplift (mm)", lambda check: number(1e3 * check["max_uplift"], 1)),
-            (LABELS["contact_loss"].column, "{[contact_loss]:.2f}"),
+            ("kind", "{.line_kind}"),
+            ("line", "{.catenary}"),
+            ("pantograph", "{.pantograph}"),
+            ("km/h", "{.speed_kmh:g}"),
+            *_figures("mean", "std", "max", "min"),
+            ("uplift (mm)", lambda check: number(1e3 * check.max_uplift, 1)),
+            *_figures("contact_loss", digits=2),
         ),
         checks,
         text_columns=3,
-        section=lambda check: check["line_kind"],
+        section=lambda check: check.line_kind,
     )
 
 
@@ -74,7 +80,8 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
     return tabled(
         "Convergence; σ relative to the first row of its speed",
         (
-            "km/h: {[speed_kmh]:g} | grid\n(m): {[spacing]:.3g}",
+            ("km/h", "{[speed_kmh]:g}"),
+            ("grid\n(m)", "{[spacing]:.3g}"),
             ("step\n(ms)", lambda row: f"{1e3 * row['time_step']:.3g}"),
             ("window\n(spans)", lambda row: str(row["window"] or "all")),
             ("precision", "{[precision]}"),
@@ -89,14 +96,14 @@ def convergence_table(runs: Sequence[dict[str, Any]]) -> Table:
     )
 
 
-def windows_table(checks: Sequence[SimpleNamespace]) -> Table:
+def windows_table(checks: Sequence[lines.WindowCheck]) -> Table:
     """Travelling windows beside the whole line: the largest changes over all lines at each speed."""
-    groups: dict[tuple[float, int | None], list[SimpleNamespace]] = {}
+    groups: dict[tuple[float, int | None], list[lines.WindowCheck]] = {}
     for check in checks:
         groups.setdefault((check.speed_kmh, check.asked), []).append(check)
     first, last = lines.COMPARED
 
-    def shown(those: Sequence[SimpleNamespace]) -> str:
+    def shown(those: Sequence[lines.WindowCheck]) -> str:
         used = map(str, sorted({check.window for check in those}))
         return str(those[0].asked) if those[0].asked else f"default: {' or '.join(used)}"
 
@@ -127,7 +134,7 @@ EXTREMES: Columns = (
 )
 
 
-def wear_table(checks: Sequence[SimpleNamespace]) -> Table:
+def wear_table(checks: Sequence[conditions.WearCheck]) -> Table:
     """Figures on worn lines over grid and time step."""
     first, last = conditions.SPANS
     return tabled(
@@ -147,14 +154,18 @@ def wear_table(checks: Sequence[SimpleNamespace]) -> Table:
     )
 
 
-def conditions_table(checks: Sequence[SimpleNamespace]) -> Table:
+def conditions_table(checks: Sequence[conditions.ConditionCheck]) -> Table:
     """Figures on lines in each named condition."""
     return tabled(
         f"Passive runs in each condition; mean ± standard deviation over {conditions.LEVEL_SEEDS} seeds",
         (
-            "line: {.catenary} | pantograph: {.pantograph} | km/h: {.speed_kmh:g} | condition: {.condition}",
+            ("line", "{.catenary}"),
+            ("pantograph", "{.pantograph}"),
+            ("km/h", "{.speed_kmh:g}"),
+            ("condition", "{.condition}"),
             (LABELS["std"].column, _spread("std")),
-            "σ from\nnew (%): {.change:+.1f} | worse\nthan new: {0.worse} of {0.seeds}",
+            ("σ from\nnew (%)", "{.change:+.1f}"),
+            ("worse\nthan new", "{0.worse} of {0.seeds}"),
             *EXTREMES,
         ),
         checks,
@@ -174,7 +185,8 @@ def lines_table(checks: Sequence[lines.LineCheck]) -> Table:
         f"Every flexible line beside a grid of {lines.GRID:g} m and a step of at most "
         f"{1e3 * lines.LONGEST_STEP:g} ms, spans {first} to {last}",
         (
-            "line: {.catenary} | km/h: {.speed_kmh:.0f}",
+            ("line", "{.catenary}"),
+            ("km/h", "{.speed_kmh:.0f}"),
             ("accuracy", lambda check: f"{check.accuracy}{', warned' * check.warned}"),
             ("grid\n(m)", "{.spacing:.3g}"),
             ("step\n(ms)", lambda check: f"{1e3 * check.time_step:.3g}"),
@@ -207,64 +219,77 @@ def largest_table(checks: Sequence[lines.LineCheck]) -> Table:
     return Table("Largest errors", headings, rows, 2, tuple(section_ends))
 
 
-def start_table(checks: Sequence[SimpleNamespace]) -> Table:
+def start_table(checks: Sequence[lines.StartCheck]) -> Table:
     """What the start does to σ, by the first span evaluated."""
     by_speed = [[*each] for _, each in groupby(checks, lambda check: check.speed_kmh)]
     first, last = lines.SETTLED
     return tabled(
         f"Error of σ over these spans beside spans {first} to {last} (%): rms over the lines (worst)",
-        [
-            "km/h: {[0].speed_kmh:g} | lines: {[0].lines}",
+        (
+            ("km/h", "{[0].speed_kmh:g}"),
+            ("lines", "{[0].lines}"),
             *(
-                f"{each.first}-{each.last}: {{0[{k}].rms:.1f}} ({{0[{k}].worst:.1f}})"
+                (f"{each.first}-{each.last}", f"{{0[{k}].rms:.1f}} ({{0[{k}].worst:.1f}})")
                 for k, each in enumerate(by_speed[0])
             ),
-        ],
+        ),
         by_speed,
         text_columns=0,
     )
 
 
-class _Part(NamedTuple):
+@dataclass(frozen=True)
+class _Part:
     """What may be requested: its cases, words for them, and what is found of each, in tables."""
 
     cases: Callable[[], Iterable[Any]]
-    words: str  # a format
-    check: Callable[..., Any]  # of a case, whose parts are its arguments where it has several
+    words: Callable[[Any], str]
+    check: Callable[[Any], list[Any]]
     tables: tuple[Callable[[Any], Table], ...]
 
 
-def _at_speeds(cases: Iterable[Any]) -> Callable[[], Iterable[Any]]:
-    """Each case, whose last part are speeds, at each of them."""
-    return lambda: [(*each, speed) for *each, speeds in cases for speed in speeds]
-
-
 PARTS = {
-    "kinds": _Part(_at_speeds(reference.KINDS), "{[1]}", reference.check_kind, (kinds_table,)),
-    "convergence": _Part(lambda: reference.DISCRETISATIONS, "{}", reference.converge, (convergence_table,)),
+    "kinds": _Part(
+        lambda: [(*each, speed) for *each, speeds in reference.KINDS for speed in speeds],
+        lambda case: case[1],
+        lambda case: [reference.check_kind(*case)],
+        (kinds_table,),
+    ),
+    "convergence": _Part(
+        lambda: reference.DISCRETISATIONS,
+        str,
+        reference.converge,
+        (convergence_table,),
+    ),
     "windows": _Part(
         lines.window_cases,
-        "windows on {0.name} at {0.speed_kmh:g} km/h",
+        lambda case: f"windows on {case.name} at {case.speed_kmh:g} km/h",
         lines.check_windows,
         (windows_table,),
     ),
     "wear": _Part(
         lambda: product(conditions.CONDITIONS, conditions.DISCRETISATIONS),
-        "{0[0]}, {0[1]}",
-        conditions.check_wear,
+        lambda case: f"{case[0]}, {case[1]}",
+        lambda case: [conditions.check_wear(*case)],
         (wear_table,),
     ),
     "conditions": _Part(
-        _at_speeds(conditions.CASES),
-        "conditions of {0[0]} at {0[2]:g} km/h",
-        conditions.check_conditions,
+        lambda: [(*each, speed) for *each, speeds in conditions.CASES for speed in speeds],
+        lambda case: f"conditions of {case[0]} at {case[2]:g} km/h",
+        lambda case: conditions.check_conditions(*case),
         (conditions_table,),
     ),
     "lines": _Part(
-        lines.every_case, "{0.name} at {0.speed_kmh:.0f} km/h", lines.check_case, (lines_table, largest_table)
+        lines.every_case,
+        lambda case: f"{case.name} at {case.speed_kmh:.0f} km/h",
+        lines.check_case,
+        (lines_table, largest_table),
     ),
     "start": _Part(
-        lambda: lines.START_SPEEDS_KMH, "the start of runs at {:g} km/h", lines.check_start, (start_table,)
+        lambda: lines.START_SPEEDS_KMH,
+        lambda speed: f"the start of runs at {speed:g} km/h",
+        lines.check_start,
+        (start_table,),
     ),
 }
 
@@ -291,12 +316,14 @@ class Validation:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the runs."""
-        requirements = [
-            {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
-            for run, criteria in zip(self.runs, self.compliance, strict=True)
-        ]
-        checks = [check.as_dict() for check in self.checks]
-        return {"passed": self.passed, "checks": checks, "compliance": requirements} | {
+        return {
+            "passed": self.passed,
+            "checks": [check.as_dict() for check in self.checks],
+            "compliance": [
+                {"speed_kmh": run.speed_kmh, "criteria": [each.as_dict() for each in criteria]}
+                for run, criteria in zip(self.runs, self.compliance, strict=True)
+            ],
+        } | {
             name: [each if isinstance(each, dict) else vars(each) for each in found]
             for name, found in self.found.items()
         }
@@ -310,8 +337,7 @@ def run(report: Report = lambda _: None, **requested: bool) -> Validation:
     for name, part in PARTS.items():
         found[name] = []
         for case in part.cases() if requested.get(f"with_{name}", name == "kinds") else ():
-            report(part.words.format(case))
-            some = part.check(*case) if isinstance(case, tuple) else part.check(case)
-            found[name] += some if isinstance(some, list) else [some]
+            report(part.words(case))
+            found[name] += part.check(case)
     compliance = [run.compliance(reference.SPANS) for run in runs]
     return Validation(runs, reference.check(runs), compliance, found)

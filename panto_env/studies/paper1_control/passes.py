@@ -9,7 +9,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, product
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -279,10 +278,21 @@ def _mean(record: Trajectory) -> float:
     return float(record.contact_force[record.inside(SPANS)].mean())
 
 
+@dataclass(frozen=True)
+class CostOverAngle:
+    """Cost function (N m) over the phase angle (rad) at one speed."""
+
+    cost: list[float]  # at THETAS
+    best: float  # theta of the minimum
+    without: float  # cost of the feedback alone
+    at_paper: float  # cost at the paper's pi/6
+    cancelling: float  # theta that cancels the force's part once per span
+
+
 def cost_over_angle(
     results: Mapping[Case, Result], speed: int, gain: float, reading: str, fine: bool = False
-) -> SimpleNamespace:
-    """Cost function (N m) over the phase angle (rad) at one speed (km/h).
+) -> CostOverAngle:
+    """At one speed (km/h).
 
     The feed-forward, once per span, opposes the force's part once per span at an angle by what is measured:
     that part with feedback alone, and what the feed-forward at angle 0 adds to it. Shifting A sin(kx) by
@@ -297,12 +307,12 @@ def cost_over_angle(
     zero, paper = (min(THETAS, key=lambda theta: abs(theta - angle)) for angle in (0.0, THETA))
     added = at(zero, SPAN).once_per_span - alone.once_per_span
     turn = cmath.phase(added) - cmath.phase(-alone.once_per_span)
-    return SimpleNamespace(
-        cost=costs,  # at THETAS
-        best=THETAS[costs.index(min(costs))],  # theta of the minimum
-        without=alone.figures.cost_function,  # cost of the feedback alone
-        at_paper=costs[THETAS.index(paper)],  # cost at the paper's pi/6
-        cancelling=math.remainder(turn, 2 * math.pi),  # theta that cancels the force's part once per span
+    return CostOverAngle(
+        cost=costs,
+        best=THETAS[costs.index(min(costs))],
+        without=alone.figures.cost_function,
+        at_paper=costs[THETAS.index(paper)],
+        cancelling=math.remainder(turn, 2 * math.pi),
     )
 
 

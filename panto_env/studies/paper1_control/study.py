@@ -105,13 +105,13 @@ def _figures(*places: tuple[str, int]) -> list[tuple[str, Callable[[Result], str
 
 
 COLUMNS: Columns = (
-    "km/h: {.case.speed_kmh}",
+    ("km/h", "{.case.speed_kmh}"),
     *_figures(("mean", 1), ("std", 1)),
-    "raw σ (N): {.raw_std:.1f}",
+    ("raw σ (N)", "{.raw_std:.1f}"),
     *_figures(("max", 0), ("min", 0), ("contact_loss", 2)),
     ("longest loss (ms)", lambda result: f"{1e3 * result.longest_loss:.0f}"),
     *_figures(("cost_function", 0)),
-    "mean |F − F_N| (N): {.mean_deviation:.1f}",
+    ("mean |F − F_N| (N)", "{.mean_deviation:.1f}"),
     *_figures(("max_uplift", 0), ("effort", 1), ("effort_rate", 0)),
 )
 
@@ -210,14 +210,17 @@ def _tables(results: Results, at_same_mean: Mapping[int, Result]) -> Iterable[Ta
     headings = (*first, "CF of FB alone", "θ that cancels once per span (°)")
     yield Table("Phase angle of the feed-forward (Fig. 13)", headings, rows)
     names = ("passive", f"FB, gain {GAIN}", f"FB+FF, gain {GAIN}")
-    bands = (f"{low:g}-{high:g} Hz: {{[1].bands[{k}]:.1f}}" for k, (low, high) in enumerate(passes.BANDS))
+    bands = (
+        (f"{low:g}-{high:g} Hz", f"{{[1].bands[{k}]:.1f}}") for k, (low, high) in enumerate(passes.BANDS)
+    )
     yield tabled(
         "What the contact force is made of: rms (N)",
         [
-            "control: {[0]} | km/h: {[1].case.speed_kmh}",
+            ("control", "{[0]}"),
+            ("km/h", "{[1].case.speed_kmh}"),
             ("once per span", lambda each: f"{abs(each[1].once_per_span) / math.sqrt(2):.1f}"),
             *bands,
-            "all: {[1].raw_std:.1f}",
+            ("all", "{[1].raw_std:.1f}"),
         ],
         [
             (name, results[Case(speed, passes.PARTS[name])])

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from itertools import product
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from ...analysis.pool import Progress, in_processes
 from ...analysis.simulation import simulate
 from ...base.arrays import Array
 from ...base.plotting import ORANGE, legend_above, panels, series_colour
-from ...base.table import Table
+from ...base.table import Table, number
 from ...catalog import load_pantograph
 from ...estimation.estimate import BANDS, COHERENT, Score, estimate, phases, score
 from ...estimation.force import FORCE_MODELS, RandomWalk, as_force_model
@@ -28,6 +27,7 @@ from ...estimation.model import PAPER2, EstimatorSettings
 from ...estimation.motion import DISPLACEMENT_NOISE, VELOCITY_NOISE, Motion, measure
 from ...estimation.parameters import (
     LIFT,
+    Parameters,
     estimate_parameters,
     frame_parameters,
     information,
@@ -36,7 +36,6 @@ from ...estimation.parameters import (
 from ...estimation.unknown_input import inertia_corrected, unknown_input
 from ...metrics.trajectory import Trajectory
 from ...plant.pantograph.schema import PantographData, with_scatter
-from ...terminal import number
 from ..study import Cell, Comparison, Figure, Outcome, Report, over, said, tabled
 
 CATENARY, PANTOGRAPH = "en50318-2002", "own-two-mass"
@@ -152,12 +151,18 @@ def over_noise(trajectory: Trajectory) -> Mapping[tuple[str, float], Score]:
     return found
 
 
-def parameter_information(trajectory: Trajectory) -> SimpleNamespace:
-    """Parameters as known, as found by the extended filter, and how well the pass can determine them.
+@dataclass(frozen=True)
+class ParameterInformation:
+    """Parameters as the extended filter found them, and how well a pass can determine them at all."""
 
-    bounds: minimum relative standard deviation of each alone, by name; scale: that of all frame parameters
-    and the lift by one factor.
-    """
+    known: PantographData
+    found: Parameters
+    bounds: Mapping[str, float]  # minimum relative standard deviation of each alone, by name
+    scale: float  # minimum relative standard deviation of all frame parameters and the lift by one factor
+
+
+def parameter_information(trajectory: Trajectory) -> ParameterInformation:
+    """Parameters by the extended filter, and how well the pass can determine each."""
     motion, true, known = measure(trajectory), load_pantograph(PANTOGRAPH), known_pantograph(0)
     settings = EstimatorSettings(observation=OBSERVATIONS[1])
     found = estimate_parameters(motion, known, settings)
@@ -167,7 +172,7 @@ def parameter_information(trajectory: Trajectory) -> SimpleNamespace:
     together = information(motion, true, free, (*frame_parameters(true), LIFT))
     bounds = dict(zip(names, single.tolist(), strict=True))
     scale = float(np.linalg.eigvalsh(together)[0] ** -0.5)
-    return SimpleNamespace(known=known, found=found, bounds=bounds, scale=scale)
+    return ParameterInformation(known=known, found=found, bounds=bounds, scale=scale)
 
 
 def ways_table(cases: Sequence[Case]) -> Table:
@@ -182,7 +187,8 @@ def ways_table(cases: Sequence[Case]) -> Table:
     return tabled(
         f"The estimated force at {SPEED_KMH:g} km/h, mismatch {100 * MISMATCH:g} %, median of {SEEDS} seeds",
         [
-            "observations: {.observation} | method: {.method}",
+            ("observations", "{.observation}"),
+            ("method", "{.method}"),
             *by_band("correlation", lambda score: number(score.correlation, 4)),
             *by_band("rms error (N)", lambda score: number(score.rms, 2)),
             ("all", lambda case: number(case.scores[-1].whole_rms, 2)),
@@ -225,7 +231,7 @@ def noise_table(scores: Mapping[tuple[str, float], Score]) -> Table:
     return Table(title, (*delays, "correlation, both", "correlation, displacements"), rows)
 
 
-def parameters_table(estimated: SimpleNamespace) -> Table:
+def parameters_table(estimated: ParameterInformation) -> Table:
     """True, known and found values, and the minimum uncertainty of each."""
     true, parameters = load_pantograph(PANTOGRAPH), estimated.found
     pairs = zip(parameters.values.tolist(), parameters.deviation.tolist(), strict=True)

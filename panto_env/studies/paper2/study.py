@@ -52,8 +52,9 @@ def on_estimated_force(report: Report) -> Outcome:
     table = tabled(
         f"{TWO_MASS} on {LINE}, ideal actuator on the frame: σ by how the force is known",
         [
-            "policy: {[0]} | contact force: {[1]}",
-            *(f"σ at {v:g} km/h (N): {{0[2][{k}]:.2f}}" for k, v in enumerate(SPEEDS_KMH)),
+            ("policy", "{[0]}"),
+            ("contact force", "{[1]}"),
+            *((f"σ at {v:g} km/h (N)", f"{{0[2][{k}]:.2f}}") for k, v in enumerate(SPEEDS_KMH)),
         ],
         named,
         2,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,18 @@ from ...metrics import compliance as en50367
 from ...metrics.figures import contact_loss
 from ..study import Comparison, Figure, Outcome, Report, said, tabled
 from . import passes as model
-from .passes import SPANS, SPEED_KMH, SPEEDS_KMH, SYSTEM, Equations, Influence, Pass, Passes, run_pass
+from .passes import (
+    SPANS,
+    SPEED_KMH,
+    SPEEDS_KMH,
+    SYSTEM,
+    Equations,
+    Influence,
+    Pass,
+    Passes,
+    Sensitivity,
+    run_pass,
+)
 
 SWEPT_KMH = tuple(np.arange(150.0, 501.0, 5.0).tolist())
 """Speeds at which the plant's resonance is looked for."""
@@ -36,7 +46,7 @@ def run(report: Report) -> Outcome:
     """
     varied = model.influences()
     passes: dict[bool, Passes] = {}
-    ranking: dict[bool, list[SimpleNamespace]] = {}
+    ranking: dict[bool, list[Sensitivity]] = {}
     for share, bilateral in ((0.0, True), (0.3, False)):
         report("contact that may pull" if bilateral else "contact that can only push", share)
         passes[bilateral] = {
@@ -96,7 +106,7 @@ def _sweep_speed(bilateral: bool) -> list[Row]:
 
 
 def _statements(
-    passes: Passes, ranking: Sequence[SimpleNamespace], over_speed: Sequence[Mapping[str, Any]]
+    passes: Passes, ranking: Sequence[Sensitivity], over_speed: Sequence[Mapping[str, Any]]
 ) -> Iterator[Comparison]:
     """All statements of the text that can be measured, in its order; over_speed: rows of a sweep."""
     speeds, stiffnesses = passes["speed"], passes["mean-stiffness"]
@@ -215,7 +225,7 @@ def _landmarks(rows: Sequence[Mapping[str, Any]], equations: Equations) -> dict[
 def _tables(
     varied: Sequence[Influence],
     passes: Mapping[bool, Passes],
-    ranking: Sequence[SimpleNamespace],
+    ranking: Sequence[Sensitivity],
     comparisons: Mapping[bool, Sequence[Comparison]],
     beginnings: Sequence[Mapping[str, float]],
     landmarks: Mapping[str, float],
@@ -272,14 +282,16 @@ def _tables(
     yield tabled(
         f"Initial values are not printed; the paper runs {model.RUN_TIME:g} s",
         (
-            "km/h: {[speed_kmh]:g} | left after a span: {[growth]:.3f}",
+            ("km/h", "{[speed_kmh]:g}"),
+            ("left after a span", "{[growth]:.3f}"),
             ("after 10 spans", lambda beginning: f"{beginning['growth'] ** (SPANS[0] - 1):.1e}"),
-            "F_C, flat less at rest (N): {[difference]:.4f} | to 600 m (s): {[seconds]:.1f}",
+            ("F_C, flat less at rest (N)", "{[difference]:.4f}"),
+            ("to 600 m (s)", "{[seconds]:.1f}"),
         ),
         beginnings,
     )
     title = "Landmarks over speed, swept in steps of 5 km/h; F_S = 70 N"
-    yield tabled(title, ["what: {[0]} | km/h: {[1]:.0f}"], [*landmarks.items()])
+    yield tabled(title, [("what", "{[0]}"), ("km/h", "{[1]:.0f}")], [*landmarks.items()])
 
 
 def _draw(

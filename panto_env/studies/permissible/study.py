@@ -15,14 +15,13 @@ import numpy as np
 
 from ...base.arrays import from_kmh, to_kmh
 from ...base.plotting import LIMIT, panels, series_colour, stacked
-from ...base.table import Alarm, Table
+from ...base.table import Alarm, Table, number
 from ...catalog import load_catenary
 from ...metrics.compliance import STD_OF_MEAN, WAVE_SHARE, arcing_limit, maximum_limit, uplift_factor
 from ...plant.catenary.flexible import FlexibleCatenaryData
 from ...plant.catenary.schema import CatenaryData
 from ...records.plots import save_page
 from ...report.charts import svg_of
-from ...terminal import number
 from ..study import Figure, Outcome, Report, legend_below
 from .scan import PASSIVE, VERIFIED_FROM, Scan, bands_of, scan, verified
 

@@ -277,11 +277,14 @@ def theories_table(found: Sequence[tuple[Curve, Found]]) -> Table:
     return tabled(
         "Second pantograph's σ over the distance L: correlation with cos 2π(f L / v − phase)",
         (
-            "line: {0[0].case.line} | km/h: {0[0].speed_kmh:g}",
+            ("line", "{0[0].case.line}"),
+            ("km/h", "{0[0].speed_kmh:g}"),
             ("theory", lambda each: names[each[1]]),
-            "f (Hz): {0[2].frequency:.2f}",
+            ("f (Hz)", "{0[2].frequency:.2f}"),
             ("v / f (m)", lambda each: f"{from_kmh(each[0].speed_kmh) / each[2].frequency:.1f}"),
-            "R: {0[2].correlation:.2f} | r in phase: {0[2].in_phase:+.2f} | phase: {0[2].phase:.2f}",
+            ("R", "{0[2].correlation:.2f}"),
+            ("r in phase", "{0[2].in_phase:+.2f}"),
+            ("phase", "{0[2].phase:.2f}"),
         ),
         [(curve, key, each) for curve, fitted in found for key, each in fitted.items()],
         text_columns=3,

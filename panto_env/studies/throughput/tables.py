@@ -139,12 +139,18 @@ def _limits(roofline: Row) -> str:
     )
 
 
-SPREAD = "slowest: {[slowest]:,.0f} | fastest: {[fastest]:,.0f}"
-PLANT: Columns = ("× real time: {[times_real_time]:,.0f}", SPREAD, "first call (s): {[first_call]:.2f}")
+SPREAD: Columns = (("slowest", "{[slowest]:,.0f}"), ("fastest", "{[fastest]:,.0f}"))
+PLANT: Columns = (
+    ("× real time", "{[times_real_time]:,.0f}"),
+    *SPREAD,
+    ("first call (s)", "{[first_call]:.2f}"),
+)
 SPEED: Columns = (
-    "steps/s: {[steps_per_second]:,.0f}",
-    SPREAD,
-    "yardstick: {[yardstick]} | its: {[yardstick_steps_per_second]:,.0f} | ratio: {[ratio]:.2g}",
+    ("steps/s", "{[steps_per_second]:,.0f}"),
+    *SPREAD,
+    ("yardstick", "{[yardstick]}"),
+    ("its", "{[yardstick_steps_per_second]:,.0f}"),
+    ("ratio", "{[ratio]:.2g}"),
 )
 
 
