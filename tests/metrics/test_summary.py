@@ -101,6 +101,11 @@ def test_uplift_is_that_of_the_supports_at_both_ends_of_the_spans_and_between(sp
     assert RUN.summary(spans).max_uplift == pytest.approx(uplift)
 
 
+def test_a_support_beyond_the_spans_has_no_part_in_their_uplift():
+    rising = replace(RUN, uplift=RUN.uplift[:, ::-1].copy())
+    assert rising.summary((1, 1)).max_uplift == pytest.approx(0.009)  # of support 1 alone
+
+
 def test_a_line_without_supports_has_no_uplift():
     bare = replace(RUN, uplift=np.zeros((SAMPLES, 0)), support_position=np.zeros(0))
     assert np.isnan(bare.summary("all").max_uplift)
