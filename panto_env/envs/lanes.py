@@ -76,7 +76,7 @@ class VectorLanes:
         """The episodes with options, for ``begin``. Raises InputError where these are not valid."""
         return self.episodes.with_options(options)
 
-    def begin(self, lanes: Flags, episodes: Episodes, random: OfLane, anew: bool = False) -> None:
+    def begin(self, lanes: Flags, episodes: Episodes, random: OfLane, anew: bool) -> None:
         """Begin episodes, the usual ones or others with as many lanes, in the marked lanes.
 
         anew: on a new line where lines are drawn, which is drawn from the first lane's generator.
@@ -208,7 +208,7 @@ class LaneGroups:
         """Episodes with options, of each group, for ``begin``; InputError where these are not valid."""
         return [group.episodes_with(options) for group in self._groups]
 
-    def begin(self, lanes: Flags, episodes: Sequence[Episodes], random: OfLane, anew: bool = False) -> None:
+    def begin(self, lanes: Flags, episodes: Sequence[Episodes], random: OfLane, anew: bool) -> None:
         """As ``VectorLanes.begin``; episodes: of each group."""
         for group, its, own in zip(self._groups, self._lanes, episodes, strict=True):
             if lanes[its].any():

@@ -160,6 +160,16 @@ def test_entries_are_clipped_to_ten_of_their_scales(sign):
     assert env.observation_space.contains(observation)
 
 
+def test_lanes_that_begin_leave_what_one_between_them_has_seen():
+    envs = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=3, observation="deviations")
+    envs.reset(seed=0)
+    for action in np.linspace(-1, 1, 20):
+        before, *_ = envs.step(np.full((3, 1), action))
+    after, _ = envs.reset(options={"reset_mask": np.array([True, False, True])})
+    np.testing.assert_array_equal(after[1], before[1])
+    assert (after[0] != before[0]).any()
+
+
 def test_line_values_say_what_the_line_is():
     """The values as the line's data and context have them; the other entries stay as they are."""
     settings = {"observation": "centred", "distance": 50.0}

@@ -72,6 +72,7 @@ def test_lanes_of_a_vector_environment_are_the_single_environment_bit_for_bit():
     assert step > 200
     figures = [each["figures"]["std"] for each in info["pantographs"]]
     assert infos["figures"]["std"][2:].tolist() == figures
+    assert info["figures"]["std"] == figures[0]
     assert figures[0] != figures[1]
 
 
