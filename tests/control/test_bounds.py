@@ -12,7 +12,7 @@ from panto_baselines.oracle.stored import OracleSettings
 from panto_env import InputError, simulate
 from panto_env.base.settings import parse
 from panto_env.control import Task
-from panto_env.control.length import LONGEST, Cost, in_words
+from panto_env.control.length import LONGEST, Cost, gigabytes, in_words
 from panto_env.control.settings import run_settings
 
 
@@ -64,6 +64,27 @@ def test_time_is_told_in_words():
         InputError, match="it would take about 2 days, but the maximum for a run is about 12 hours"
     ):
         Cost(1e9, 0.0, 2 * 86400.0).check("it")
+
+
+def test_a_record_may_take_seven_tenths_of_the_memory(monkeypatch):
+    monkeypatch.setattr("panto_env.base.machine.memory", lambda: 10e9)
+    Cost(1e6, 6.9e9, 0.0).check("it")
+    with pytest.raises(
+        InputError, match=r"would take 7\.1 GB, but this machine has 10\.0 GB"
+    ):
+        Cost(1e6, 7.1e9, 0.0).check("it")
+    assert gigabytes(5e21) == "5.0e+12 GB"
+
+
+def test_an_ended_episode_makes_no_further_step():
+    task = Task(run_settings({"distance": 10.0}))
+    task.reset(0, np.random.default_rng(0))
+    while not task.step(np.zeros((1, 1))):
+        pass
+    with pytest.raises(
+        InputError, match="lane 0 has ended or not begun; reset the lane first"
+    ):
+        task.step(np.zeros((1, 1)))
 
 
 def test_lanes_that_don_t_fit_into_memory_are_refused_before_they_are_made(monkeypatch):
