@@ -46,9 +46,12 @@ lint: $(READY)
 # Bytecode is kept whatever the environment says: tests start more than a hundred processes.
 test proofs: export PYTHONDONTWRITEBYTECODE =
 
+# CI runs the longer tests too.
+QUICK := not slow and not study
+TESTS := $(QUICK) and not longer
 test: $(READY)
 	$(MAKE) -j 2 lint kernels
-	$(BIN)/pytest -n auto --dist loadfile -m 'not slow and not study'
+	$(BIN)/pytest -n auto --dist loadfile -m '$(TESTS)'
 
 # The usual kernels, beside the lint, which leaves a core idle.
 kernels: $(READY)
@@ -112,7 +115,7 @@ accuracy: $(READY)
 
 # Coverage of the kernels, which run as plain Python for it: a chosen quick set of tests.
 coverage: $(READY)
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m 'plain and not slow and not study'
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m 'plain and $(QUICK)'
 	$(BIN)/coverage report
 
 # Share of generated mutants that the tests notice, room by room; ROOMS= for some of the rooms.

@@ -96,6 +96,7 @@ def learner(training, folder):
     return train.Run(training, folder, train.make_lanes(training))
 
 
+@pytest.mark.longer
 def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -290,6 +291,7 @@ class TestCommand:
 
         return run
 
+    @pytest.mark.longer
     def test_train_and_evaluate(self, panto, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         config = tmp_path / "tiny.toml"
@@ -334,6 +336,7 @@ class TestCommand:
         unknown = panto("evaluate", "nobody")
         assert isinstance(unknown.exception, InputError)
 
+    @pytest.mark.longer
     def test_a_stored_agent_is_evaluated_as_in_its_training(self, panto):
         result = panto("evaluate", "agent-any-line-five", "--speed", 275, "--distance", 900, "--json")
         assert result.exit_code == 0, result.output
@@ -393,6 +396,7 @@ def linear(tmp_path, monkeypatch):
 
 
 class TestStart:
+    @pytest.mark.longer
     @pytest.mark.parametrize("kind", ["ppo", "sac"])
     def test_an_agent_does_what_it_has_cloned(self, kind, linear, tmp_path):
         training = settings(

@@ -139,6 +139,7 @@ def test_a_pass_is_that_of_simulate():
     assert own.counted_from * (300 / 3.6) * 0.01 == pytest.approx(120, abs=2)
 
 
+@pytest.mark.longer
 def test_a_pass_that_ends_early_is_run_anew_in_the_same_environment(monkeypatch):
     training = settings(lanes=4, variants=[{"speed_kmh": 280}, {"speed_kmh": 300}])
     lanes, actor = PassLanes(training, Pulsing(10, 1)), training.hyperparameters.actor(learner(training))
@@ -197,6 +198,7 @@ def test_a_training_lowers_sigma_and_its_model_runs_as_a_policy(tmp_path):
     assert active.summary().mean == pytest.approx(passive.summary().mean, rel=0.015)
 
 
+@pytest.mark.longer
 def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     folder = train(settings(total_steps=1, hyperparameters=FEW), tmp_path / "run", progress=False)
     first = load(folder.model).facts
@@ -207,6 +209,7 @@ def test_a_resumed_training_goes_on_from_its_checkpoint(tmp_path):
     assert second.updates / first.updates == second.steps / first.steps  # all rounds are alike
 
 
+@pytest.mark.longer
 def test_a_training_goes_on_with_the_network_that_it_starts_from(tmp_path):
     shape = FEW | {"recurrent_units": 4}
     first = train(settings(total_steps=1, hyperparameters=shape), tmp_path / "first", progress=False)

@@ -43,6 +43,7 @@ def settings(**changes: Any) -> Training:
     return parse_training(table | changes, "the test")
 
 
+@pytest.mark.longer
 def test_whoever_learns_sees_a_part_and_hears_the_teacher():
     training = settings(lanes=1)
     needs = find_policy(TEACHER).facts.needs
@@ -119,6 +120,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_does_not_fit_is_refused_in_a_sentence(case):
     changes, message = REFUSED[case]

@@ -23,6 +23,7 @@ RECIPE = {
 }
 
 
+@pytest.mark.longer
 def test_learns_and_goes_on(tmp_path):
     training = parse_training(RECIPE, "test")
     run = train(training, tmp_path / "run", progress=False)
@@ -37,6 +38,7 @@ def test_learns_and_goes_on(tmp_path):
     assert any((a != b).any() for a, b in zip(actor.weights, later.weights, strict=True))
 
 
+@pytest.mark.longer
 def test_same_seed_same_model(tmp_path):
     short = RECIPE | {"total_steps": 2_048}
     actors = [

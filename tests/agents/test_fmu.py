@@ -148,6 +148,7 @@ def run(instance, readings, first=0):
     return np.array(found)
 
 
+@pytest.mark.longer
 def test_it_is_valid_and_says_what_it_is(unit, tmp_path):
     version, path = unit
     assert validate_fmu(str(path)) == []

@@ -41,6 +41,7 @@ def training(**changes: Any) -> Training:
     return settings("ppo", **usual | changes)
 
 
+@pytest.mark.longer
 def test_a_training_gives_a_policy_for_lines_that_it_has_not_met(tmp_path):
     folder = train.train(training(lines=2), tmp_path / "run", progress=False)
     facts, actor = read_model(folder.model)
@@ -131,6 +132,7 @@ def test_each_variant_has_its_share_of_the_lanes():
         lanes.close()
 
 
+@pytest.mark.longer
 def test_a_training_learns_from_all_and_evaluates_all(tmp_path):
     folder = train.train(varied(), tmp_path / "run", progress=False)
     with folder.evaluations.open(newline="") as file:

@@ -96,6 +96,7 @@ def check_same(case, folder):
     print(f"{case}: {most:.1e}, sigma {sigma:.4f} and {closed:.4f} N, state {compiled.bytes_of_state} bytes")
 
 
+@pytest.mark.longer
 @needs_gcc
 @pytest.mark.parametrize("case", some_at_once(CASES, ["any-line"]))
 def test_in_c_a_policy_acts_as_in_the_environment_and_closes_the_loop_alike(case, tmp_path):
@@ -159,6 +160,7 @@ class FromStart(Repetitive):
         super().begin(replace(context, speed=280 / 3.6), lanes)
 
 
+@pytest.mark.longer
 @needs_gcc
 def test_repetitive_control_learns_on_at_another_speed(tmp_path):
     controller = Compiled(made("repetitive", BRAKING), tmp_path)
@@ -249,6 +251,7 @@ def export(*given):
     return CliRunner().invoke(make_app(), ["export", *given])
 
 
+@pytest.mark.longer
 @needs_gcc
 def test_the_command_writes_c_that_compiles_a_unit_and_a_network(tmp_path, monkeypatch):
     fmpy, onnx = pytest.importorskip("fmpy"), pytest.importorskip("onnx")

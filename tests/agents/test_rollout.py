@@ -125,6 +125,7 @@ CASES = {
 }
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("case", some_at_once(CASES, ("recurrent", "a slow actuator")))
 def test_rollouts_and_their_derivatives_are_those_of_torch(case):
     """Nine passes of unequal lengths: two groups, one of them not full."""

@@ -146,6 +146,7 @@ def test_a_line_too_slow_for_an_agent_is_refused_with_the_reason():
     assert "or a range 'normalise' for the speeds of this line" in str(caught.value)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", some_at_once(NAMES, ["small"]))
 def test_a_card_is_of_today_and_a_hub_can_read_it(name):
     hub = pytest.importorskip("huggingface_hub")

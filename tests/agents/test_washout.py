@@ -68,6 +68,7 @@ def test_an_actuator_s_mean_is_zero_where_limits_cut_one_side():
     assert abs(settled.mean()) < 0.03 * settled.std()
 
 
+@pytest.mark.longer
 def test_a_constant_action_leaves_the_mean_force_alone(washed):
     given = settings("ppo").arguments | {"distance": 600.0}
     base = read_model(washed.model)[0].residual_of or "passive"

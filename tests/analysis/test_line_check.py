@@ -250,6 +250,7 @@ def test_values_are_those_of_the_line_that_an_environment_has(source):
     assert found.uplift == run.max_uplift
 
 
+@pytest.mark.longer
 def test_the_stiffest_places_are_not_missed(monkeypatch):
     """They are at droppers: between 49 places, re250's non-uniformity was 45.1 instead of 48.4 %."""
     line = load_catenary("re250")

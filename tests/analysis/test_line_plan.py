@@ -139,6 +139,7 @@ SURVEYS = {
 }
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("base", ["re250", "arms"])
 @pytest.mark.parametrize("name", SURVEYS)
 def test_a_survey_of_equal_spans_is_seen_from_above_where_it_has_all_staggers(base, name, tmp_path):

@@ -53,6 +53,7 @@ def test_jobs_that_have_not_begun_are_cancelled_after_an_error():
     assert len(begun) < 1000
 
 
+@pytest.mark.longer
 def test_each_process_is_another_one_with_one_thread_of_linear_algebra(monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)

@@ -136,6 +136,7 @@ def film(*arguments):
     return str(result.exception) if isinstance(result.exception, InputError) else result.output
 
 
+@pytest.mark.longer
 def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
     from panto_env.render.film import check_together, figures_in_words, policy_pass, saved_passes
@@ -154,6 +155,7 @@ def test_a_saved_run_is_filmed_beside_a_policy_under_its_settings(kept, tmp_path
     assert "25 frames per second" in film(kept[2], kept[2], "passive", "--output", output)
 
 
+@pytest.mark.longer
 def test_what_cannot_stand_above_each_other_is_refused(kept, tmp_path):
     pytest.importorskip("cv2", reason="the extra 'render' is not installed")
     output, run = tmp_path / "film.mp4", kept[2]

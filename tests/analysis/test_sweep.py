@@ -59,6 +59,7 @@ def test_value_takes_effect_as_in_a_file_of_ones_own(parameter, value, tmp_path)
     assert figures(row) != expected(simulate(**PAPER_3, speed_kmh=280), (5, 8))
 
 
+@pytest.mark.longer
 def test_speed_actuator_and_policy_parameters_take_effect():
     rows = sweep({"speed_kmh": [200, 250], "actuator.lag": [0.0, 0.02]}, **PAPER_3, policies=["pd"])
     assert [(row["speed_kmh"], row["actuator.lag"]) for row in rows] == [
@@ -156,6 +157,7 @@ def test_values_of_a_range_include_both_ends():
             parse_values("x", text)
 
 
+@pytest.mark.longer
 def test_command_writes_the_rows_it_prints(tmp_path):
     arguments = (
         "sweep", "catenary.mean_stiffness=3000:5000:3", "speed_kmh=250,300", "--bilateral",

@@ -137,6 +137,7 @@ def shown(opened, key):
     return [float(value) for value in re.findall(r"<td>([-\d.]+)</td>", row)]
 
 
+@pytest.mark.longer
 def test_a_choice_changes_the_figures_and_an_error_ends_nothing():
     opened = Opened()
     assert "200 km/h, passive: " in opened.see()

@@ -45,6 +45,7 @@ def function_of(value):
     return function if function is not None and hasattr(function, "__code__") else None
 
 
+@pytest.mark.longer
 @pytest.mark.skipif(not JIT, reason="nothing is compiled")
 def test_all_that_kernels_name_counts(sources):
     """From each compiled function on, by what its name means in the running program."""

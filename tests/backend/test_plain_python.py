@@ -208,6 +208,7 @@ def test_plain_python_and_compiled_kernels_agree(name):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.longer
 @CHOSEN
 def test_kernels_compute_what_they_did(name):
     """Physics has tests of its own; this one notices each change of a result, wanted or not."""

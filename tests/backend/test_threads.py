@@ -65,6 +65,7 @@ def test_a_small_batch_is_not_shared():
     assert helpers() <= before
 
 
+@pytest.mark.longer
 def test_threads_end_with_their_owner():
     before, batch = helpers(), Batch(2000)
     for _ in range(20):

@@ -198,6 +198,7 @@ def test_what_was_computed_is_printed_and_the_old_file_stays(options, tmp_path, 
     assert os.listdir(tmp_path) == [file]
 
 
+@pytest.mark.longer
 def test_one_file_that_fails_does_not_keep_the_others_from_being_written(old, monkeypatch):
     replace = files.Path.replace
     monkeypatch.setattr(
@@ -224,6 +225,7 @@ def test_studies_are_printed_and_the_others_go_on(wanted, tmp_path, monkeypatch,
 # --- what is there already ----------------------------------------------------------------------------
 
 
+@pytest.mark.longer
 def test_overwriting_is_told_in_one_line(tmp_path):
     words = ("simulate", *SHORT, "--output", "run.parquet")
     first = panto(*words, cwd=tmp_path)
@@ -235,6 +237,7 @@ def test_overwriting_is_told_in_one_line(tmp_path):
     assert (tmp_path / "run.parquet").read_bytes() == before
 
 
+@pytest.mark.longer
 def test_a_benchmark_is_overwritten_only_if_asked(old, monkeypatch):
     words = (*BENCHMARK, "--output", "out.json")
     assert "out.json exists already; give another --output, or --force" in refused(*words)

@@ -113,6 +113,7 @@ def test_a_plug_in_that_can_t_be_loaded_stops_no_other_command(site):
     assert np.isclose(told["pd"]["parameters"]["gain"], find_policy("pd").gain)
 
 
+@pytest.mark.longer
 @quiet
 def test_it_is_said_what_is_wrong_with_it(site):
     for name, why in SAID.items():
@@ -147,6 +148,7 @@ def test_one_that_takes_a_name_of_ours_is_left_out_and_named(site):
         assert type(find_policy(str(FOLDER / "head.safetensors"))).__module__.startswith("panto_agents")
 
 
+@pytest.mark.longer
 @quiet
 def test_a_tuning_does_not_load_them(site):
     from panto_baselines.tuning.tune import tunable

@@ -153,6 +153,7 @@ def test_odd_digits_are_no_spans(text):
         parse_spans(text)
 
 
+@pytest.mark.longer
 def test_a_name_that_is_no_mathematics_is_drawn_as_it_is(tmp_path, caplog):
     line = load_catenary("periodic-stiffness").model_copy(update={"name": r"$\bad{$ and $_$"})
     save(plot_run(simulate(line, "three-mass", distance=100.0), "all"), tmp_path / "run.png")

@@ -57,6 +57,7 @@ def test_it_learns_beside_feedback_what_repeats_to_near_zero():
     assert controlled[-1] < 0.05 * passive[-1]
 
 
+@pytest.mark.longer
 def test_learning_goes_on_from_the_feed_forward():
     series = np.zeros(2 * HARMONICS)
     series[[0, 15]] = 9.0, -6.0

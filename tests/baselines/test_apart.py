@@ -55,6 +55,7 @@ def written(folder, body):
     return f"{path}:Policy"
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("policy", ["lqg", "blind of pd", "tape of pd"])
 def test_an_installed_policy_plays_the_same_pass_apart_and_trusted(policy):
     one, other = (play(policy, trusted=trusted) for trusted in (False, True))
@@ -63,6 +64,7 @@ def test_an_installed_policy_plays_the_same_pass_apart_and_trusted(policy):
     assert one.played.actions.any()
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     "policy", ["agents/models/known-line.safetensors", "examples/own_controller.py:Damper"]
 )
@@ -73,6 +75,7 @@ def test_a_policy_of_a_file_plays_the_same_pass_as_its_object(policy):
     np.testing.assert_array_equal(one.played.actions, other.played.actions)
 
 
+@pytest.mark.longer
 def test_it_sees_what_it_wishes_and_neither_secrets_nor_seeds_and_prints_elsewhere(
     tmp_path, monkeypatch, capfd
 ):
@@ -90,6 +93,7 @@ def test_it_sees_what_it_wishes_and_neither_secrets_nor_seeds_and_prints_elsewhe
     assert (output, set(errors.split())) == ("", {"hello"})
 
 
+@pytest.mark.longer
 def test_only_trusted_and_installed_policies_run_beside_the_plant(tmp_path):
     file = written(tmp_path, "return np.zeros(1)")
     assert isinstance(find_apart("pd", trusted=False), PolicyApart)

@@ -57,6 +57,7 @@ def called(*arguments):
     return commands.called(command.benchmark, *short, columns=120)
 
 
+@pytest.mark.longer
 def test_every_policy_runs_the_same_passes_beside_the_passive_one(outcome):
     rows = [(row.policy, row.seed) for row in outcome.rows]
     assert rows == [("passive", 0), ("passive", 1), (P, 0), (P, 1)]
@@ -75,6 +76,7 @@ def test_outcome_does_not_depend_on_workers_and_repeats(outcome):
     assert json.dumps(again.as_dict()) == json.dumps(outcome.as_dict())
 
 
+@pytest.mark.longer
 def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome):
     assert outcome.rows[0].figures.std != outcome.rows[1].figures.std
     assert outcome.cells[1].interval is not None
@@ -84,6 +86,7 @@ def test_seeds_tell_lines_apart_only_where_there_is_chance(outcome):
     assert new.cells[1].interval is None
 
 
+@pytest.mark.longer
 def test_default_spans_leave_out_the_run_in_and_the_end():
     lines = [
         {"speeds_kmh": [300]},
@@ -230,6 +233,7 @@ def test_command_prints_a_table_and_a_drawn_salt_and_writes_the_page_that_its_js
         assert words in wide
 
 
+@pytest.mark.longer
 def test_command_prints_nothing_but_json_for_machines(tmp_path):
     files = (tmp_path / "out.csv", tmp_path / "out.png")
     result = called("p", "--json", "--output", str(files[0]), "--plot", str(files[1]))
@@ -261,6 +265,7 @@ def test_command_raises_one_sentence_and_overwrites_nothing(tmp_path, arguments,
     assert kept.read_text() == "kept"
 
 
+@pytest.mark.longer
 def test_the_command_is_looked_up_fast():
     code = (
         "import sys, panto_baselines.benchmark.command; "
@@ -270,6 +275,7 @@ def test_the_command_is_looked_up_fast():
     assert done.stdout.strip() == "set()"
 
 
+@pytest.mark.longer
 def test_a_line_can_have_policies_of_its_own():
     lines = [LINE, {**LINE, "catenary": "ln2", "speeds_kmh": [200], "policies": ["p"]}]
     done = benchmark.run(settings(policies=["passive"], lines=lines, seeds=1), workers=1)
@@ -307,6 +313,7 @@ def test_seeds_have_one_purpose_and_those_of_a_salt_are_what_their_definition_sa
         settings(salt="")
 
 
+@pytest.mark.longer
 def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
     track = load_benchmark("benchmark/known-line")
     rows = [
@@ -321,6 +328,7 @@ def test_the_tape_of_the_oracle_does_on_its_own_line_what_the_oracle_did():
         benchmark.run(settings(policies=[ORACLE_TAPE], lines=[LINE | {"speeds_kmh": [351]}]), workers=1)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("source", "speeds_kmh", "spans"),
     [

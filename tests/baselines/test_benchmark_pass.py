@@ -23,6 +23,7 @@ def run(**given):
     return drive(settings(**{"line_condition": "new"} | given), LINE, "p:gain=0.5", SPEED_KMH, seed=3)[0]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     "setting",
     [
@@ -130,6 +131,7 @@ def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     assert row.figures.std == run.summary((1, 3)).std
 
 
+@pytest.mark.longer
 def test_where_the_speed_drifts_commands_count_where_the_figures_do():
     """An ideal actuator does what it is told: its effort in the figures is the rms of the commands."""
     given = settings(line_condition="new", speed_drift=10.0)

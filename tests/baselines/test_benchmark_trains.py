@@ -39,6 +39,7 @@ def ended():
     apart.close()
 
 
+@pytest.mark.longer
 def test_figures_are_those_of_the_controlled_pantograph():
     row = a_pass("pd", 2).row
     run = simulate(**TRAIN, controlled=2, speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
@@ -65,6 +66,7 @@ def test_its_commands_count_while_it_is_in_the_spans():
     assert a_pass(Shaking(), 2).row.action_rate == pytest.approx(80.0 / 0.01)
 
 
+@pytest.mark.longer
 def test_of_two_the_worst_counts_and_both_play_again():
     done = a_pass("pd", [1, 2])
     run = simulate(**TRAIN, controlled=[1, 2], speed_kmh=SPEED_KMH, policy="pd", line_condition="smooth")
@@ -78,6 +80,7 @@ def test_of_two_the_worst_counts_and_both_play_again():
     assert a_pass("pd", [1, 2], played=done.played).row == done.row
 
 
+@pytest.mark.longer
 def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
     """Passively the second swings more; the policy calms it, and moves the mean of the first."""
     passive = a_pass("passive", [1, 2]).row
@@ -94,6 +97,7 @@ def test_the_mean_of_each_is_held_not_only_that_of_the_one_that_is_judged():
     assert not cell.disqualified
 
 
+@pytest.mark.longer
 def test_one_that_learns_does_not_learn_while_it_waits():
     """The second stands at the line's start for 200 m: what it reads there repeats with nothing."""
     given = {"pantographs": ["dsa380"] * 2, "distances": [200.0], "speed_kmh": 250.0, "policy": "repetitive"}

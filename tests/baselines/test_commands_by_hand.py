@@ -68,6 +68,7 @@ def test_policies_on_the_command_line_replace_the_file_s_and_its_trainings(hande
     assert (settings.seeds, lines(settings)) == ((0, 1, 2), lines(handed().settings))
 
 
+@pytest.mark.longer
 def test_a_line_on_the_command_line_replaces_all_and_a_speed_holds_on_each(handed):
     before = handed().settings
     settings = handed("--speed", "210", "--speed", "220").settings
@@ -79,6 +80,7 @@ def test_a_line_on_the_command_line_replaces_all_and_a_speed_holds_on_each(hande
     assert settings.policies == ("passive", "p")
 
 
+@pytest.mark.longer
 def test_other_options_replace_one_setting_each(handed):
     found = handed("--seeds", "5", "--trusted", "--workers", "2", "--salt", "mine")
     assert (found.settings.seeds, found.settings.trusted, found.workers) == ((0, 1, 2, 3, 4), True, 2)
@@ -107,6 +109,7 @@ class Made:
         return Path("data") / "it"
 
 
+@pytest.mark.longer
 def test_what_was_made_of_data_is_printed_or_given_as_json(monkeypatch, tmp_path):
     episodes, designs = mock.Mock(return_value=[Made()]), mock.Mock(return_value=Made())
     monkeypatch.setattr("panto_baselines.dataset.make.make_episodes", episodes)

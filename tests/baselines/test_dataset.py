@@ -77,6 +77,7 @@ def data(made, minari, monkeypatch):
     return minari.load_dataset(one.dataset_id)
 
 
+@pytest.mark.longer
 def test_of_the_project_are_whole_and_have_seeds_of_their_own():
     for name in names("dataset"):
         found = load_episodes(name)
@@ -127,6 +128,7 @@ def test_sets_are_chosen_by_name():
         chosen(found, ("pasive",))
 
 
+@pytest.mark.longer
 def test_a_data_set_loads_and_gives_its_environment_back(data, made):
     _, one = made
     assert (one.episodes, one.steps, one.kept) == (len(data), data.total_steps, False)

@@ -92,6 +92,7 @@ def test_it_listens_first_and_then_does_what_the_policy_does():
     assert np.abs(run.frame_force[acted]).max() == pytest.approx(10.0)
 
 
+@pytest.mark.longer
 def test_a_policy_that_harms_is_stopped():
     plain, stopped = (changes("ln2", "dsa250", 220.0, each, late=False)[0] for each in ("pd", "guarded:pd"))
     assert plain > 100.0

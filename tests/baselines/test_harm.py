@@ -103,6 +103,7 @@ def asked(**given):
     return parse(BenchmarkSettings, LATE | given, "the benchmark")
 
 
+@pytest.mark.longer
 def test_both_windows_are_those_of_one_pass_and_the_passive_run_of_the_early_one_may_end_with_it():
     given = asked(lines=[{"speeds_kmh": [280]}], line_condition="as-built", policies=["p:gain=0.3"])
     done = benchmark.run(given, workers=1)

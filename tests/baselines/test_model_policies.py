@@ -47,6 +47,7 @@ def test_models_response_is_that_of_masses_springs_and_dampers_by_hand():
     assert MODEL.response(frequency) == pytest.approx(np.array(expected), rel=1e-9)
 
 
+@pytest.mark.longer
 def test_the_plant_answers_at_the_spans_harmonics_much_as_the_model_says():
     """The dashpot of the string's closed form stands for wires, droppers and supports within a quarter."""
     settings = run_settings({"speed_kmh": 250.0, "accuracy": "fast", "actuator": "realistic"})
@@ -134,6 +135,7 @@ def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_lit
         repeated(Repetitive(), 5, blind=True)
 
 
+@pytest.mark.longer
 def test_repetitive_control_backs_off_where_its_model_is_wrong():
     """Under a plant of the opposite sign it would grow without bounds."""
     controlled, passive = repeated(Repetitive(gains=(0.5, 0.05, 0.1)), 40, sign=-1.0)

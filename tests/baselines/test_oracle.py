@@ -163,6 +163,7 @@ def filtered_forces_by_scipy(asked):
     return filtered[inside, -1], filtered[inside, :-1]
 
 
+@pytest.mark.longer
 def test_optimum_of_a_linear_line_is_that_of_scipys_least_squares(monkeypatch):
     monkeypatch.setattr(problem, "LEAD", 0.6)
     asked = Problem(LINEAR, spans=(3, 3))
@@ -178,6 +179,7 @@ def test_optimum_of_a_linear_line_is_that_of_scipys_least_squares(monkeypatch):
     assert reached == pytest.approx(std / passive.std(), abs=0.005)
 
 
+@pytest.mark.longer
 def test_every_iteration_is_better_and_the_mean_stays(short, descent):
     passive = short.figures
     merits = [each.std + solver.MEAN_WEIGHT * abs(each.mean - passive.mean) for each in descent.iterations]

@@ -103,6 +103,7 @@ def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
     assert called(command.replay, path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
 
 
+@pytest.mark.longer
 def test_what_is_not_a_whole_result_is_refused(result, tmp_path):
     with pytest.raises(InputError, match="no policy 'p': it has passive, pd, fb"):
         replay(result, ["p"])
@@ -202,6 +203,7 @@ def test_one_that_presses_would_not(folder):
     assert "It would not be ranked" in checked(folder).stdout
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [

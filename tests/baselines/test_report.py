@@ -264,6 +264,7 @@ def test_labels_of_points_lie_apart_and_inside():
     assert all(a[0] != b[0] or a[2] <= b[1] for a, b in itertools.pairwise(spans))
 
 
+@pytest.mark.longer
 def test_command_writes_the_page_beside_the_first_file(tmp_path):
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     for path in (first, second):
@@ -308,6 +309,7 @@ def opened(tmp_path, script):
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
 
 
+@pytest.mark.longer
 @pytest.mark.skipif(
     BROWSER is None and "CI" not in os.environ, reason="no browser; the Debian package chromium is one"
 )
@@ -381,6 +383,7 @@ TRACKS = [name for name in names("benchmark") if name.startswith("benchmark/") a
 """All but that for the curious, which `make benchmark` leaves out."""
 
 
+@pytest.mark.longer
 def test_the_page_has_a_ranking_of_each_headline_track_and_no_other_table_of_results():
     printed = [short_ranking(read_result(DOCS / "benchmark" / f"{track}.json.gz")) for track in HEADLINE]
     assert tables_of("benchmark.md") == {

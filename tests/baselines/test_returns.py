@@ -83,6 +83,7 @@ def test_every_policy_has_the_mean_of_its_episodes_at_the_speeds_of_the_result_i
         assert each.error == pytest.approx(np.std(single, ddof=1) / 3**0.5)
 
 
+@pytest.mark.longer
 def test_the_command_prints_policies_by_return_and_the_correlation(result, tmp_path):
     file = tmp_path / "result.json"
     result.save(file)

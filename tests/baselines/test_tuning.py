@@ -237,6 +237,7 @@ def test_residuals_are_of_sigma_and_of_the_mean_beside_the_passive_ones():
     assert costs == pytest.approx([1.0, expected])
 
 
+@pytest.mark.longer
 def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen():
     settings = run_settings(FEW | REAL)
     tuned = tune_at("skyhook", settings, 350.0, 1, 60)
@@ -280,6 +281,7 @@ FAMILY = {"catenary": "family:high-speed", "pantograph": "dsa380", "line_conditi
 FAMILY |= {"actuator": "realistic", "sensors": "realistic", "accuracy": "fast", "speed_kmh": 275}
 
 
+@pytest.mark.longer
 def test_on_a_family_each_seed_has_its_own_line():
     """Forces of a batch beside those of single runs, which draw the same lines."""
     force = run_batch(run_settings(FAMILY), [Still(), Skyhook(gains=(200.0, 0.0))], [2001, 2002])

@@ -119,6 +119,7 @@ def test_a_base_line_that_takes_no_sequence_is_refused(change, message, tmp_path
     assert str(caught.value).count(". ") == 0
 
 
+@pytest.mark.longer
 def test_the_command_makes_shows_draws_and_checks_a_line(tmp_path):
     masts, toml, drawing = (tmp_path / name for name in ("masts.csv", "my-line.toml", "line.png"))
     masts.write_text(table(";", ","))

@@ -63,6 +63,7 @@ def overlaps_are_described(section, line):
     assert supports[-1] - behind < described.distance[1] + 500.0
 
 
+@pytest.mark.longer
 @pytest.mark.plain
 @pytest.mark.parametrize("name", NAMES)
 def test_drawn_lines_are_what_the_section_describes(name):
@@ -324,6 +325,7 @@ def test_kinds_that_are_joined_have_spans_and_droppers_of_their_own():
         assert len({span.droppers.positions[0] for span in alone.layout().spans}) == 1
 
 
+@pytest.mark.longer
 @pytest.mark.plain
 @pytest.mark.parametrize("name", NAMES)
 def test_seeds_give_lines_that_differ_widely(name):

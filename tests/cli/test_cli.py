@@ -165,6 +165,7 @@ def test_validate_prints_every_table_that_it_made_and_passes(monkeypatch):
     assert (done.returncode, "Not all figures are inside." in done.stdout) == (1, True)
 
 
+@pytest.mark.longer
 def test_simulate_writes_and_prints_what_identifies_the_run(tmp_path):
     words = ("simulate", "--distance", 120, "--sensors", "realistic", "--seed", 3, "--spans", "1-2")
     found = told(*words, "--output", tmp_path / "run.parquet", "--plot", tmp_path / "run.png")
@@ -224,6 +225,7 @@ def test_a_preset_takes_values_and_defects():
     assert actuator_settings("realistic:lag=0.02").rate_limit == ACTUATOR_PRESETS["realistic"].rate_limit
 
 
+@pytest.mark.longer
 def test_a_film_is_as_large_as_its_help_says(monkeypatch, tmp_path):
     count, size = 2, (1280, 960)
     pytest.importorskip("cv2")
@@ -241,6 +243,7 @@ def test_a_film_is_as_large_as_its_help_says(monkeypatch, tmp_path):
 # --- list -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.longer
 def test_all_that_has_a_name_is_listed_with_its_whole_description(monkeypatch):
     monkeypatch.setattr("panto_env.terminal.console._width", 100)
     shown = only_words(panto("list").stdout)

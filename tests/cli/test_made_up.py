@@ -53,6 +53,7 @@ def made(monkeypatch):
     return of
 
 
+@pytest.mark.longer
 def test_a_family_of_plausible_lines(made):
     asked = made(lambda seed: {})
     done = panto("family", "--seeds", 4, "--first", 7)
@@ -162,6 +163,7 @@ def test_a_line_from_masts_is_shown_and_written_where_a_file_is_named(tmp_path):
     assert (alone.returncode, "Give --masts with --output" in alone.stderr) == (2, True)
 
 
+@pytest.mark.longer
 def test_a_limit_that_is_broken_is_said_and_ends_with_1(tmp_path):
     """A wire that rises by 10 cm in a span of 60 m, 1.7 ‰: too steep for fast trains alone."""
     (tmp_path / "masts.csv").write_text(masts([5.3] * 4 + [5.4] * 4))

@@ -69,9 +69,7 @@ def test_time_is_told_in_words():
 def test_a_record_may_take_seven_tenths_of_the_memory(monkeypatch):
     monkeypatch.setattr("panto_env.base.machine.memory", lambda: 10e9)
     Cost(1e6, 6.9e9, 0.0).check("it")
-    with pytest.raises(
-        InputError, match=r"would take 7\.1 GB, but this machine has 10\.0 GB"
-    ):
+    with pytest.raises(InputError, match=r"would take 7\.1 GB, but this machine has 10\.0 GB"):
         Cost(1e6, 7.1e9, 0.0).check("it")
     assert gigabytes(5e21) == "5.0e+12 GB"
 
@@ -81,9 +79,7 @@ def test_an_ended_episode_makes_no_further_step():
     task.reset(0, np.random.default_rng(0))
     while not task.step(np.zeros((1, 1))):
         pass
-    with pytest.raises(
-        InputError, match="lane 0 has ended or not begun; reset the lane first"
-    ):
+    with pytest.raises(InputError, match="lane 0 has ended or not begun; reset the lane first"):
         task.step(np.zeros((1, 1)))
 
 

@@ -277,6 +277,7 @@ def test_lost_tension_changes_the_whole_line(healthy_runs):
     assert found.notes == ()
 
 
+@pytest.mark.longer
 def test_healthy_passes_that_are_few_or_over_other_lines_are_said_to_be(healthy_runs):
     others = [drive(replace(TRACK, seed=1000 + k), 0) for k in range(6)]
     note = diagnose(healthy_runs[:1], others).notes[-1]
@@ -288,6 +289,7 @@ def test_healthy_passes_that_are_few_or_over_other_lines_are_said_to_be(healthy_
     assert rare.notes[0].startswith("Only 3 healthy passes")
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -318,6 +320,7 @@ def test_runs_that_say_too_little_are_refused(healthy_runs):
         diagnose([short], healthy_runs[1:])
 
 
+@pytest.mark.longer
 def test_an_example_is_right_only_where_the_defect_is(monkeypatch):
     """Of a short training: classes are those of the kinds, and candidates right or wrong by their place."""
     monkeypatch.setattr("panto_env.diagnosis.training.BROKEN_EACH", 1)
@@ -357,6 +360,7 @@ def test_command_prints_a_table_and_draws(files, tmp_path, monkeypatch):
     assert picture.stat().st_size > 20_000
 
 
+@pytest.mark.longer
 def test_command_prints_json(files):
     call = ["diagnose", files[0], "--healthy", files[1], "--healthy", files[2], files[3], "--json"]
     told = CliRunner().invoke(make_app(), call)

@@ -56,6 +56,7 @@ def known(healthy_record, coarse):
     )  # fmt: skip
 
 
+@pytest.mark.longer
 def test_healthy_passes_surround_a_healthy_record(healthy_record, known, monkeypatch):
     """Where sensors have neither gain nor zero, as this record's."""
     monkeypatch.setitem(OWN, "gain", 0.0)
@@ -70,6 +71,7 @@ def test_healthy_passes_surround_a_healthy_record(healthy_record, known, monkeyp
     assert 0.3 < spread.mean() < 3.0  # noise of 0.6 N a coefficient, and what the fit does not know
 
 
+@pytest.mark.longer
 def test_a_healthy_record_is_healthy_and_a_broken_dropper_is_found(healthy_record, known):
     assert diagnose_records([healthy_record], known).healthy
     broken = record_of({"broken_droppers": ((12, 4),)}, seed=2, position_error=-0.4)
@@ -77,16 +79,19 @@ def test_a_healthy_record_is_healthy_and_a_broken_dropper_is_found(healthy_recor
     assert (finding.kind, finding.span, finding.dropper) == ("broken dropper", 12, 4)
 
 
+@pytest.mark.longer
 def test_lost_tension_is_a_changed_line(known):
     assert diagnose_records([record_of({"lost_contact_tension": 0.03}, seed=3)], known).changed
 
 
+@pytest.mark.longer
 def test_sensors_with_a_gain_and_a_zero_make_no_line_unhealthy(healthy_record, known):
     (piece,) = healthy_record.pieces
     record = replace(healthy_record, pieces=(replace(piece, force=0.97 * piece.force + 5.0),))
     assert diagnose_records([record], known).healthy
 
 
+@pytest.mark.longer
 def test_a_record_with_a_gap_is_judged_by_its_longest_piece_and_says_so(healthy_record, known):
     (piece,) = healthy_record.pieces
     ends = piece.position < 610.0, piece.position > 630.0
@@ -115,6 +120,7 @@ def test_what_cannot_be_judged_is_refused(healthy_record, known):
         measured_passes([healthy_record], replace(known, line='{"kind": "flexible"}'))
 
 
+@pytest.mark.longer
 def test_the_command(known, tmp_path):
     record = record_of({"broken_droppers": ((12, 4),)}, seed=2)
     write_record(record, tmp_path / "later.csv")

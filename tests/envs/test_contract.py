@@ -142,6 +142,7 @@ def run(kind, env, steps, seed=0):
     return np.concatenate(answers)
 
 
+@pytest.mark.longer
 @every
 def test_copies_go_on_as_the_original_and_none_moves_another(kind):
     env = kind.make()
@@ -159,6 +160,7 @@ def test_copies_go_on_as_the_original_and_none_moves_another(kind):
         np.testing.assert_array_equal(kind.reset(twin), begun, way)
 
 
+@pytest.mark.longer
 @every
 def test_a_seed_begins_the_same_whatever_came_before(kind):
     env = kind.make()
@@ -185,6 +187,7 @@ def test_an_episode_broken_off_changes_the_next_one_without_a_seed():
     assert speeds[0] == speeds[1] != speeds[2]
 
 
+@pytest.mark.longer
 @every
 def test_a_bad_seed_changes_nothing(kind):
     env = kind.make()
@@ -197,6 +200,7 @@ def test_a_bad_seed_changes_nothing(kind):
     np.testing.assert_array_equal(run(kind, env, 5), run(kind, twin, 5))
 
 
+@pytest.mark.longer
 @every
 def test_an_environment_in_use_is_neither_used_nor_copied(kind):
     env = kind.make()
@@ -225,6 +229,7 @@ def bad_actions(kind, env):
     return [*bad, *wrong]
 
 
+@pytest.mark.longer
 @every
 def test_what_is_no_action_is_refused_and_changes_nothing(kind):
     env = kind.make()
@@ -236,6 +241,7 @@ def test_what_is_no_action_is_refused_and_changes_nothing(kind):
     np.testing.assert_array_equal(run(kind, env, 20), run(kind, twin, 20))
 
 
+@pytest.mark.longer
 @every
 def test_options_that_are_none_are_refused_and_change_nothing(kind):
     env = kind.make()
@@ -251,6 +257,7 @@ def test_options_that_are_none_are_refused_and_change_nothing(kind):
     np.testing.assert_array_equal(run(kind, env, 5), run(kind, twin, 5))
 
 
+@pytest.mark.longer
 @every
 def test_an_argument_is_not_set_as_an_attribute(kind):
     """It had been set without a word and without any effect."""
@@ -260,6 +267,7 @@ def test_an_argument_is_not_set_as_an_attribute(kind):
     assert not hasattr(env, "speed_kmh")
 
 
+@pytest.mark.longer
 def test_an_environment_of_tensors_is_used_within_inference_mode_and_after():
     env = Tensors.make()
     Tensors.reset(env, 3)
@@ -293,6 +301,7 @@ def test_a_reset_mask_names_whole_trains(device, mask):
     np.testing.assert_array_equal(flat(envs.step(still)[:4]), flat(twin.step(still)[:4]))
 
 
+@pytest.mark.longer
 def test_lanes_have_the_attributes_and_calls_of_gymnasium_s():
     for kind in (Vector, Tensors):
         envs = kind.make()

@@ -57,6 +57,7 @@ def test_reward_terms_sum_to_the_trajectory_s_cf_and_cl(name):
     assert not any("figures" in info for info in infos[:-1])
 
 
+@pytest.mark.longer
 def test_import_compiles_nothing_leaves_heavy_packages_alone_and_makes_ids_known():
     code = (
         "import sys, panto_env; from panto_env.plant import step;"

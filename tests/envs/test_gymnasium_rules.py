@@ -23,6 +23,7 @@ def _warnings_are_errors():
         yield
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", IDS)
 def test_public_checkers_find_no_fault(name):
     of_stable_baselines = pytest.importorskip("stable_baselines3.common.env_checker").check_env

@@ -32,6 +32,7 @@ def test_groups_are_copied_without_the_threads_that_step_them(monkeypatch):
     np.testing.assert_array_equal(twin.step(still)[0], envs.step(still)[0])
 
 
+@pytest.mark.longer
 def test_a_line_that_has_had_more_than_enough_episodes_is_drawn_anew():
     """Two of three lanes begin at a time, so that the count of three is passed and not met."""
     envs = make_vec(3, lines=1, **QUICK)

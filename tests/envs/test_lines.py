@@ -52,6 +52,7 @@ def run_to_end(env, action=0.0):
             return np.array(seen)
 
 
+@pytest.mark.longer
 def test_a_list_gives_its_lines():
     names = [line_of(seed, **LIST).name for seed in range(12)]
     assert set(names) == set(LIST["catenary"])
@@ -117,6 +118,7 @@ def test_lane_i_is_the_single_environment_seeded_seed_plus_i(settings):
     assert ran.ends > 3
 
 
+@pytest.mark.longer
 @drawn
 def test_lanes_of_a_group_share_the_line_of_its_first_lane(settings):
     envs = make_vec(7, lines=3, **settings)
@@ -130,6 +132,7 @@ def test_lanes_of_a_group_share_the_line_of_its_first_lane(settings):
     assert not {values_of(envs.unwrapped.context(lane)) for lane in range(7)} & set(lines)
 
 
+@pytest.mark.longer
 @drawn
 def test_lanes_that_share_a_line_are_single_environments_on_it(settings):
     """The first of a group in all; the others on its line and at speeds for it."""
@@ -152,6 +155,7 @@ def test_lanes_that_share_a_line_are_single_environments_on_it(settings):
             assert rewards[lane] == reward
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
 def test_lines_are_drawn_anew_after_so_many_episodes(mode):
     """Episodes on a line go on to their end while others begin on the next one."""
@@ -182,6 +186,7 @@ def test_lines_are_drawn_anew_after_so_many_episodes(mode):
     assert between > 0
 
 
+@pytest.mark.longer
 def test_options_go_to_each_group():
     envs = make_vec(4, lines=2, **FAMILY)
     envs.reset(seed=0)

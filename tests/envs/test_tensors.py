@@ -93,6 +93,7 @@ def test_lanes_are_those_of_arrays(case):
     check_same(info["figures"], ours["figures"], within)
 
 
+@pytest.mark.longer
 def test_same_step():
     name, settings = CASES["stiffness"]
     arrays, tensors = both(name, 3, settings, autoreset_mode="SameStep")
@@ -101,6 +102,7 @@ def test_same_step():
         check_same(info[key], ours[key], 1e-9, key)
 
 
+@pytest.mark.longer
 def test_disabled_and_masks():
     name, settings = CASES["stiffness"]
     arrays, tensors = both(name, 3, settings, autoreset_mode="Disabled")
@@ -115,6 +117,7 @@ def test_disabled_and_masks():
     tensors.step(action)
 
 
+@pytest.mark.longer
 def test_seeds_and_starts():
     make = {"num_envs": 5, "device": DEVICE, "starts": 3, "distance": 300.0}
     env = gymnasium.make_vec("panto_env:PantographStiffness-v0", speed_kmh=(100, 300), **make)
@@ -124,6 +127,7 @@ def test_seeds_and_starts():
     assert len(set(first)) == 3
 
 
+@pytest.mark.longer
 def test_context_is_that_of_the_lane():
     make = {"num_envs": 3, "device": DEVICE, "distance": 300.0, "speed_kmh": (100, 300)}
     env = gymnasium.make_vec("panto_env:PantographStiffness-v0", **make)
@@ -135,6 +139,7 @@ def test_context_is_that_of_the_lane():
         assert env.unwrapped.context(lane).speed * 3.6 == pytest.approx(speed_kmh)
 
 
+@pytest.mark.longer
 def test_noise_is_drawn_anew():
     env = gymnasium.make_vec(
         "panto_env:PantographStiffness-v0", num_envs=2, device=DEVICE, sensors="realistic"
@@ -168,6 +173,7 @@ def test_refused(settings, said):
         gymnasium.make_vec("panto_env:Pantograph-v0", num_envs=2, **settings)
 
 
+@pytest.mark.longer
 def test_refused_actions_and_options():
     env = gymnasium.make_vec("panto_env:PantographStiffness-v0", num_envs=2, device=DEVICE)
     device = env.unwrapped.device

@@ -246,6 +246,7 @@ class Constant:
         return np.array([0.2], dtype=np.float32)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("driven", [False, True])
 def test_trains_pass_gymnasium_s_check_and_go_on_as_their_copies(driven):
     env = make(**BOTH, **SHORT, washout=0.0)

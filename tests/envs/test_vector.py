@@ -38,6 +38,7 @@ def test_bad_resets_are_refused():
         env.step(np.zeros((3, 1)))
 
 
+@pytest.mark.longer
 def test_lanes_draw_their_own_pantograph_line_condition_and_speed():
     """Bit for bit as single environments with the seeds that follow, over ends of episodes."""
     scattered = {"pantograph_scatter": 0.1, "line_condition": ["new", "worn", {"broken_droppers": [(2, 4)]}]}

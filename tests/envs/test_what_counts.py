@@ -103,6 +103,7 @@ def steps_of(env):
         yield np.asarray(reward), np.asarray(counts)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", some_at_once(SIBLINGS, set(SIBLINGS) - {"tensors of trains"}))
 def test_infos_say_whether_a_reward_counts(name):
     """A reward of 0 does not, in any kind of environment: that of a step that counts is never so exact."""

@@ -28,6 +28,7 @@ def readings(task, steps, seed=0):
     return np.array(seen)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("settings", "estimator"),
     [(FLEXIBLE, "usual"), (FLEXIBLE, "displacements"), (MASSLESS, "usual:suspension_drift=0")],
@@ -65,6 +66,7 @@ def run_start(task, row):
     return task.samples.rows[0, 0, 0, row]
 
 
+@pytest.mark.longer
 def test_lanes_are_single_environments_and_copies_go_on():
     settings = FLEXIBLE | {
         "observation": "estimated",
@@ -93,6 +95,7 @@ def test_lanes_are_single_environments_and_copies_go_on():
     assert not np.array_equal(seen, first)
 
 
+@pytest.mark.longer
 def test_an_estimate_follows_the_force_and_is_as_late_as_the_sensors():
     delayed = {}
     for delay in (0.0, 0.01):
@@ -116,6 +119,7 @@ def test_an_estimate_follows_the_force_and_is_as_late_as_the_sensors():
     assert np.argmax(lags) <= 2
 
 
+@pytest.mark.longer
 def test_noise_of_displacement_reaches_the_estimate_and_that_of_a_force_sensor_does_not():
     spreads = {}
     for name, sensors in {
@@ -129,6 +133,7 @@ def test_noise_of_displacement_reaches_the_estimate_and_that_of_a_force_sensor_d
     assert np.std(spreads["displacement"] - spreads["none"]) > 3.0
 
 
+@pytest.mark.longer
 def test_policies_and_estimator_may_know_another_pantograph_than_the_true_one():
     known = load_pantograph("benchmark-2015")
     settings = {**FLEXIBLE, "observation": "estimated"}

@@ -57,6 +57,7 @@ def test_known_forces_are_those_until_the_next_sample(run):
     np.testing.assert_array_equal(seen.head_force, -seen.frame_force)
 
 
+@pytest.mark.longer
 def test_the_bar_of_the_estimator(run):
     """250 km/h, 120 N static, noise of real sensors, parameters 5 % wrong: above 0.97 in 0 to 20 Hz."""
     delays = {}
@@ -121,6 +122,7 @@ def test_a_record_tunes_its_noise_and_that_is_said(run, tmp_path):
     assert "the size of its innovations is no test" in " ".join(shown.stderr.split())
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [

@@ -134,6 +134,7 @@ def test_the_likelihood_is_the_density_of_all_samples(small):
     assert log_likelihood(filtered, 3) == pytest.approx(wanted - first, rel=1e-7)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("force", ["random-walk", "shaped", "periodic:highest=6"])
 @pytest.mark.parametrize("observation", ["displacements", "displacements and velocities"])
 def test_the_steady_gain_is_the_limit_of_the_time_varying_one(force, observation):

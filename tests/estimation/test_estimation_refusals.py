@@ -184,6 +184,7 @@ def test_an_estimate_is_judged_by_the_bounds_that_are_printed(name, found, suspe
             assert believed or f"{test.text}, not {bounds}" in judged.reasons[0]
 
 
+@pytest.mark.longer
 def test_a_wrong_head_mass_and_a_wrong_lift_cannot_be_seen(motion):
     """The limits of all tests, which documents and the command's help tell."""
     heavy = estimate(motion, changed(TRUE, {"masses.1": 10.0}))

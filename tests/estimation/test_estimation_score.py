@@ -80,6 +80,7 @@ def noisy(motion, seed=0):
     )
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("observation", ["displacements", "displacements and velocities"])
 def test_a_record_without_noise_gives_the_force_back(driven, observation):
     motion, pantograph = driven

@@ -32,6 +32,7 @@ def test_lines_at_rest_are_the_same(name):
     assert found.force < 1.0
 
 
+@pytest.mark.longer
 def test_elasticity_under_stitch_wires_is_the_same():
     """Of a force so small that every dropper stays taut."""
     line = sections()["some-stitched"].line

@@ -137,6 +137,7 @@ def test_energy_is_balanced_under_a_bridge():
     assert found.error < 1e-3 * found.turnover
 
 
+@pytest.mark.longer
 def test_figures_of_a_stretch_are_those_of_its_spans():
     section = SECTIONS["mixed"]
     run = simulate(

@@ -35,6 +35,7 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.longer
 def test_it_writes_line_values_and_plot(folder):
     done = panto(
         "fit", "run.csv", *TENSIONS,
@@ -65,6 +66,7 @@ def test_it_writes_line_values_and_plot(folder):
     assert "fitted to run.csv" in " ".join(shown.stdout.split())
 
 
+@pytest.mark.longer
 def test_json_and_a_pantograph(folder):
     done = panto(
         "fit", "run.csv", *ON, "--free", "pantograph,tensions", "--tolerance", "pantograph=0.1",
@@ -78,6 +80,7 @@ def test_json_and_a_pantograph(folder):
     assert (folder / "p.toml").read_text(encoding="utf-8").startswith(text_of(PANTOGRAPH).splitlines()[0])
 
 
+@pytest.mark.longer
 def test_a_fit_that_was_broken_off_goes_on(folder, monkeypatch):
     """Broken off after two steps, the second time it goes on there, and ends where one that was not does."""
     whole = panto("fit", "run.csv", *TENSIONS, "--values", "whole.csv", cwd=folder)
@@ -115,6 +118,7 @@ def others(lost, folder):
     return folder
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -153,6 +157,7 @@ def undamped(text):
     return text[: text.index("[damping]")]
 
 
+@pytest.mark.longer
 def test_a_line_that_could_not_be_written_is_refused_before_the_fit(folder):
     inline = "damping.alpha = 0.05\ndamping.beta = 1e-4\n" + undamped(text_of(LINE))
     (folder / "mine.toml").write_text(inline, encoding="utf-8")

@@ -239,6 +239,7 @@ def test_a_damaged_file_is_not_taken(tmp_path, record, state):
 STORED = ROOT / "docs" / "records-coverage"
 
 
+@pytest.mark.longer
 def test_the_documents_have_the_table_of_the_stored_lines():
     """Each row of the page is one of the stored lines', and every kind of line and of model is there."""
     text = (ROOT / "docs" / "records-fit.md").read_text(encoding="utf-8")

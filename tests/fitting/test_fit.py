@@ -67,6 +67,7 @@ def test_tensions_droppers_and_supports_are_found_within_their_intervals(
     assert 0.4 < np.sqrt(np.mean(shares**2)) < 1.7
 
 
+@pytest.mark.longer
 def test_what_is_left_is_the_sensors_noise_and_the_position_error_is_found(fitted):
     """2 N at 500 samples a second are 0.63 N in a coefficient; values take some of it up."""
     ((before, after),) = fitted.std

@@ -66,6 +66,7 @@ def written(done, tmp_path_factory):
     return path
 
 
+@pytest.mark.longer
 def test_the_file_is_the_design_s_with_what_was_found(written, done):
     line = load_catenary(written)
     assert line.as_found == CONDITION  # with the dropper that is hardly told: others were found with it

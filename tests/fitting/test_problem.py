@@ -77,6 +77,7 @@ def test_the_true_line_gives_the_force_of_a_record_without_noise(ready, truth, d
     assert (part.measured.force() - force_of(fitting, 0 * x)).std() > 10
 
 
+@pytest.mark.longer
 def test_records_of_several_tension_lengths_are_noted(pantograph):
     """On this line trains pass to other wires at 1070 m."""
     line = load_catenary("sweden-st15-bridge")
@@ -278,6 +279,7 @@ def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     assert len(both.of_records) == len(both.parts) == 1  # and nothing is said of the other one
 
 
+@pytest.mark.longer
 def test_a_record_of_another_line_is_called_strange_in_the_file_of_the_fit_too(record, pantograph):
     found = fit([record], load_catenary("re250"), pantograph, free=("tensions",))
     assert any(note.startswith("The fit explains little of") for note in remarks(found))

@@ -59,6 +59,7 @@ def widened(every):
     return np.sqrt(np.array(ratios)[:, : len(LONG)]).mean()
 
 
+@pytest.mark.longer
 def test_a_right_model_keeps_its_intervals(ready, jacobian):
     every = list(fits(ready, jacobian))
     assert inside(every, lambda fit: fit.covariance) == pytest.approx(0.95, abs=0.03)
@@ -68,6 +69,7 @@ def test_a_right_model_keeps_its_intervals(ready, jacobian):
     assert 1 <= widened(every) < 1.01
 
 
+@pytest.mark.longer
 def test_what_the_model_lacks_in_one_span_widens_intervals_so_that_they_hold_the_truth(ready, jacobian):
     every = list(fits(ready, jacobian, LACKING))
     assert inside(every, lambda fit: fit.solution.covariance) < 0.7

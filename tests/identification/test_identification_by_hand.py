@@ -197,6 +197,7 @@ def test_two_million_samples_are_the_most():
         _check_time(SimpleNamespace(plate=range(2_000_001), time_step=1e-3))
 
 
+@pytest.mark.longer
 def test_a_fit_of_what_is_no_motion_of_such_a_model_ends():
     """Time in s read as ms: the motion is a thousand times as quick as any such pantograph's."""
     record = replace(RECORD, time_step=1e-3 * RECORD.time_step)
@@ -234,6 +235,7 @@ def test_a_model_that_cannot_be_simulated_is_said_unless_a_file_needs_it(options
     assert "The model is not stable." in said
 
 
+@pytest.mark.longer
 def test_what_a_record_cannot_determine_is_marked_and_said(panto):
     """One sine cannot tell the spring from the mass."""
     sine = noisy(EXPERIMENTS[0], 20.0)
@@ -247,6 +249,7 @@ def test_what_a_record_cannot_determine_is_marked_and_said(panto):
         assert words in " ".join(shown.split())
 
 
+@pytest.mark.longer
 def test_a_method_that_finds_nothing_hides_no_other_unless_its_fit_is_wanted(panto, monkeypatch):
     failing = identify(RECORD, KNOWN)
     del failing.fits[OUTPUT_ERROR]
@@ -260,6 +263,7 @@ def test_a_method_that_finds_nothing_hides_no_other_unless_its_fit_is_wanted(pan
         failing.fits.clear()
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -122,6 +122,7 @@ def test_csv_to_identify_to_toml_to_simulate(sweep, tmp_path):
     assert simulated.returncode == 0, simulated.stderr
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

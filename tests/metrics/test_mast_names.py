@@ -48,6 +48,7 @@ def test_files_of_a_run(run):
         assert {12210.0, 12200.0, 12190.0} == set(sheet.columns["chainage"])
 
 
+@pytest.mark.longer
 def test_the_page_of_a_run(run):
     text = page([Findings(run, "run.parquet")])
     assert text.count(f'<th scope="row">{TWELFTH}</th>') > 2  # figures and droppers

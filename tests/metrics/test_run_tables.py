@@ -39,6 +39,7 @@ def check_samples(frame, run):
     assert all(heading.endswith(")") for heading in frame), "a heading without unit"
 
 
+@pytest.mark.longer
 def test_csv_has_all_samples_with_units(run, tmp_path):
     run.save(tmp_path / "run.csv")
     frame = pandas.read_csv(tmp_path / "run.csv")
@@ -70,6 +71,7 @@ def test_a_workbook_has_samples_figures_droppers_and_settings(run, book):
     assert about["power supply"] == "AC 15 kV"
 
 
+@pytest.mark.longer
 def test_droppers_at_rest_and_in_the_run_stand_side_by_side(run, book):
     frame = book["droppers"]
     moving, resting = moving_droppers(run), droppers_at_rest(load_catenary(run.catenary))
@@ -105,6 +107,7 @@ def test_a_run_without_figures_is_saved_with_the_reason(tmp_path):
         save_figures([ended], tmp_path / "figures.csv")
 
 
+@pytest.mark.longer
 def test_only_parquet_is_read_again(run, tmp_path):
     run.save(tmp_path / "run.csv")
     with pytest.raises(InputError, match=r"read from its \.parquet file only"):

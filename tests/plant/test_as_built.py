@@ -109,6 +109,7 @@ def test_more_tension_raises_the_wire_in_the_middle_of_a_span():
     assert least < heights[1] - heights[0] < most
 
 
+@pytest.mark.longer
 def test_each_lane_has_its_own_line_as_a_single_environment_has():
     """Over the ends of episodes, bit for bit, and each its own tension."""
     name = "panto_env:Pantograph-v0"

@@ -83,6 +83,7 @@ def test_turns_are_numpy_s():
     assert cosines == pytest.approx(np.cos(2 * np.pi * turns), abs=1e-13)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("x", [40.17, 40.5])
 @pytest.mark.parametrize("name", ["en50318-2002", "ohl-three-span"])
 def test_the_wire_yields_to_a_force_as_it_was_said_to(name, x):

@@ -193,6 +193,7 @@ def test_an_even_wire_carries_what_lifts_the_pantograph_at_its_present_speed():
     assert run.contact_force[0] == pytest.approx(carried[0], abs=1e-2)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("line", [SIMPLE, TWO_WIRES])
 def test_the_motion_is_that_of_a_pantograph_alone_under_a_lift_that_follows_the_speed(line):
     """The contact force is the run's own; SciPy's matrix exponential does the rest."""
@@ -278,6 +279,7 @@ def test_entries_normalised_by_speed_read_as_what_they_are():
         assert layout.read(seen, "contact force") == pytest.approx(env.trajectory.contact_force[-1], abs=0.02)
 
 
+@pytest.mark.longer
 def test_an_estimator_knows_the_uplift_of_the_speed():
     """A filter that took the mean speed's uplift would miss what differs from it: 5 N and more."""
     run, _ = passive(TWO_WIRES | QUICK | {"distance": 1400.0, "time_step": 1e-3})

@@ -167,6 +167,7 @@ def energy(line, wire, data, step):
     return total + line_energy.of_droppers(*extensions, stiffness, line.link_static[0])
 
 
+@pytest.mark.longer
 @PULSES
 @PRECISIONS
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar, precision):

@@ -150,6 +150,7 @@ def test_a_table_that_does_not_hold_the_line_s_heights_is_refused():
         slowly(short, UP)
 
 
+@pytest.mark.longer
 def test_estimators_know_what_the_height_adds(tmp_path):
     """Else the force would be 40 N wrong beyond the ramp."""
     run = slowly(with_table(), UP)

@@ -106,6 +106,7 @@ def test_the_stiffest_droppers_stay_stable_on_a_coarse_grid():
     assert 20 < run.summary((5, 9)).std < 60
 
 
+@pytest.mark.longer
 @pytest.mark.filterwarnings("ignore:A grid of")
 def test_a_grid_of_half_a_metre_is_within_two_per_cent():
     """Without what is missing, sigma was 3 % and the maximum 2.3 % of the mean force off."""

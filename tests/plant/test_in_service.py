@@ -138,6 +138,7 @@ def test_term_of_the_mean_force_is_that_of_a_low_passed_deviation():
     assert rewards == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.longer
 def test_controls_of_a_benchmark():
     settings = BenchmarkSettings(line_condition="as-built")
     line = Line(speeds_kmh=[300], distance=240.0, spans=(2, 3))
@@ -183,6 +184,7 @@ def test_with_the_term_of_the_mean_force_a_trained_agent_presses_less_hard(tmp_p
     assert abs(moved[0]) < 0.5 * moved[1]
 
 
+@pytest.mark.longer
 def test_a_tape_of_actions_is_worth_little_in_another_episode():
     """It was worth as much as the policy while every episode was the same one."""
     env, pd = gymnasium.make(NAME, distance=400.0), find_policy("pd")

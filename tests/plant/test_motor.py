@@ -83,6 +83,7 @@ MOVING = {"amplitude": 0.02, "frequency": 3.0}
 # --- against the continuous equations, integrated by SciPy -------------------------------------------
 
 
+@pytest.mark.longer
 def test_a_step_of_the_command_with_the_arm_locked_is_the_pi_loop_s():
     """And that is a first-order lag of the loop's bandwidth."""
     bench = Bench(MotorActuator(**SMOOTH), **LOCKED, step=1e-4)
@@ -92,6 +93,7 @@ def test_a_step_of_the_command_with_the_arm_locked_is_the_pi_loop_s():
     np.testing.assert_allclose(bench.per_ampere * ours[:20, 2], expected, rtol=1e-5)
 
 
+@pytest.mark.longer
 def test_the_force_is_the_mean_over_the_step_of_the_continuous_one():
     """In a step of eight time constants of the loop, and where the voltage is at its limit."""
     for changes in ({}, {"voltage": 3.0, "inductance": 2e-3, "bandwidth": 60.0}):
@@ -106,6 +108,7 @@ def test_the_force_is_the_mean_over_the_step_of_the_continuous_one():
         assert bench.plant.actuators.energy(0)[1, 1] == pytest.approx(heat, rel=2e-3)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("name", "changes", "tolerance"),
     [
@@ -139,6 +142,7 @@ def longest(true):
     return int((edges[1::2] - edges[::2]).max())
 
 
+@pytest.mark.longer
 def test_a_motor_that_turns_back_crosses_its_play_as_long_as_the_continuous_one():
     """No force reaches the head meanwhile; the teeth on the other side then take it over."""
     motor = MotorActuator(**SMOOTH, backlash=0.014)
@@ -177,6 +181,7 @@ def test_rotors_are_a_mass_between_the_ends():
     np.testing.assert_allclose((a @ x + b @ force)[2:], [head / m1, frame / m2])
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("ratio", [26.0, 400.0])
 def test_rotors_slow_a_mass_and_take_no_energy(ratio):
     """Also where they are thirty times the mass: an explicit inertia force would grow at once."""
@@ -192,6 +197,7 @@ def test_rotors_slow_a_mass_and_take_no_energy(ratio):
     np.testing.assert_allclose(height[:, 0], expected, atol=0.02 * start)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("backlash", [0.0, 0.03])
 @pytest.mark.parametrize("inductance", [1e-5, 1e-2])
 def test_light_rotors_with_a_strong_back_emf_are_stable(backlash, inductance):
@@ -205,6 +211,7 @@ def test_light_rotors_with_a_strong_back_emf_are_stable(backlash, inductance):
     assert motor.motors * 0.5 * inductance * rows[-1, 2] ** 2 < 10.0  # J
 
 
+@pytest.mark.longer
 def test_efficiency_is_what_a_motor_passes_on_and_a_load_has_to_overcome_more():
     """Lifted and lowered at a steady speed by a slow wave of the wire, the motors press 60 N."""
     motor = MotorActuator(gear_efficiency=0.8)
@@ -216,6 +223,7 @@ def test_efficiency_is_what_a_motor_passes_on_and_a_load_has_to_overcome_more():
         assert rows[:, 3] == pytest.approx(60 - sense * lost, abs=0.8)
 
 
+@pytest.mark.longer
 def test_friction_holds_what_it_can():
     bench = Bench(MotorActuator(), damping=0.0)
     at_rest = bench.run([0.8] * 20, 0.01)  # dry friction is 1.07 N
@@ -224,6 +232,7 @@ def test_friction_holds_what_it_can():
     assert np.abs(bench.run([3.0] * 20, 0.01)[:, 0]).max() > 1e-4
 
 
+@pytest.mark.longer
 def test_a_winding_that_gets_hot_is_held_to_its_continuous_force():
     motor = MotorActuator(thermal_time=0.5)
     bench = Bench(motor, **LOCKED, step=1e-3)
@@ -238,6 +247,7 @@ def test_a_winding_that_gets_hot_is_held_to_its_continuous_force():
 # --- energy -----------------------------------------------------------------------------------
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("changes", [SMOOTH, {}], ids=["smooth", "with friction"])
 def test_what_the_supply_gives_is_heat_work_and_what_rotors_and_armatures_hold(changes):
     """Over a second of sine and tape. Friction takes energy out: what is left is positive."""
@@ -259,6 +269,7 @@ def test_what_the_supply_gives_is_heat_work_and_what_rotors_and_armatures_hold(c
 # --- lanes ------------------------------------------------------------------------------------
 
 
+@pytest.mark.longer
 def test_lanes_of_a_batch_are_single_environments():
     """With motors at both places, and pantographs that differ."""
     actuator = {"kind": "motor", "place": "both", "backlash": 0.014}

@@ -119,6 +119,7 @@ def test_before_an_overlap_the_line_is_as_without_it_and_uplift_is_that_of_the_w
     assert 0.04 < uplift.min() < uplift.max() < 0.08
 
 
+@pytest.mark.longer
 def test_a_travelling_window_and_defects_on_both_pairs():
     """Beside the whole line; a dropper that is broken in the beginning wires, and a raised support."""
     condition = {"broken_droppers": [(FIRST, 15)], "raised_supports": [(FIRST + 1, 0.03)]}

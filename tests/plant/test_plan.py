@@ -248,6 +248,7 @@ def in_sequence(count, **changes):
     return line_with(steady_arm=ARM, sequence=[{}] * count, spans=count, **changes)
 
 
+@pytest.mark.longer
 def test_unlike_arms_need_a_sequence_and_stagger_and_pull():
     masts = [{"stagger": 0.299 if k == 5 else 0.3 * (-1) ** k} for k in range(13)]
     for line, message in (

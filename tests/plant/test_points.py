@@ -80,6 +80,7 @@ def test_points_of_an_overlap_are_on_the_wire_in_use():
     np.testing.assert_array_equal(one.contact_force, other.contact_force)
 
 
+@pytest.mark.longer
 def test_mass_and_spring_of_a_point_take_part_in_the_line_s_energy(monkeypatch):
     """Kept over 10 s of free motion with what is theirs, by velocity and height of the node they hang on."""
     data = undamped(with_points(SPOT))

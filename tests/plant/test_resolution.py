@@ -191,6 +191,7 @@ def swinging(line, wire):
     return total
 
 
+@pytest.mark.longer
 @PRECISIONS
 def test_ends_let_waves_out(precision):
     """A pulse on bare wires leaves a window in the middle of a line; what is reflected is told."""
@@ -225,6 +226,7 @@ def figures(**settings):
     return simulate("beijing-tianjin", **given, **settings).summary((10, 19))
 
 
+@pytest.mark.longer
 def test_no_wave_from_the_far_anchor_meets_the_train_on_a_whole_line():
     """With eight spans beyond the pass, those of a window, sigma was 3.3 % high."""
     distance = load_catenary("beijing-tianjin").alignment().support(19)

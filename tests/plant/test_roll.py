@@ -19,6 +19,7 @@ def rolling(name="dsa380", **changes):
     return load_pantograph(name).model_copy(update=own)
 
 
+@pytest.mark.longer
 def test_on_a_massless_line_it_moves_as_scipy_s_solver_has_it(monkeypatch):
     """The line's wire lies beside the middle of the head."""
     line, aside, speed, force = load_catenary("periodic-stiffness"), 0.3, 50.0, 120.0

@@ -114,6 +114,7 @@ def test_head_stands_a_compressed_strip_above_a_wire_with_mass(catenary, pantogr
     assert (run.head - run.wire)[pressed] == pytest.approx(strip[pressed], rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.longer
 def test_a_slower_run_keeps_no_uplift_of_a_faster_one():
     """At the same time step the slower train is a span behind: the support ahead has not moved yet."""
 

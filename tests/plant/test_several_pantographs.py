@@ -66,6 +66,7 @@ def test_parts_of_a_pantograph_at_one_place_are_the_pantograph(name, monkeypatch
         np.testing.assert_allclose(forces(rows, collector), share * forces(whole), atol=1e-6)
 
 
+@pytest.mark.longer
 def test_two_at_one_place_may_be_named_in_either_order():
     train = [Train.of(*pair, distances=[0.0]) for pair in ((ONE, OTHER), (OTHER, ONE))]
     rows = [run(each, 150.0, spans=5, precision="double")[1] for each in train]
@@ -74,6 +75,7 @@ def test_two_at_one_place_may_be_named_in_either_order():
         np.testing.assert_allclose(forces(rows[0], collector), forces(rows[1], 1 - collector), atol=1e-6)
 
 
+@pytest.mark.longer
 def test_one_that_never_touches_changes_no_bit_of_the_other():
     distance = 35.0
     alone = run(Train.of(ONE), 300.0, spans=8, train_length=distance)[1]
@@ -110,6 +112,7 @@ def test_far_behind_on_a_line_that_damps_its_waves_it_is_the_only_one():
     assert second.std() > 1.3 * alone.std()
 
 
+@pytest.mark.longer
 def test_it_waits_at_rest_until_it_comes_onto_the_line():
     distance = 120.0
     plant, rows = run(Train.of(ONE, OTHER, distances=[distance]), 400.0, spans=12)
@@ -124,6 +127,7 @@ def test_it_waits_at_rest_until_it_comes_onto_the_line():
     assert np.ptp(own[~waiting, Row.CONTACT_FORCE]) > 20
 
 
+@pytest.mark.longer
 def test_lanes_of_trains_are_bit_for_bit_the_single_train():
     train = Train.of(ONE, OTHER, ONE, distances=[50.0, 120.0])
     alone, lanes = (run(train, 200.0, spans=6, lanes=count)[1] for count in (1, 2))
@@ -131,6 +135,7 @@ def test_lanes_of_trains_are_bit_for_bit_the_single_train():
         np.testing.assert_array_equal(lanes[lane], alone[0])
 
 
+@pytest.mark.longer
 def test_pantographs_of_different_kinds_keep_their_own_equations():
     """Far apart on a damped line, each is as if alone, whatever number of masses the other has."""
     three = load_pantograph("three-mass")

@@ -74,6 +74,7 @@ def test_slow_gusts_are_as_coherent_along_the_track_as_davenport_has_it():
         assert together / power == pytest.approx(expected / power, abs=0.05)
 
 
+@pytest.mark.longer
 def test_wires_are_blown_upon_by_the_gusts_of_their_place_and_time():
     """The last computed gusts, at the points of all segments, against the sum of cosines."""
     model = in_wind(ALIKE, 3, side_wind=25.0).plant.model
@@ -134,6 +135,7 @@ def test_finite_elements_agree_in_gusts(line, seed):
     assert gusty.std > 1.4 * 27.1 or seed != STRONG
 
 
+@pytest.mark.longer
 def test_every_seed_has_its_gusts_and_without_turbulence_there_are_none():
     def force(seed, **condition):
         return simulate(distance=150.0, seed=seed, line_condition=condition, window=0).contact_force
@@ -146,6 +148,7 @@ def test_every_seed_has_its_gusts_and_without_turbulence_there_are_none():
     assert 0.01 < np.abs(even - force(1)).max() < 20
 
 
+@pytest.mark.longer
 def test_lanes_have_gusts_each_of_its_own_as_single_environments_do():
     settings = {"line_condition": ["new", {"side_wind": 30.0}], "spans": 6, "window": 0}
     settings |= {"distance": 10.0, "settle": 0.0, "run_in": 0.0}

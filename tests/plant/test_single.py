@@ -112,6 +112,7 @@ def test_a_rail_swings_at_a_beam_s_frequency_and_a_wire_at_a_string_s():
     assert frequency(string, 30.0) == pytest.approx(string.wave_speed / 60, rel=1e-3)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("data", [RAIL, TRAM], ids=["rail", "tram"])
 @pytest.mark.parametrize("step", [1e-3, 0.02])
 def test_a_moving_force_s_work_is_the_energy_gained(data, step):
@@ -129,6 +130,7 @@ def test_a_moving_force_s_work_is_the_energy_gained(data, step):
     assert work.sum() == pytest.approx(energy, rel=1e-9)
 
 
+@pytest.mark.longer
 def test_a_slow_force_lifts_the_line_as_in_statics():
     """By the judge's matrices and a sparse solver."""
     model = built(RAIL, time_step=0.05)
@@ -146,6 +148,7 @@ def test_a_slow_force_lifts_the_line_as_in_statics():
     assert heights[-1] == pytest.approx(height + lifted[unknowns] @ values, rel=1e-3)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("data", [RAIL, TRAM], ids=["rail", "tram"])
 def test_elasticity_is_by_the_judge_s_matrices(data):
     """And of model-based policies the mean line's spring is the inverse of its mean over a span."""
@@ -239,6 +242,7 @@ def test_a_window_gives_the_figures_of_a_line_without_ends(speed):
     assert usual.summary((150, 200)).std == pytest.approx(wide.summary((150, 200)).std, rel=0.01)
 
 
+@pytest.mark.longer
 def test_where_bending_counts_by_a_hair_figures_are_the_same():
     """Two lines on either side of the rule for the wave speed differ in their damping layers."""
     light = {"contact_wire__bending_stiffness": 200.0, "spans": 30}
@@ -251,12 +255,14 @@ def test_where_bending_counts_by_a_hair_figures_are_the_same():
     assert runs[0] == pytest.approx(runs[1], rel=0.01)
 
 
+@pytest.mark.longer
 def test_spans_given_one_by_one_are_the_same_line_where_they_are_alike():
     one_by_one = changed(TRAM, span_lengths=[30.0] * 24)
     runs = [simulate(data, "own-tram", 70.0, spans=24, distance=120.0) for data in (TRAM, one_by_one)]
     assert (runs[0].contact_force == runs[1].contact_force).all()
 
 
+@pytest.mark.longer
 def test_a_ramp_is_where_the_head_starts_and_leaves_the_rest_as_it_was():
     bent = changed(RAIL, ramp={"length": 4.0, "rise": 0.05})
     model, level = built(bent), built(RAIL)
@@ -287,6 +293,7 @@ def test_policies_act_on_it(policy):
     assert np.ptp(run.frame_force) > 1.0
 
 
+@pytest.mark.longer
 def test_lanes_of_an_environment_do_not_touch_each_other():
     """Two of three have the same seed and commands."""
     settings = {"catenary": "rail-10", "pantograph": "dsa380", "speed_kmh": 120.0, "line_condition": "new"}

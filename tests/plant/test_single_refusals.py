@@ -42,6 +42,7 @@ def test_what_a_single_wire_has_not_is_refused_in_its_own_words(settings, words)
     assert words in str(refused.value)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("numerics", "words"),
     [({"window": 5}, "A window of 5 spans is short"), ({"spacing": 3.0}, "Elements of 3 m are coarser")],

@@ -141,6 +141,7 @@ def test_a_profile_takes_the_place_of_a_speed_and_a_speed_in_options_that_of_the
     assert env.reset(seed=0, options={"speed_kmh": 250.0})[1]["speed_kmh"] == pytest.approx(250.0)
 
 
+@pytest.mark.longer
 def test_figures_by_classes_of_the_speed_are_those_of_their_places(tmp_path):
     run = simulate(**SIMPLE, speed_profile=[(0, 210), (600, 210), (1000, 235)], distance=1100.0)
     found = by_speed(run, "all")

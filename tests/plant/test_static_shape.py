@@ -193,6 +193,7 @@ def random_line(random):
     }
 
 
+@pytest.mark.longer
 def test_any_line_is_refused_in_one_sentence_or_hangs_in_equilibrium():
     """Random numbers within the ranges; what hangs is judged by finite elements."""
     hung, messages = 0, []

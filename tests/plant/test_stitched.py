@@ -142,6 +142,7 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     assert max(moved) > 0.2 * height
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("settings", [{"window": 0}, {"line_condition": "as-built", "seed": 3}], ids=str)
 def test_uniform_and_written_out_lines_move_alike(settings):
     """The window travels; defects and other tensions are the same."""

@@ -189,6 +189,7 @@ def test_its_elasticity_is_that_of_a_line_designed_for_these_tensions():
     assert lifts.max() > 1.05 * elasticity(line, 10.0)[1].max()
 
 
+@pytest.mark.longer
 def test_the_report_and_the_command_show_the_line_as_it_was_run(tmp_path):
     data = fixed(EN50318, EA)
     run = simulate(data, speed_kmh=250.0, line_condition={"temperature": 20.0})

@@ -44,6 +44,7 @@ def test_stiff_springs_make_the_supports_nodes(data):
     assert three_span.modes(rigid)[0][0] == pytest.approx(expected, rel=5e-3)
 
 
+@pytest.mark.longer
 def test_static_compliance_is_the_string_s_between_springs(data):
     """Deflection under a unit force at the first support, from statics of the string alone."""
     stringy = data.model_copy(
@@ -190,6 +191,7 @@ def errors(runs, number, difference):
     return [np.abs(in_span(difference(run, round(run.time_step / STEPS[-1])), number)).max() for run in runs]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(("number", "tolerance"), [(0, 0.15), (1, 0.6)])
 def test_force_head_and_uplift_are_the_judge_s_and_of_second_order(runs, solution, number, tolerance):
     """Forces swing by 165 N, the head moves within 55 mm; the second span begins with a re-projection."""

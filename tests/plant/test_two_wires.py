@@ -202,6 +202,7 @@ def test_a_run_starts_at_rest_where_the_wires_begin_at_unlike_heights(touched):
     assert (first > 0) == (touched == 2)
 
 
+@pytest.mark.longer
 def test_records_show_both_wires_of_each_pantograph(tmp_path):
     given = {"pantographs": [DSA, DSA], "distances": [60.0], "speed_kmh": 160.0, "distance": 800.0}
     run = simulate(CA, **given)
@@ -308,6 +309,7 @@ def test_defects_of_the_contact_wire_itself_are_refused(own):
         simulate("ca-160", DSA, 160.0, line_condition=own)
 
 
+@pytest.mark.longer
 def test_a_window_about_the_train_gives_what_the_whole_line_does():
     runs = [
         simulate(FAR, DSA, 160.0, distance=1320.0, window=window).summary((10, 19)) for window in (0, None)

@@ -77,6 +77,7 @@ def new():
     return runs[0][0]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     "condition",
     [
@@ -176,6 +177,7 @@ def energy(line, wire, data, step):
     return total + line_energy.of_droppers(*extensions, stiffness, line.link_static[0, links.number])
 
 
+@pytest.mark.longer
 @PULSES
 def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     """Supports and droppers lie between nodes, and clamps make some nodes heavier."""

@@ -39,6 +39,7 @@ def row_of(output, first):
     return next(row for row in rows if row[0] == first)
 
 
+@pytest.mark.longer
 def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch):
     monkeypatch.setattr(validate.console, "_width", 150)
     validate.validate(convergence=True, wear=True)
@@ -47,6 +48,7 @@ def test_tables_name_the_grid_and_step_of_the_default(short, capsys, monkeypatch
     assert row_of(printed, "0.8")[1:5] == ["0.5", "0.312", "1.67", "5.8"]
 
 
+@pytest.mark.longer
 def test_json_holds_the_same_tables(short, capsys):
     validate.validate(convergence=True, wear=True, json=True)
     told = json.loads(capsys.readouterr().out)

@@ -139,6 +139,7 @@ def random_sequence(random):
     return {"sequence": spans}
 
 
+@pytest.mark.longer
 def test_any_sequence_is_refused_in_one_sentence_or_hangs_as_finite_elements_do():
     hung, messages = 0, []
     for seed in range(30):

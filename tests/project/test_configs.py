@@ -23,6 +23,7 @@ def test_every_file_has_a_name_and_one_kind():
     assert {"benchmark", "benchmark-realistic", "benchmark/known-line"} <= set(kinds[1])
 
 
+@pytest.mark.longer
 def test_commands_take_names_and_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert load_training("ppo") == load_training(ROOT / "configs" / "ppo.toml")

@@ -6,6 +6,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+import pytest
 import yaml
 
 ROOT = Path(__file__).parents[2]
@@ -75,6 +76,7 @@ def reached(file):
     return found - {file}
 
 
+@pytest.mark.longer
 def test_five_parameters_go_down_through_the_house_and_through_no_file_twice():
     text = (ROOT / "docs/kernels.md").read_text()
     walks = re.findall(r"^- \*\*[\w' ]+\*\*: (`\w+/(?:.|\n(?! *[-\n]))+)", text, re.MULTILINE)

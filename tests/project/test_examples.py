@@ -54,6 +54,7 @@ def test_a_rig_over_udp_feels_the_line_that_another_process_computes(monkeypatch
     assert abs(ours.std() / true.std() - 1) < 0.05
 
 
+@pytest.mark.longer
 def test_first_run_is_the_same_through_gymnasium(run, tmp_path):
     example, told, said = run("first_run", "--plot", tmp_path / "run.png")
     assert told in said
@@ -75,6 +76,7 @@ def test_own_controller_is_ranked_and_pd_is_not(run):
     assert pd.rank is None
 
 
+@pytest.mark.longer
 def test_line_from_toml_keeps_the_standards(run, tmp_path):
     example, told, said = run("line_from_toml", "--plot", tmp_path / "line.png")
     verdicts, speeds = told.splitlines()[:9], told.splitlines(keepends=True)[9:]

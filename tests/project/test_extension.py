@@ -28,6 +28,7 @@ stiffness = 2e4
 """
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("plain", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_each_extension_is_at_most_one_new_file_and_one_line(tmp_path, plain):
     unwanted = shutil.ignore_patterns("__pycache__")

@@ -20,6 +20,7 @@ def files(run, tmp_path):
     return tmp_path
 
 
+@pytest.mark.longer
 def test_record_prints_figures_requirements_and_parts_of_runs(files):
     """Of runs whose names are HTML, which a page shows as text."""
     heading, *text = (files / "measured.csv").read_text(encoding="utf-8").splitlines()
@@ -39,6 +40,7 @@ def test_record_prints_figures_requirements_and_parts_of_runs(files):
     assert "<b>" not in (files / "runs.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.longer
 def test_record_writes_what_it_is_asked_for(files):
     done = panto(
         "record", "measured.csv", "--span", 60, "--section", 400, "--output", "parts.csv",
@@ -57,6 +59,7 @@ def test_record_writes_what_it_is_asked_for(files):
     assert not re.search(r"<(script|link|img)|url\(http", page)  # one file, which loads no other
 
 
+@pytest.mark.longer
 def test_units_and_a_mass_are_passed_on(files):
     text = (files / "measured.csv").read_text(encoding="utf-8").replace("force (N)", "force")
     (files / "plain.csv").write_text(text, encoding="utf-8")
@@ -65,6 +68,7 @@ def test_units_and_a_mass_are_passed_on(files):
     assert "no accelerations" in panto("record", "measured.csv", "--mass", 5, cwd=files).stderr
 
 
+@pytest.mark.longer
 def test_compare_accepts(files):
     done = panto(
         "compare", "measured.csv", "run.parquet", "--plot", "both.png", "--html", "both.html", cwd=files
@@ -76,6 +80,7 @@ def test_compare_accepts(files):
     assert "The simulation is accepted." in (files / "both.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.longer
 def test_compare_ends_with_1_where_it_does_not_accept(files, other_run):
     other_run.save(files / "other.parquet")
     done = panto("compare", "measured.csv", "other.parquet", "--html", "both.html", cwd=files)
@@ -87,6 +92,7 @@ def test_compare_ends_with_1_where_it_does_not_accept(files, other_run):
     assert json.loads(told.stdout)["accepted"] is False
 
 
+@pytest.mark.longer
 def test_compare_without_height_and_uplift_judges_nothing(files, run):
     run.save(files / "run.csv")
     done = panto("compare", "run.csv", "run.parquet", "--shift", 0, cwd=files)

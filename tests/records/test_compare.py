@@ -25,6 +25,7 @@ def deviations(found):
     return {each.key: each.value for each in found.criteria}
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("error", [1.7, -42.3])
 def test_a_run_against_its_own_noisy_record(run, error):
     found = compare(measured(run, position_error=error), run)
@@ -93,6 +94,7 @@ def test_deviations_are_run_minus_record_and_each_is_judged(run, record, key, se
     assert found.verdict == ("accepted" if kept else "not accepted")
 
 
+@pytest.mark.longer
 def test_what_was_not_measured_is_not_judged(run, record):
     found = compare(changed(record, height=lambda _: None, uplift=lambda _: None), run)
     assert found.accepted is None
@@ -132,6 +134,7 @@ def accelerating(record, change):
     return Record("a", (replace(piece, position=place, **series),))
 
 
+@pytest.mark.longer
 def test_a_speed_that_changes_is_refused(run, record):
     changes = accelerating(record, 0.4)
     assert changes.longest.speed == pytest.approx(run.speed)

@@ -38,6 +38,7 @@ def steady(speed, seconds, force=None, begin=0.0, run=""):
     return Piece(run, 0.002, 0.0, begin + 0.002 * speed * np.arange(count), force)
 
 
+@pytest.mark.longer
 def test_spans_have_the_figures_of_the_run(run, tmp_path):
     run.save(tmp_path / "run.csv")
     found = judge(read_record(tmp_path / "run.csv"), load_catenary(LINE))
@@ -150,6 +151,7 @@ def test_a_record_that_was_low_passed_is_judged_as_it_is(run):
     assert ("contact loss CL (%)", "–") in whole_table(found, "").rows
 
 
+@pytest.mark.longer
 def test_arcing_is_not_judged_behind_a_filter_that_is_known(run, tmp_path):
     """A weak filter looks like none: "arcing 0, kept" was said of a force that cannot fall to 0 any more."""
     record, weak = measured(run), butter(1, 20, fs=1 / run.time_step, output="sos")

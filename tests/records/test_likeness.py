@@ -59,6 +59,7 @@ def test_the_forces_of_two_pantographs_added(train, as_designed):
     assert any("2 times the run's: it may be the sum of two pantographs" in note for note in found.notes)
 
 
+@pytest.mark.longer
 def test_a_trailing_pantograph(train, as_designed):
     behind = measured(train.train[1])
     found = compare(behind, as_designed)

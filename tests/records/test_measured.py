@@ -53,6 +53,7 @@ def test_the_inertia_of_a_sinusoid():
     np.testing.assert_allclose(contact_force(tilted, 6.0)[0], 120, atol=1e-9)
 
 
+@pytest.mark.longer
 def test_the_inertia_of_a_simulated_head(run, written):
     """A head whose upper 4 kg are above the sensors: they feel the contact force and its inertia."""
     upward = np.gradient(run.head_velocity, run.time_step)

@@ -22,6 +22,7 @@ def test_a_written_record_is_read_back_to_the_last_bit(record, tmp_path):
         write_record(record, tmp_path / "a.txt")
 
 
+@pytest.mark.longer
 def test_the_csv_of_a_run_is_read_as_it_is(run, tmp_path):
     run.save(tmp_path / "run.csv")
     (piece,) = read_record(tmp_path / "run.csv").pieces

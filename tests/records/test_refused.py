@@ -168,6 +168,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", REFUSED)
 def test_refused_in_one_sentence(name, columns, written):
     change, words = REFUSED[name]

@@ -120,6 +120,7 @@ def test_the_axis_of_a_film_fits_what_the_film_shows():
         assert _highest(replace(run, contact_force=force), what) == (9000.0 if shown else 100.0), peak
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_two_policies_are_filmed_above_each_other(tmp_path, suffix):
     path = tmp_path / f"film{suffix}"

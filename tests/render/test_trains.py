@@ -95,6 +95,7 @@ def test_a_terminal_shows_the_controlled_one_and_names_all(task):
     assert "2 dsa250: 208 m" in told
 
 
+@pytest.mark.longer
 def test_a_film_of_a_saved_train_repeats_it(tmp_path):
     path = tmp_path / "train.parquet"
     run = simulate(**TRAIN | {"spans": 20}, controlled=[2], policy="p", distance=600.0)

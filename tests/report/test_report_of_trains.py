@@ -39,6 +39,7 @@ def cells(text, table, key):
     return [float(each) for each in re.findall(r'(?:<td>|class="value">)([\d.]+)<', row)]
 
 
+@pytest.mark.longer
 def test_a_report_has_a_column_and_a_picture_for_each_pantograph(run, file, tmp_path):
     report.save([file], tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text(encoding="utf-8")
@@ -64,6 +65,7 @@ def test_pantographs_of_trains_count_as_runs(run):
         page(found * 5)
 
 
+@pytest.mark.longer
 def test_samples_of_each_have_its_number_in_the_heading(run, tmp_path):
     run.save(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(encoding="utf-8-sig") as file:

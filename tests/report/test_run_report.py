@@ -109,6 +109,7 @@ def test_what_is_found_is_what_the_run_says(run, found):
     assert [dropper.position for dropper in found.droppers] == pytest.approx(found.line.droppers.positions)
 
 
+@pytest.mark.longer
 def test_the_page_says_it_and_is_the_same_twice(found):
     text = page([found])
     assert page([Findings(found.run, "run.parquet")]) == text
@@ -155,6 +156,7 @@ def test_the_page_says_it_and_is_the_same_twice(found):
         assert re.search(rf"{name}\b[^{{}}]*{{ break-inside: avoid; }}", rules), name
 
 
+@pytest.mark.longer
 def test_several_runs_stand_side_by_side(run, file, tmp_path):
     slow = replace(run, speed=250 / 3.6, contact_force=0.9 * run.contact_force)
     slow.save(tmp_path / "slow.parquet")
@@ -183,6 +185,7 @@ def test_the_report_is_of_the_line_that_was_run_whatever_its_file_says_now(tmp_p
     assert found.line.name == "mine"
 
 
+@pytest.mark.longer
 def test_names_and_descriptions_are_escaped(run):
     """Of a run that ended early, which is reported as such."""
     design = {part: {**values, "description": HOSTILE} for part, values in run.design.items()}
@@ -208,6 +211,7 @@ def test_what_is_no_run_is_refused_in_a_sentence(run, file, tmp_path):
             report_command(files, None)
 
 
+@pytest.mark.longer
 def test_runs_that_share_a_name_stay_apart(run):
     """A line's file edited between two runs, and runs that differ in what their names do not tell."""
     softer = {**run.design["catenary"], "span_length": 61.0}
@@ -282,6 +286,7 @@ def test_charts_stand_on_the_page_of_runs_that_have_them(whole, short, drawn):
         assert sum(text.count(f"{name}:") for name in CHARTS) == len(shown)
 
 
+@pytest.mark.longer
 def test_a_page_holds_one_to_eight_runs(short, drawn):
     assert MOST == 8
     names = [f"{k}.parquet" for k in range(9)]

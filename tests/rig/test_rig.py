@@ -105,6 +105,7 @@ def test_the_cylinder_is_its_transfer_function_behind_the_delay():
     assert heights == pytest.approx(true[1:, 0], abs=1e-9)
 
 
+@pytest.mark.longer
 @pytest.mark.plain
 def test_the_cylinder_keeps_its_largest_speed_and_stops_at_its_end():
     data = rig("rig", cylinder={"speed_limit": 0.5})
@@ -119,6 +120,7 @@ def test_the_cylinder_keeps_its_largest_speed_and_stops_at_its_end():
     assert model.wire.table[0, RigRow.STOPPED] > 0
 
 
+@pytest.mark.longer
 @pytest.mark.plain
 def test_the_load_cell_reads_the_force_less_inertia_behind_its_filter():
     data = rig("rig", load_cell={"mass": 2.0, "compensated_mass": 0.5, "filter_frequency": 100})
@@ -189,6 +191,7 @@ def test_the_rig_as_it_stands_follows_the_flexible_line_within_a_tenth_to_20_hz(
     assert error(rig(computer={"compensation": "none"}), dt) > 3 * usual
 
 
+@pytest.mark.longer
 def test_a_fitted_compensation_learns_a_cylinder_that_is_not_the_assumed_one():
     dt, wrong = 2.5e-4, {"assumed_frequency": 40.0}
     fixed = error(rig(computer=wrong), dt)
@@ -197,6 +200,7 @@ def test_a_fitted_compensation_learns_a_cylinder_that_is_not_the_assumed_one():
     assert known < fitted < known + 0.4 * (fixed - known)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("tables", "said"),
     [({"computer": {"delay": 0.02}}, "load cell"), ({"cylinder": {"stroke": 0.02}}, "end of its stroke")],
@@ -206,6 +210,7 @@ def test_a_loop_that_is_not_stable_ends_by_itself(tables, said):
     assert said in run.ending
 
 
+@pytest.mark.longer
 def test_a_loop_whose_limits_are_far_away_diverges_and_says_that_it_is_the_loop():
     wild = {"load_cell": {"force_range": 1e5}, "cylinder": {"stroke": 2, "speed_limit": 20}}
     data = rig(**wild, computer={"delay": 0.02, "assumed_delay": 0.001})
@@ -220,6 +225,7 @@ def test_what_the_cylinder_would_not_follow_is_refused():
         simulate(rig(computer={"interval": 7e-4}), PANTOGRAPH, SPEED)
 
 
+@pytest.mark.longer
 def test_a_defect_of_the_computed_line_is_felt_on_the_rig():
     dt, broken = 2.5e-4, {"broken_droppers": [(5, 4)]}
     change = {}
@@ -233,6 +239,7 @@ def test_a_defect_of_the_computed_line_is_felt_on_the_rig():
     assert change["rig-flexible"].std() == pytest.approx(change[LINE].std(), rel=0.1)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", some_at_once(["rig", "rig-flexible"], ["rig"]))
 def test_an_environment_on_the_rig_is_one_like_any_other(name):
     """A policy's view of it; lanes are single environments, copies go on as the original does."""

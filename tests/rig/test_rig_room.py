@@ -51,6 +51,7 @@ def test_the_computer_computes_what_the_simulated_rig_does():
     assert own[RigRow.TARGET] != 0
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", ["rig", "rig-flexible"])
 def test_a_run_can_be_repeated_and_ends_with_a_sentence(name):
     computer = RigComputer(name, SPEED, force=120.0, spans=3)
@@ -65,6 +66,7 @@ def test_a_run_can_be_repeated_and_ends_with_a_sentence(name):
     assert computer.ended
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -83,6 +85,7 @@ def test_what_no_sensor_says_is_refused_and_changes_nothing(arguments, said):
     assert computer.step(100.0) == other.step(100.0)
 
 
+@pytest.mark.longer
 def test_a_computed_line_that_leaves_its_range_is_said():
     computer = RigComputer("rig-flexible", SPEED, force=120.0)
     with pytest.raises(InputError, match="computed line left its valid range"):
@@ -96,6 +99,7 @@ def test_a_line_is_no_rig():
         RigComputer("rig-flexible", 500.0, force=120.0)
 
 
+@pytest.mark.longer
 def test_every_step_is_timed_and_the_late_ones_are_missed():
     computer = RigComputer("rig", SPEED, force=120.0)
     words = r"must run for \S+ s or longer, a step of its own, not for 1e-308 s\.$"
@@ -150,6 +154,7 @@ def test_an_uncompensated_mass_is_in_the_loop():
     assert change[0] == pytest.approx(1 + 1.5 * (2j * np.pi * 30) ** 2 / force[0])
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", ["rig", pytest.param("rig-flexible", marks=pytest.mark.slow)])
 def test_frequency_response_and_simulation_agree_on_the_delay_that_is_borne(name, monkeypatch):
     if name == "rig":  # it has no droppers, between which a loop would be worst
@@ -177,6 +182,7 @@ def test_frequency_response_and_simulation_agree_on_the_slowest_cylinder():
 # --- beside the line -----------------------------------------------------------------------------
 
 
+@pytest.mark.longer
 def test_the_flexible_line_on_a_rig_is_followed_and_three_spans_without_droppers_are_not():
     line = "en50318-2002"
     rigs = {name: load_catenary(name) for name in ("rig", "rig-flexible")}

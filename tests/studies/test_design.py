@@ -44,6 +44,7 @@ def test_the_least_tension_is_the_lower_end_where_nothing_forbids_it(tmp_path):
     assert in_words(wanted, found).endswith("all requirements kept")
 
 
+@pytest.mark.longer
 def test_figures_of_a_design_are_those_of_its_passes():
     wanted = design(speeds_kmh=[160, 280], run=RUN | {"line_condition": "as-built"})
     ((objectives, found),) = tried(wanted, [{"catenary.contact_wire.tension": 20e3}])

@@ -48,6 +48,7 @@ def test_a_figure_outside_is_named_and_fails(form):
     assert "27.89" in done.stdout
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

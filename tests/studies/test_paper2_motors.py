@@ -58,6 +58,7 @@ def test_at_equal_power_the_head_lowers_sigma_more_than_the_frame_and_both_most(
     assert (changes(head, passive)[1:] < changes(frame, passive)[1:] - 0.15).all()
 
 
+@pytest.mark.longer
 def test_at_a_limit_of_force_the_gain_of_the_least_sigma_is_taken(passive):
     best = motors.at_force_limit(SPEED, "head", 50.0, (0.25, 2.0))
     assert best.gain == 2.0
@@ -65,6 +66,7 @@ def test_at_a_limit_of_force_the_gain_of_the_least_sigma_is_taken(passive):
     assert 10.0 < best.largest_force < 50.0 * 1.25  # a driven gearbox adds friction
 
 
+@pytest.mark.longer
 def test_motors_that_are_off_hardly_change_the_force(passive):
     """Rotors, half a kilogram, and friction of a newton."""
     off = motors.motor_pass(SPEED, "head", 0.0, passive.figures.mean)
@@ -74,6 +76,7 @@ def test_motors_that_are_off_hardly_change_the_force(passive):
     assert abs(off.power) < 1e-9
 
 
+@pytest.mark.longer
 def test_power_is_what_the_record_tells_the_mechanical_a_fraction_of_the_electrical(by_place):
     for place in ("frame", "head"):
         one = by_place[place]
@@ -98,6 +101,7 @@ def test_heat_is_that_of_the_current_over_the_nominal_one(by_place):
     assert both.heat < 0.7 * head.heat
 
 
+@pytest.mark.longer
 def test_what_no_gain_reaches_is_refused():
     with pytest.raises(InputError, match=r"move the mean force by more than 1.5 %"):
         motors.at_force_limit(SPEED, "both", 100.0, (8.0,))
@@ -110,6 +114,7 @@ def bench_runs(passive):
     return {gain: motors.bench_run(passive.record, gain) for gain in (None, 0.0, 1.0, 2.0)}
 
 
+@pytest.mark.longer
 def test_the_bench_moves_as_the_line_does(passive, bench_runs):
     """The motion's harmonics carry most of what the contact wire does, and the collector feels them alone."""
     record, waves = passive.record, motors.motion_of_line(passive.record)
