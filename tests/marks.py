@@ -3,10 +3,10 @@
 import pytest
 
 
-def some_at_once(names, quick):
-    """Parameters: cases by name, of which some are run by `make test`, and the others by `make proofs`."""
+def some_at_once(names, quick, others=pytest.mark.slow):
+    """Parameters: cases by name, of which some are run by `make test`; others: mark of all others."""
     assert set(quick) <= set(names)
-    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in names]
+    return [name if name in quick else pytest.param(name, marks=others) for name in names]
 
 
 def some_in_proofs(names, proofs):

@@ -94,7 +94,7 @@ def test_frame_parameters_are_told_but_for_a_common_scale_that_the_lift_tells(mo
     assert values[1] > 1e4
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_the_extended_filter_finds_what_it_can_and_says_how_well(motion):
     names = frame_parameters(TRUE)
     wrong = dict(zip(names, (1.1, 0.92, 1.1, 0.9, 1.08), strict=True))

@@ -46,6 +46,10 @@ REFUSED = {
         lambda m: with_values(m, head=1e3 * m.head),
         "holds displacements of .* mm in a column",
     ),
+    "as much as from end to end": (
+        lambda m: with_values(m, head=m.head.mean() + 1.1 * (m.head - m.head.mean()) / np.ptp(m.head)),
+        "holds a motion of 1.1 m, which no pantograph makes",
+    ),
     "m for mm": (lambda m: with_values(m, head=1e-4 * m.head), "moves by .* µm only: metres"),
     "a jump": (
         lambda m: with_value(m, "head", slice(9000, None), m.head[9000:] + 0.1),

@@ -208,7 +208,7 @@ def test_what_the_record_does_not_agree_with_is_said():
     moved = noisy(head=clean_record(ALL[0], TRUTH).head + 7e-3)
     found = identify(moved, KNOWN)
     assert "a zero were off by 7 mm" in found.doubts[0]
-    # Where the search ends depends on the processor: without influence on the motion, or where no pantograph is.
+    # The processor decides where the search ends: without influence on the motion, or where no pantograph is.
     assert OUTPUT_ERROR in found.failures or {"c1T", "m3"} <= {*found.fits[OUTPUT_ERROR].impossible}
     assert identify(moved, KNOWN, free_offset=True).doubts == ()
     with pytest.raises(InputError, match="a plate can't pull the head"):

@@ -47,9 +47,10 @@ def pixels(plot):
 
 PICTURES = {f"frame-{name}": partial(frame, name) for name in FRAMES}
 PICTURES |= {name: partial(pixels, plot) for name, plot in PLOTS.items()}
+QUICK = "frame-flexible", "frame-stiffness"
 
 
-@pytest.mark.parametrize("name", some_at_once(PICTURES, ("frame-flexible", "frame-stiffness")))
+@pytest.mark.parametrize("name", some_at_once(PICTURES, QUICK, pytest.mark.longer))
 def test_a_picture_is_as_it_was(name):
     now = np.asarray(PICTURES[name]()).astype(int)
     then = cv2.imread(str(STORED / f"{name}.png"))[..., ::-1].astype(int)
