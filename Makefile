@@ -160,7 +160,7 @@ floors:
 	$(FLOORS)/bin/pip install -qq --upgrade pip packaging
 	$(FLOORS)/bin/python -m tests.floors $(FLOOR_EXTRAS) > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/pip install -q --constraint $(FLOORS)/floors.txt pytest pytest-xdist --editable ".[$(FLOOR_EXTRAS)]"
-	$(FLOORS)/bin/pytest -n auto --dist worksteal tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_trains.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
+	$(FLOORS)/bin/pytest -n auto --dist worksteal -m '$(TESTS)' tests/cli/test_cli.py tests/envs/test_env.py tests/envs/test_trains.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py \
 	  tests/envs/test_vector_rules.py tests/analysis/test_sweep.py tests/analysis/test_plots.py tests/metrics/test_trajectory.py tests/render/test_render.py
 
 # Every version of Python that is supported and at hand, but the first one, without the extra 'agents'.
@@ -173,7 +173,7 @@ pythons:
 	  venv=.venv-$$(basename $$python); \
 	  $$python -m venv $$venv && \
 	  $$venv/bin/pip install -qq --constraint constraints.txt pytest pytest-xdist --editable '.[control,render]' && \
-	  $$venv/bin/pytest -n auto --dist worksteal tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py tests/baselines/test_baselines.py \
+	  $$venv/bin/pytest -n auto --dist worksteal -m '$(TESTS)' tests/envs/test_env.py tests/envs/test_vector.py tests/envs/test_gymnasium_rules.py tests/baselines/test_baselines.py \
 	    || exit 1; done
 
 # The kernels' source compiled for a GPU, without one: NVIDIA's compiler in an environment of its own.
