@@ -199,12 +199,12 @@ def _with_sequence(
     spans, masts = ("".join(f"    {_inline(each)},\n" for each in rows) for rows in (items, named))
     given = f"sequence = {{ value = [\n{spans}], source = {json.dumps(source)} }}\n"
     given += f"end_support = {_inline(end)}\n" if end else ""
-    given += f"masts = [\n{masts}]\n" if named else ""
+    given += f"masts = {{ value = [\n{masts}], source = {json.dumps(source)} }}\n" if named else ""
     comment = f"# Spans between the masts of {json.dumps(source)}, in the order of travel."
     made = f"{plain.rstrip()}\n\n{comment}\n{given}\n{text[place:]}"
     expected = {key: value for key, value in table.items() if key != "spans"}
     expected |= {"sequence": {"value": items, "source": source}} | ({"end_support": dict(end)} if end else {})
-    expected |= {"masts": named} if named else {}
+    expected |= {"masts": {"value": named, "source": source}} if named else {}
     try:
         usable = tomllib.loads(made) == expected
     except tomllib.TOMLDecodeError:

@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.parts import CLOSEST
+from ..plant.catenary.flexible.plan import with_stiff_arms
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHORTEST_SPAN, SpanLength
 from .drawn_lines import Bands, DrawnLines, Length, PlanRanges, Range, Share, Speeds, in_words
@@ -287,7 +288,8 @@ class LineSection(DrawnLines):
     droppers: DropperRule
     plan: PlanRanges | None = Field(
         None,
-        description="stagger and steady arms; by default arms are the base line's, and lines have no plan",
+        description="stagger and steady arms; by default lines have no plan, and their arms the stiffness of "
+        "the base line's",
     )
     kinds: Kinds | None = Field(None, description="by default the whole line is of one kind")
     plausible: Bands
@@ -382,7 +384,8 @@ class LineSection(DrawnLines):
             encumbrances[under] = np.minimum(encumbrances[under], bridge.encumbrance)
         error = self.masts.height_error
         encumbrances += random.uniform(-error, error, count + 1)
-        table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
+        base = with_stiff_arms(base) if self.plan is None else base
+        table = base.model_dump(exclude={"sources", "spans", "plan"}, exclude_none=True)
         rounded = zip(encumbrances.round(HEIGHTS).tolist(), heights.round(HEIGHTS).tolist(), strict=True)
         at = [{"encumbrance": own, "contact_height": height + 0.0} for own, height in rounded]
         droppers = [self._droppers(random, base) for _ in range(int(kind[-1]) + 1)]

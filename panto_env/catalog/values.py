@@ -85,7 +85,7 @@ def leaves(entry: BaseModel, prefix: str = "", given: bool = True) -> Iterator[t
                 yield f"{prefix}{key}.{name}", item, field.description or "", own
         elif isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{key}.", own)
-        elif key in ("span_types", "sequence", "overlaps", "points", "tunnels"):
+        elif key in ("span_types", "sequence", "overlaps", "points", "tunnels", "masts"):
             items = value.items() if isinstance(value, Mapping) else enumerate(value, start=1)
             meanings = chain([field.description or ""], repeat(""))
             for (name, item), meaning in zip(items, meanings, strict=False):
@@ -100,6 +100,7 @@ def _inline(value: Any) -> str:
         return ", ".join(
             f"{key} ({_inline(item)})" if isinstance(item, Mapping) else f"{key} {item}"
             for key, item in value.items()
+            if item not in (None, "")
         )
     return str(value)
 

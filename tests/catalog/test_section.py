@@ -13,6 +13,7 @@ from panto_env.analysis.line_check import check
 from panto_env.catalog import load_catenary, load_pantograph, load_section
 from panto_env.catalog.loader import file_of, text_of
 from panto_env.catalog.section import Bridge, Kinds, Masts, lowered
+from panto_env.plant.catenary.flexible.plan import in_still_air, steady_arms
 from panto_env.plant.catenary.flexible.static import hang
 
 NAMES = ("main-line", "fast-line", "curved-line")
@@ -251,6 +252,19 @@ def test_a_section_may_have_any_line_of_one_s_own_as_its_base(tmp_path):
     assert 54.0 < line.alignment().lengths.max() <= 55.6
     assert line.sources["contact_wire.tension"] == load_catenary("re250").sources["contact_wire.tension"]
     assert line.sources["sequence.1"] == line.sources["droppers.positions"] == "drawn from section:mine"
+
+
+def test_without_a_plan_arms_are_as_stiff_as_on_the_base_line(tmp_path):
+    base = tmp_path / "wires.toml"
+    text = text_of("re250").replace("stiffness = { value = 0.0", "length = { value = 1.15")
+    base.write_text(f"{text}\n[plan]\nstagger = [0.3, -0.3]\nwind = [2.0, 2.0]\n")
+    section = load_section(own(tmp_path, ('"sweden-st15"', json.dumps(str(base)))))
+    line, there = section.draw(np.random.default_rng(3))[0], load_catenary(base)
+    expected = steady_arms(in_still_air(there).layout(5))
+    assert line.steady_arm.stiffness == expected.stiffness[0] > 100
+    assert line.steady_arm.mass == expected.mass[0]
+    assert line.plan is None
+    assert not line.arms_by_plan
 
 
 # --- sections of the catalogue ---------------------------------------------------------------------

@@ -5,6 +5,7 @@ import pytest
 from panto_env import Trajectory, simulate
 from panto_env.analysis.line_check import check, span_tables
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog.values import values_of
 from panto_env.fitting.values import Design, Values
 from panto_env.metrics.run_tables import droppers, of_spans
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
@@ -40,6 +41,12 @@ def test_tables_of_the_line_at_rest(line):
     found, name = check(line, 100.0), line.alignment().span_name
     for table in (*span_tables(found.spans, name), dropper_table(found.droppers, name)):
         assert TWELFTH in [cells[0] for cells in table.cells]
+
+
+def test_values_of_a_line_have_a_row_each(line):
+    assert [each.value for each in values_of(line) if each.key == "masts.12"] == [
+        "name M011, chainage 12190.0"
+    ]
 
 
 def test_files_of_a_run(run):

@@ -278,6 +278,19 @@ def _arms_of(line: FlexibleCatenaryData, spans: int) -> PulledArm:
     return PulledArm(*np.array(found).T.copy())
 
 
+def with_stiff_arms(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """A line of equal spans without its plan, whose steady arms are as stiff as on it in still air.
+
+    The same object where they have no length. Raises InputError as ``steady_arms``.
+    """
+    if not line.arms_by_plan:
+        return line
+    arms = steady_arms(in_still_air(line).layout())
+    kept = {"mass": float(arms.mass[0]), "stiffness": float(arms.stiffness[0])}
+    arm = line.steady_arm.model_copy(update=kept | {"length": None, "clamp_mass": 0.0})
+    return line.model_copy(update={"steady_arm": arm, "plan": None})
+
+
 def in_still_air(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
     """A line without the wind of its plan."""
     if line.plan is None or not any(line.plan.wind):
