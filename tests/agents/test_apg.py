@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,18 @@ def ratio(made: APGLearner, training: Training, seed: int) -> float:
     """Variance of the force over the passive one in the plant."""
     own = own_pass(made, training, seed, ALONE).judged
     return float(own.force[own.counted_from + 1 :].astype(float).var() / own.passive_variance)
+
+
+def test_an_actor_is_its_network_squashed():
+    network = apg.Network(5, (16,), torch.nn.Tanh, 0)
+    with torch.no_grad():
+        network.rest[-1].weight *= 1e3
+        seen = torch.randn(5, generator=torch.Generator().manual_seed(0))
+        force = network.rest[0](torch.tanh(network.first(seen)))
+    actor = settings().hyperparameters.actor(SimpleNamespace(network=network))
+    actor.reset(None)
+    assert 0.5 < abs(force.item()) < 5
+    np.testing.assert_allclose(actor.act(seen.numpy()), torch.tanh(force).numpy(), rtol=1e-5)
 
 
 TRAILING = {
