@@ -53,8 +53,9 @@ def test_learns_and_goes_on(tmp_path):
     assert facts.ratio < 0.95  # of a passive pantograph's sigma
     more = training.model_copy(update={"total_steps": 10_240})
     again = train(more, tmp_path / "run", resume=True, progress=False)
-    facts, later = read_model(again.model)
+    first, (facts, later) = facts, read_model(again.model)
     assert facts.steps == 10_240
+    assert read_model(again.best)[0].ratio == min(first.ratio, facts.ratio)
     assert math.isfinite(facts.ratio)
     assert any((a != b).any() for a, b in zip(actor.weights, later.weights, strict=True))
 

@@ -175,6 +175,23 @@ def test_a_limit_that_is_broken_is_said_and_ends_with_1(tmp_path):
     assert panto(*given, 250, "--json", cwd=tmp_path).returncode == 1
 
 
+def test_trainings_have_a_row_each(monkeypatch, tmp_path):
+    trainings = pytest.importorskip("panto_agents.trainings")
+    found = {"best": "a.safetensors", "best_steps": 4000, "ratio": 0.75, "qualified": True}
+    outcomes = [
+        found,
+        found | {"best": "b.safetensors", "ratio": 1.1, "qualified": False},
+        found | {"ratio": None},
+    ]
+    monkeypatch.setattr(trainings, "train_all", lambda planned, **_: outcomes)
+    shown = panto("trainings", "ppo", "--output", tmp_path / "all")
+    assert cells(shown.stdout)[1:4] == [
+        ["a.safetensors", "4000", "-25.0 %", ""],
+        ["b.safetensors", "4000", "+10.0 %", "F_m out of range"],
+        ["a.safetensors", "4000", "ended early", ""],
+    ]
+
+
 def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
     load = lambda path: SimpleNamespace(catenary="a", speed_kmh=250.0, path=path)  # noqa: E731
     monkeypatch.setattr(diagnose, "Trajectory", SimpleNamespace(load=load))
