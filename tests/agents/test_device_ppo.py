@@ -31,7 +31,16 @@ RECIPE = {
     "evaluation": {"interval_steps": 8_192, "speeds_kmh": [300]},
     "hyperparameters": {"n_steps": 32, "batch_size": 256, "n_epochs": 5, "learning_rate": 1e-3},
 }
-SHARED = "batch_size", "n_epochs", "clip_range", "ent_coef", "vf_coef", "max_grad_norm", "learning_rate"
+SHARED = (
+    "batch_size",
+    "n_epochs",
+    "learning_rate",
+    "clip_range",
+    "target_kl",
+    "ent_coef",
+    "vf_coef",
+    "max_grad_norm",
+)
 LAYERS = {
     "actor.0": "mlp_extractor.policy_net.0",
     "actor.2": "action_net",
@@ -76,9 +85,11 @@ class Still(gymnasium.Env):
     observation_space, action_space = Box(-1, 1, (3,)), Box(-1, 1, (2,))
 
 
-def test_an_update_is_that_of_stable_baselines_3():
+@pytest.mark.parametrize("target_kl", [None, 0.05, 0.01])
+def test_an_update_is_that_of_stable_baselines_3(target_kl):
     """From the same steps, whose policy was so different that many ratios are clipped."""
-    settings = PPO(batch_size=96, n_epochs=3, net_arch=(8,), ent_coef=0.01, learning_rate=1e-2)
+    given = {"batch_size": 96, "n_epochs": 9, "net_arch": (8,), "ent_coef": 0.01, "learning_rate": 1e-2}
+    settings = PPO(**given, target_kl=target_kl)
     shared = {name: getattr(settings, name) for name in SHARED}
     theirs = sb3.PPO("MlpPolicy", Still(), n_steps=96, **shared, policy_kwargs=settings.policy_kwargs())
     theirs.set_logger(configure(None, []))

@@ -98,6 +98,10 @@ class Workbench:
         by_line = self.data.contexts_by_lineno(str(mutant.path))
         found = {context for line in mutant.lines for context in by_line.get(line, ())}
         tests = [_node(context) for context in sorted(found - {""})]
+        if not found and any(
+            mutant.path.is_relative_to(self.root / each) for each in self.room.get("translated", ())
+        ):
+            return list(self.room["tests"])
         return tests + self.room["tests"] * ("" in found)
 
     def kills(self, mutant: Mutant) -> bool:
