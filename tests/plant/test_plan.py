@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from panto_env import InputError, simulate
+from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
 from panto_env.metrics.strip import strip_use, swept
 from panto_env.plant.catenary.flexible import FlexibleCatenaryData
@@ -224,6 +225,18 @@ def test_wind_of_a_condition_and_of_the_plan_are_the_same():
 
 
 @pytest.mark.filterwarnings("ignore")
+def test_in_unlike_winds_arms_are_as_in_still_air():
+    line = line_with(ZIGZAG, steady_arm=ARM)
+    conditions = [LineCondition(), LineCondition(side_wind=28.0)]
+    with pytest.warns(AccuracyWarning, match="pulled as in still air.*make a run for each"):
+        assert in_wind(line, 14, conditions) is line
+    with pytest.warns(AccuracyWarning, match="pulled as in still air"):
+        found = {
+            simulate(line, "dsa380", 200, line_condition=conditions, seed=k).summary().std for k in (0, 1, 2)
+        }
+    assert len(found) == 3  # the gusts blow on the wires
+
+
 def test_a_plan_without_lengths_of_arms_changes_no_run():
     plain, planned = (run(line, 250, line_condition="as-built") for line in (line_with(), line_with(ZIGZAG)))
     assert plain == planned
@@ -265,9 +278,6 @@ def test_unlike_arms_need_a_sequence_and_stagger_and_pull():
     ):
         with pytest.raises(InputError, match=message):
             simulate(line, "dsa380", 250)
-    line, conditions = line_with(ZIGZAG, steady_arm=ARM), ("new", "new:side_wind=20")
-    with pytest.raises(InputError, match="must have the same side_wind"):
-        simulate(line, "dsa380", 250, line_condition=conditions)
     line = in_sequence(12, plan={"stagger": (0.3, -0.3, -0.2)})
     assert len(set(np.round(steady_arms(line.layout()).stiffness, 3))) > 2
     assert simulate(line, "dsa380", 200, distance=480.0).summary((6, 7)).std > 0
