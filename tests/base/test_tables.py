@@ -120,7 +120,7 @@ def test_pandas_reads_what_was_written(suffix, tmp_path):
     assert (frame["ended"].tolist(), frame["seed"].tolist()) == ([False, True], [0, 7])
 
 
-def test_text_never_becomes_a_formula(tmp_path):
+def test_text_never_becomes_a_formula_nor_a_link(tmp_path):
     sheet = Sheet("table", {"name": FORMULAS, "=A1": list(range(len(FORMULAS)))})
     write_table(sheet, tmp_path / "table.xlsx")
     page = openpyxl.load_workbook(tmp_path / "table.xlsx").active
@@ -131,6 +131,8 @@ def test_text_never_becomes_a_formula(tmp_path):
     frame = pandas.read_csv(tmp_path / "table.csv")
     assert frame["name"].tolist() == [f"'{text}" for text in FORMULAS]
     assert list(frame) == ["name", "'=A1"]
+    write_table(Sheet("table", {"site": ["https://example.org"]}), tmp_path / "link.xlsx")
+    assert openpyxl.load_workbook(tmp_path / "link.xlsx").active["A2"].hyperlink is None
 
 
 def test_numbers_are_numbers_in_csv_and_only_more_than_ascii_has_a_mark(tmp_path):
