@@ -121,6 +121,7 @@ def test_a_run_s_folder_its_tables_and_its_best_model(finished):
     assert facts.ratio == pytest.approx(-max(scores)[1])
 
 
+@pytest.mark.longer
 def test_same_seed_same_weights(runs, tmp_path):
     again = train.train(settings("ppo"), tmp_path / "again", progress=False)
     for one, other in zip(weights(runs["ppo"].model), weights(again.model), strict=True):

@@ -65,6 +65,7 @@ def with_a_layer_of_its_own():
     return model
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("model", "message"),
     [
@@ -328,6 +329,7 @@ def test_pictures_are_those_of_the_lanes(tmp_path):
 FILE = Path(__file__).parents[1] / "extensions" / "of_td3.py"
 
 
+@pytest.mark.longer
 def test_a_file_of_any_library_acts_as_the_model_does(tmp_path):
     lanes = DummyVecEnv([bare])
     kwargs = {"learning_starts": 20, "batch_size": 8, "policy_kwargs": {"net_arch": [16]}}

@@ -81,6 +81,7 @@ def test_a_constant_action_leaves_the_mean_force_alone(washed):
     assert simulate(**given, policy=without, seed=3).summary().mean > 1.02 * nothing.mean
 
 
+@pytest.mark.longer
 def test_lanes_do_as_the_policy_does(washed):
     """Two episodes of a training lane under the trained network are the policy's, bit for bit."""
     import gymnasium

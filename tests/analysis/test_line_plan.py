@@ -119,6 +119,7 @@ def test_a_line_without_stagger_has_no_plan():
     assert line_plan(load_catenary("re250"), LineCondition(side_wind=20)) is None
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("wind", [0.0, 20.0])
 def test_the_drawing_shows_the_plan(wind, tmp_path):
     line = load_catenary(str(written(tmp_path, "stagger = [0.3, -0.3]")))

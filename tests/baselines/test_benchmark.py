@@ -173,6 +173,7 @@ def test_a_bad_file_is_named_with_its_key(tmp_path, text, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.longer
 def test_json_holds_everything_and_the_settings_that_make_it_again(outcome, tmp_path):
     outcome.save(tmp_path / "out.json")
     table = read_checked(tmp_path / "out.json")

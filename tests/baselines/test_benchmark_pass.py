@@ -84,6 +84,7 @@ def test_a_pass_that_ends_early_has_no_figures():
     assert np.isnan([*row.figures.as_dict().values(), row.action_rate, row.power, row.pressed_std]).all()
 
 
+@pytest.mark.longer
 def test_the_pressed_passive_pantograph_has_the_mean_of_the_pass():
     given = settings(line_condition="new")
     row = run_pass(given, LINE, Windows((2, 3)), "p:gain=0.5", SPEED_KMH, seed=0).row

@@ -139,6 +139,7 @@ def test_a_data_set_loads_and_gives_its_environment_back(data, made):
     assert data.spec.env_spec.kwargs["catenary"] == "en50318-2002"
 
 
+@pytest.mark.longer
 def test_seed_and_actions_give_an_episode_again(data):
     env = data.recover_environment()
     for k, (episode, facts) in enumerate(

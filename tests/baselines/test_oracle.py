@@ -221,6 +221,7 @@ def test_the_oracle_of_a_trailing_pantograph_is_what_simulate_says_of_it():
     assert asked.first_action * asked.interval == pytest.approx(35.0 / run.speed, abs=asked.interval)
 
 
+@pytest.mark.longer
 def test_simulate_says_the_same_to_the_digit_and_the_force_keeps_the_actuators_limits(short, descent):
     run, actuator = short.replay(short.knots.commands(descent.knots)), short.settings.actuator
     figures, force = run.summary(SPANS), run.frame_force

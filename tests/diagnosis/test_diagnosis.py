@@ -308,6 +308,7 @@ def test_runs_that_cannot_be_compared_are_refused(healthy_runs, change, message)
         diagnose(runs[:1], runs[1:])
 
 
+@pytest.mark.longer
 def test_runs_that_say_too_little_are_refused(healthy_runs):
     with pytest.raises(InputError, match="takes at least 3 of them, not 2; give more with --healthy"):
         diagnose(healthy_runs[:1], healthy_runs[1:3])
@@ -370,6 +371,7 @@ def test_command_prints_json(files):
     assert all(sum(each["shares"].values()) == pytest.approx(1) for each in found["findings"])
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("extra", "message"),
     [

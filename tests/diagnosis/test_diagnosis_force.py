@@ -35,6 +35,7 @@ def test_the_estimate_is_the_force_to_20_hz():
     assert not np.array_equal(error, error_of(run, seed=1))
 
 
+@pytest.mark.longer
 def test_the_estimator_knows_the_pantograph_as_designed(runs):
     """And not as it was drawn: that costs more than noise does, and the catalogue's values are used."""
     as_designed = error_of(runs[0])

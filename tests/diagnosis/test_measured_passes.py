@@ -101,6 +101,7 @@ def test_a_record_with_a_gap_is_judged_by_its_longest_piece_and_says_so(healthy_
     assert "250 km/h has 2 pieces, and a diagnosis takes one of each record: that from 630 to 900 m." in notes
 
 
+@pytest.mark.longer
 def test_what_is_left_out_and_what_a_record_says_is_among_the_notes(healthy_record, known):
     (piece,) = healthy_record.pieces
     short = replace(piece, position=piece.position[:3000], force=piece.force[:3000], run="May")
@@ -111,6 +112,7 @@ def test_what_is_left_out_and_what_a_record_says_is_among_the_notes(healthy_reco
     assert (GOES_ON in found.notes) is bool(found.findings)
 
 
+@pytest.mark.longer
 def test_what_cannot_be_judged_is_refused(healthy_record, known):
     with pytest.raises(InputError, match=r"at 220 and 250 km/h cannot be judged together"):
         measured_passes([healthy_record, record_of({}, speed=220.0)], known)

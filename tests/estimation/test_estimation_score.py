@@ -92,6 +92,7 @@ def test_a_record_without_noise_gives_the_force_back(driven, observation):
     assert np.abs(smoothed.force - motion.contact_force)[500:-100].max() < 0.05
 
 
+@pytest.mark.longer
 def test_inertia_corrected_is_the_force_low_passed(driven):
     motion, pantograph = driven
     if len(pantograph.masses) == 3:

@@ -82,6 +82,7 @@ def test_what_is_left_is_the_sensors_noise_and_the_position_error_is_found(fitte
     assert deviation < 0.05
 
 
+@pytest.mark.longer
 def test_it_settles(fitted, steps):
     assert fitted.solution.converged
     assert steps[-1][0].steps == fitted.solution.state.steps < STEPS

@@ -78,6 +78,7 @@ def test_what_the_model_lacks_in_one_span_widens_intervals_so_that_they_hold_the
     assert np.mean([ODD in fit.moved for fit, _ in every]) > 0.9
 
 
+@pytest.mark.longer
 def test_spans_move_values_by_as_much_as_noise_does(ready, jacobian, monkeypatch):
     """All spans together, in the mean over draws, although values follow the noise in each."""
     monkeypatch.setattr(fitting, "TOO_MUCH", -np.inf)

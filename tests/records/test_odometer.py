@@ -24,6 +24,7 @@ def turned(columns, out, hold=0, back=0, again=0):
 STANDS = "The train stands once, at 1,300.0 m and 5.998 s; the record is cut there."
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("hold", "samples", "notes"),
     [

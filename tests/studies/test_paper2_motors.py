@@ -93,6 +93,7 @@ def test_power_is_what_the_record_tells_the_mechanical_a_fraction_of_the_electri
     assert both.mechanical_power(motors.SPANS) == pytest.approx(mean)
 
 
+@pytest.mark.longer
 def test_heat_is_that_of_the_current_over_the_nominal_one(by_place):
     """Of two motors at 6 A: 21.5 W."""
     head = by_place["head"]
@@ -126,6 +127,7 @@ def test_the_bench_moves_as_the_line_does(passive, bench_runs):
     assert (amplitude[near] ** 2).sum() > 0.97 * (amplitude**2).sum()
 
 
+@pytest.mark.longer
 def test_without_control_the_bench_is_linear(passive, bench_runs):
     """Mass, suspension and pad: each harmonic of the force follows from that of the motion."""
     run, waves = bench_runs[None], motors.motion_of_line(passive.record)
