@@ -68,6 +68,8 @@ def test_a_value_that_is_known_is_taken_out_of_the_equations():
     """The others are then as if its column had been subtracted."""
     known = KNOWN | {"m3": TRUTH["m3"], "c2": 120.0}
     fit = fit_equation_error(RECORD, known)
+    assert fit.method == "equation error"
+    assert fit_equation_error(RECORD, known, band=5.0).method == "equation error, low-passed"
     a, y = equations(RECORD, KNOWN)
     y = (y - a[:, :, 1] * 120.0 - a[:, :, 2] * TRUTH["m3"]).ravel()
     values = np.linalg.lstsq(a.reshape(-1, 5)[:, [0, 3, 4]], y)[0]
