@@ -16,7 +16,11 @@ from panto_env.diagnosis import diagnose
 from panto_env.diagnosis.diagnosis import judge
 from panto_env.diagnosis.features import (
     KINDS,
+    LONG,
     OFFSETS,
+    RAISED,
+    SHORT,
+    SUNK,
     TRAINED,
     Classifier,
     Evidence,
@@ -241,8 +245,12 @@ def test_there_is_one_of_each_severity_and_as_many_broken_droppers_as_wanted(giv
     ]
     assert FIRST < BEYOND < SPANS
     begin, end = (UNEVEN.data.alignment().support(each) for each in (FIRST - 1, BEYOND))
+    signs = {LONG: 1, SHORT: -1, RAISED: 1, SUNK: -1}
     for defect in defects:
         LineCondition(**defect.condition)  # can be simulated
+        if defect.kind in signs:
+            ((*_, amount),) = next(iter(defect.condition.values()))
+            assert amount == signs[defect.kind] * defect.severity
         assert np.isnan(defect.position) if defect.kind == TENSION else begin <= defect.position <= end + 10
 
 
