@@ -38,8 +38,9 @@ USUAL = (
     "make('Pantograph-v0', **two)",
     "make('PantographStiffness-v0')",
     "make('PantographThreeSpan-v0')",
-    "simulate(precision='double')",
 )
+"""Statements whose kernels quick tests need."""
+FIRST = (*USUAL, "simulate(precision='double')")
 """Statements whose kernels users need first."""
 
 
@@ -57,7 +58,7 @@ BUILDING = FileLock(Path(tempfile.gettempdir()) / "panto-env-build.lock")
 """Held while sources are packed, which writes into the checkout: two at once are in each other's way."""
 
 
-def build_wheel(folder: Path, statements: tuple[str, ...] = USUAL) -> None:
+def build_wheel(folder: Path, statements: tuple[str, ...] = FIRST) -> None:
     """Build a wheel of the packed sources with the kernels of these statements."""
     own = [sys.executable, "-m", "build", "--no-isolation"]
     with tempfile.TemporaryDirectory() as made:

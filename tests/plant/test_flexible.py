@@ -204,6 +204,7 @@ def test_agrees_with_finite_elements(line, pantograph, speed):
         assert uplift == pytest.approx(other.uplift[:, 3:6].max(), abs=5e-4)
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     ("speed", "accuracy", "error"),
     [(250.0, "full", 0.01), (300.0, "full", 0.01), (350.0, "full", 0.005), (350.0, "fast", 0.03)],

@@ -142,6 +142,7 @@ def test_what_hangs_in_the_same_rows_goes_abreast():
     np.testing.assert_array_equal(table[2, 1], [7, -1, 9, -1, -1, -1, -1, -1])
 
 
+@pytest.mark.longer
 @pytest.mark.skipif(not JIT, reason="slow in plain Python")
 def test_any_window_that_has_not_travelled_gives_the_same_run():
     """However its segments lie to spans and droppers."""
