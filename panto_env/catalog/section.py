@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from ..base.arrays import Array
 from ..base.settings import Between, Settings
 from ..plant.catenary.flexible.parts import CLOSEST
-from ..plant.catenary.flexible.plan import with_stiff_arms
+from ..plant.catenary.flexible.plan import without_plan
 from ..plant.catenary.flexible.schema import FlexibleCatenaryData
 from ..plant.catenary.schema import FEWEST_SPANS, LONGEST_SPAN, MOST_SPANS, SHORTEST_SPAN, SpanLength
 from .drawn_lines import Bands, DrawnLines, Length, PlanRanges, Range, Share, Speeds, in_words
@@ -384,8 +384,8 @@ class LineSection(DrawnLines):
             encumbrances[under] = np.minimum(encumbrances[under], bridge.encumbrance)
         error = self.masts.height_error
         encumbrances += random.uniform(-error, error, count + 1)
-        base = with_stiff_arms(base) if self.plan is None else base
-        table = base.model_dump(exclude={"sources", "spans", "plan"}, exclude_none=True)
+        base = without_plan(base) if self.plan is None else base
+        table = base.model_dump(exclude={"sources", "spans"}, exclude_none=True)
         rounded = zip(encumbrances.round(HEIGHTS).tolist(), heights.round(HEIGHTS).tolist(), strict=True)
         at = [{"encumbrance": own, "contact_height": height + 0.0} for own, height in rounded]
         droppers = [self._droppers(random, base) for _ in range(int(kind[-1]) + 1)]

@@ -85,6 +85,7 @@ class Still(gymnasium.Env):
     observation_space, action_space = Box(-1, 1, (3,)), Box(-1, 1, (2,))
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("target_kl", [None, 0.05, 0.01])
 def test_an_update_is_that_of_stable_baselines_3(target_kl):
     """From the same steps, whose policy was so different that many ratios are clipped."""

@@ -265,6 +265,8 @@ def test_without_a_plan_arms_are_as_stiff_as_on_the_base_line(tmp_path):
     assert line.steady_arm.mass == expected.mass[0]
     assert line.plan is None
     assert not line.arms_by_plan
+    with_plan = load_section("curved-line").model_copy(update={"base": there})
+    assert with_plan.draw(np.random.default_rng(3))[0].plan == there.plan
 
 
 # --- sections of the catalogue ---------------------------------------------------------------------

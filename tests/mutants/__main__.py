@@ -35,7 +35,7 @@ class Workbench:
 
     def __init__(self, folder: Path, python: str, room: dict[str, Any]) -> None:
         self.root, self.python = folder / "checkout", python
-        self.room = room | {"tests": [*room["tests"], OF_EVERY_ROOM]}
+        self.room = {"translated": ()} | room | {"tests": [*room["tests"], OF_EVERY_ROOM]}
         shutil.copytree(ROOT, self.root, ignore=LEFT_OUT)
         (folder / "names").mkdir()
         for name, source in PACKAGES.items():
@@ -94,15 +94,12 @@ class Workbench:
         return self._python("-c", name).stdout.split("\n")[0]
 
     def tests_of(self, mutant: Mutant) -> list[str]:
-        """The tests that reach a mutant, and all of the room where a fixture does."""
+        """The tests that reach a mutant; all of the room where a fixture does, or where it becomes C."""
         by_line = self.data.contexts_by_lineno(str(mutant.path))
         found = {context for line in mutant.lines for context in by_line.get(line, ())}
         tests = [_node(context) for context in sorted(found - {""})]
-        if not found and any(
-            mutant.path.is_relative_to(self.root / each) for each in self.room.get("translated", ())
-        ):
-            return list(self.room["tests"])
-        return tests + self.room["tests"] * ("" in found)
+        translated = any(mutant.path.is_relative_to(self.root / each) for each in self.room["translated"])
+        return tests + self.room["tests"] * ("" in found or (translated and not found))
 
     def kills(self, mutant: Mutant) -> bool:
         """Whether one of the tests that reach a mutant fails, or hangs."""

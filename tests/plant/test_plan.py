@@ -230,6 +230,9 @@ def test_in_unlike_winds_arms_are_as_in_still_air():
     conditions = [LineCondition(), LineCondition(side_wind=28.0)]
     with pytest.warns(AccuracyWarning, match="pulled as in still air.*make a run for each"):
         assert in_wind(line, 14, conditions) is line
+    blown = line_with(ZIGZAG | {"wind": (4.0, 4.0)}, steady_arm=ARM)
+    with pytest.warns(AccuracyWarning, match="pulled as in still air"):
+        assert in_wind(blown, 14, conditions) == line
     with pytest.warns(AccuracyWarning, match="pulled as in still air"):
         found = {
             simulate(line, "dsa380", 200, line_condition=conditions, seed=k).summary().std for k in (0, 1, 2)

@@ -57,10 +57,7 @@ RULES = (
         "panto design",
         f"a search {MINUTES}, of a file that the page shows; tests/studies/test_design.py has short ones",
     ),
-    Rule(
-        "panto line runs/droppers",
-        "of that search; tests/studies/test_design.py has short ones",
-    ),
+    Rule("panto line runs/droppers", "of that search; tests/studies/test_design.py has short ones"),
     Rule("panto permissible-speed runs/droppers", "of that search"),
     Rule("panto permissible-speed", "hundreds of passes", "--speeds 200:220:20 --seeds 1 --workers 1"),
     Rule("panto oracle", f"a search {MINUTES}; tests/baselines/test_oracle.py has short ones"),

@@ -279,17 +279,17 @@ def _arms_of(line: FlexibleCatenaryData, spans: int) -> PulledArm:
     return PulledArm(*np.array(found).T.copy())
 
 
-def with_stiff_arms(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
-    """A line of equal spans without its plan, whose steady arms are as stiff as on it in still air.
+def without_plan(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
+    """A line of equal spans without its plan; steady arms by their length are as stiff as on it in still air.
 
-    The same object where they have no length. Raises InputError as ``steady_arms``.
+    Raises InputError as ``steady_arms``.
     """
-    if not line.arms_by_plan:
-        return line
-    arms = steady_arms(in_still_air(line).layout())
-    kept = {"mass": float(arms.mass[0]), "stiffness": float(arms.stiffness[0])}
-    arm = line.steady_arm.model_copy(update=kept | {"length": None, "clamp_mass": 0.0})
-    return line.model_copy(update={"steady_arm": arm, "plan": None})
+    changes: dict[str, Any] = {"plan": None}
+    if line.arms_by_plan:
+        arms = steady_arms(in_still_air(line).layout())
+        as_spring = {"mass": float(arms.mass[0]), "stiffness": float(arms.stiffness[0]), "clamp_mass": 0.0}
+        changes["steady_arm"] = line.steady_arm.model_copy(update=as_spring | {"length": None})
+    return line.model_copy(update=changes)
 
 
 def in_still_air(line: FlexibleCatenaryData) -> FlexibleCatenaryData:
@@ -311,13 +311,13 @@ def in_wind(
         return line
     if len({each.side_wind for each in conditions}) > 1:
         warnings.warn(
-            f"The conditions that are drawn from have unlike side_winds, so the steady arms of line "
+            "The conditions that are drawn from have unlike side_winds, so the steady arms of line "
             f"'{line.name}' are pulled as in still air, and no support rises or sinks: in 30 m/s, where arms "
             "slope by 10°, the standard deviation is too small by up to about 12 %; make a run for each.",
             AccuracyWarning,
             stacklevel=2,
         )
-        return line
+        return in_still_air(line)
     blown = loads_in(line, conditions[0])
     if not any(blown):
         return line
