@@ -160,6 +160,16 @@ def test_ice_weighs_on_both_pairs_and_not_on_stitch_wires(new):
             run(line, line_condition={"temperature": 10.0})
 
 
+def test_a_picture_shows_the_wires_in_use():
+    """The others rise by 0.1 m and more at the overlap's ends."""
+    plant = Plant(line_of(), Train.of(load_pantograph("dsa380")), runs=Runs((300 / 3.6,) * 2))
+    plant.start(0, 300 / 3.6)
+    shown = plant.model.view(0, (FIRST - 2) * LENGTH, (FIRST + 4) * LENGTH)
+    assert shown.x[-1] - shown.x[0] > 5 * LENGTH
+    assert np.abs(shown.contact).max() < 0.02
+    assert max(np.abs(height).max() for _, height in shown.further) > 0.3
+
+
 @pytest.mark.parametrize("stitched", [False, True])
 def test_the_force_passes_from_one_wire_to_the_other(stitched):
     line = line_of(stitched=stitched)

@@ -8,6 +8,8 @@ import pytest
 from panto_env import InputError, simulate
 from panto_env.base.errors import AccuracyWarning
 from panto_env.catalog import load_catenary
+from panto_env.control import Task
+from panto_env.control.settings import run_settings
 from panto_env.plant.catenary.flexible.arrays import CONTACT
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import stable
@@ -56,6 +58,33 @@ def test_the_grid_is_the_finest_on_which_a_slightly_longer_step_is_stable():
         found = chosen(runs(speed))
         assert stable(LINE, found.spacing, 1.06 * found.time_step)
         assert not stable(LINE, 0.9 * found.spacing, 1.06 * found.time_step)
+
+
+def test_a_worn_wire_allows_the_steps_of_a_lighter_one():
+    lighter = LINE.contact_wire.model_copy(update={"mass": 0.6 * LINE.contact_wire.mass})
+    light = LINE.model_copy(update={"contact_wire": lighter})
+    steps = np.linspace(0.2e-3, 2e-3, 91)
+    new, worn, thin = (
+        sum(stable(line, 0.25, step, share) for step in steps)
+        for line, share in ((LINE, 1.0), (LINE, 0.6), (light, 1.0))
+    )
+    assert 0.8 * thin < worn <= thin < 0.9 * new
+
+
+def test_runs_are_controlled_as_often_as_settings_say():
+    assert Runs().control_interval == run_settings({}).control_interval
+
+
+def test_a_run_says_how_many_spans_its_window_has_about_each_pantograph():
+    def window(given, **train):
+        settings = run_settings({"window": given, "speed_kmh": 300, "distance": 300.0} | train)
+        return Task(settings).plant.model.grid["window"]
+
+    twins = {"pantographs": ["dsa380"] * 2, "distances": [200.0]}  # four spans
+    assert [window(given) for given in (None, 8, 0)] == [8, 8, 10]
+    assert [window(given, **twins) for given in (None, 3, 0)] == [6, 3, 6]
+    short = {"like": "en50318-2002", "sequence": [{}] * 5 + [{"encumbrance": 1.3}]}
+    assert window(None, **twins | {"catenary": short, "distance": 60.0}) == 0  # the whole line
 
 
 def test_a_shorter_step_has_a_finer_grid():
