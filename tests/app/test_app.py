@@ -66,7 +66,7 @@ def test_bad_choices_are_errors_of_one_sentence():
     alone = look(QUICK._replace(policy="front-preview"))
     assert "no controlled one has any in front of it" in alone.error
     assert (alone.found, alone.requirements) == (None, [])
-    early = look(Choice(speed_kmh=420))
+    early = look(Choice(speed_kmh=400))
     assert re.fullmatch(r"The run ended early at .* It has no figures\.", early.error)
     assert early.found.run.terminated
 
@@ -159,6 +159,26 @@ def test_a_choice_changes_the_figures_and_an_error_ends_nothing():
     opened.choose(catenary=QUICK.catenary, speed_kmh=200)
     assert "200 km/h, passive: " in opened.see()
     assert shown(opened, "std") == [pytest.approx(figures.std, abs=0.005)]
+
+
+@pytest.mark.longer
+def test_a_part_that_is_zoomed_into_stays_in_view_until_another_line_is_chosen():
+    opened = Opened()
+    opened.see()
+    view = opened.document.get_model_by_name("force").x_range
+    whole = view.start, view.end
+    view.update(start=300.0, end=400.0)
+    opened.choose(speed_kmh=210)
+    opened.see()
+    assert (view.start, view.end) == (300.0, 400.0)
+    opened.choose(catenary="re250")
+    opened.see()
+    longer = view.start, view.end
+    assert longer != whole
+    assert longer[1] - longer[0] > 500
+    opened.choose(catenary=QUICK.catenary)
+    opened.see()
+    assert (view.start, view.end) == whole
 
 
 def test_only_the_last_of_several_choices_is_run(monkeypatch):

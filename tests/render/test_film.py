@@ -97,6 +97,15 @@ def test_a_pass_of_a_policy_has_the_run_that_simulate_makes_and_no_file():
     made.check()  # nothing to repeat
 
 
+@pytest.mark.longer
+def test_a_pass_says_what_it_shows():
+    alone = film._Pass(policy_pass("pd", SHORT, 0), {}, SIZE, 100.0)
+    assert alone._title.startswith("pd: pantograph ")
+    train = {"pantographs": ["dsa380"] * 2, "distances": [50.0], "speed_kmh": 200.0, "distance": 200.0}
+    behind = film._Pass(policy_pass("passive", train, 0), {}, SIZE, 100.0)
+    assert behind._title.startswith("passive: pantographs ")
+
+
 def test_the_frames_of_a_film_and_the_share_that_is_drawn():
     """A fifth of the way is the run up to where it begins, the rest its frames: every second step."""
     filmed, shares = policy_pass("p", STIFFNESS | {"distance": 510.0}, 0), []
@@ -255,3 +264,18 @@ def test_an_error_between_frames_leaves_neither_film_nor_encoder(suffix, tmp_pat
     assert not os.listdir(tmp_path)
     assert len(started) == (suffix == ".mp4")
     assert all(each.returncode for each in started)
+
+
+@unix
+def test_an_interrupt_from_the_keyboard_does_not_reach_the_encoder(tmp_path, monkeypatch):
+    sessions = []
+
+    def start(*arguments, **options):
+        process = Popen(*arguments, **options)
+        sessions.append(os.getsid(process.pid))
+        return process
+
+    monkeypatch.setattr(video, "Popen", start)
+    write_film(noise(3), tmp_path / "film.mp4", 25, SIZE)
+    assert len(sessions) == 1
+    assert sessions[0] != os.getsid(0)
