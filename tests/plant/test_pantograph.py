@@ -84,9 +84,10 @@ def swing(pantographs, run, heights):
         heights[k] = own[ROW.STATE]
 
 
-def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
+@pytest.mark.parametrize("friction", [6.0, 0.6])
+def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds(friction):
     """A frame alone on its spring: the closed form of Coulomb friction."""
-    spring, friction = 4000.0, 6.0
+    spring = 4000.0
     changed = {"masses": (10.0,), "stiffnesses": (spring,), "dampings": (0.0,), "frame_friction": friction}
     data = load_pantograph("own-two-mass").model_copy(update=changed | {"static_force": 0.0})
     plant = Plant(load_catenary("en50318-2002"), Train.of(data), numerics=Numerics(time_step=2e-4, window=3))
@@ -99,7 +100,7 @@ def test_dry_friction_takes_2_f_over_k_from_each_swing_and_then_holds():
     turns = np.abs([0.02, *height[1:-1][up[1:] != up[:-1]]])
     assert -np.diff(turns[:3]) == pytest.approx(2 * friction / spring, rel=0.02)
     assert len(turns) < 0.02 / (2 * friction / spring) + 2
-    if JIT:
+    if JIT and friction > 1:
         assert np.ptp(height[-500:]) == 0  # where the spring is weaker than the friction it stays
         assert abs(height[-1]) < friction / spring
 
