@@ -82,6 +82,13 @@ def test_contact_lost_where_the_passive_pantograph_keeps_it_takes_the_rank():
         assert cells[1].harm.lost == (not ranked)
 
 
+def test_passes_with_more_loss_are_counted():
+    passive = [row(seed=seed, contact_loss=0.2) for seed in range(4)]
+    own = [row("a", seed, contact_loss=loss) for seed, loss in enumerate((0.2, 0.9, 0.0, 0.5))]
+    harm = harm_of(own, passive)
+    assert (harm.loss, harm.lost) == (2, 0)
+
+
 def test_minimum_and_uplift_are_counted_with_the_worst():
     passive = [row(seed=seed, min=50.0, max_uplift=0.05) for seed in range(3)]
     own = [
