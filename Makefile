@@ -98,7 +98,7 @@ urls:
 
 # Slow proofs: more lines against finite elements, longer trainings, random environments, and, from the command line only,
 # COMMANDS=, NONSENSE= and FILES= of command lines, lines and damaged files. They take the best part of an hour on two
-# cores; PART=0/16 runs a sixteenth of them.
+# cores; PART=0/20 runs a twentieth of them.
 CASES := 2000
 PART := 0/1
 proofs: $(READY)
