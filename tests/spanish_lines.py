@@ -109,7 +109,8 @@ def made(name: str, arm: bool, both: bool = False) -> FlexibleCatenaryData:
         table["plan"] = {"stagger": (own.stagger, -own.stagger)}
     if own.stitch is not None:
         table["stitch_wire"] = {"length": own.stitch[0], "tension": own.stitch[1], "mass": 0.31}
-    found = line_of(table, like="re250-stitched" if own.stitch else "re250", name=name)
+    like = "ca-160" if both else "re250-stitched" if own.stitch else "re250"
+    found = line_of(table, like=like, name=name)
     assert isinstance(found, FlexibleCatenaryData)
     return found
 

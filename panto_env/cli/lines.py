@@ -153,6 +153,12 @@ def line(
                 console.print("This condition changes no tension along the line: it is run as designed.")
             if above is None and any(mast.stagger is not None for mast in chosen.masts):
                 console.print("The line is not seen from above: not every mast has a stagger.")
+            supports, surveyed = len(alignment.supports), [each.stagger is not None for each in chosen.masts]
+            if above and (masts is not None or surveyed) and sum(surveyed) < supports:
+                console.print(
+                    f"{supports - sum(surveyed)} of {supports} masts have no stagger, and theirs is assumed: "
+                    "that of the line's plan, in turn."
+                )
             for limit in broken:
                 alert(f"{limit.name} is not kept.")
     if broken:

@@ -141,13 +141,14 @@ SURVEYS = {
 
 
 @pytest.mark.longer
-@pytest.mark.parametrize("base", ["re250", "arms"])
+@pytest.mark.parametrize("base", ["re250", "arms", "plan"])
 @pytest.mark.parametrize("name", SURVEYS)
 def test_a_survey_of_equal_spans_is_seen_from_above_where_it_has_all_staggers(base, name, tmp_path):
     masts = tmp_path / "masts.csv"
     rows = [f"M{k},{60 * k},{stagger}" for k, stagger in enumerate(SURVEYS[name])]
     masts.write_text("\n".join(["mast,position (m),stagger (m)", *rows]) + "\n")
-    line = base if base == "re250" else written(tmp_path, "contact_height = 5.5")
+    plan = "stagger = [0.3, -0.3]" if base == "plan" else "contact_height = 5.5"
+    line = base if base == "re250" else written(tmp_path, plan)
     result = panto("line", line, "--masts", masts, "--plot", tmp_path / "line.png", cwd=tmp_path)
     if name == "all":
         assert result.returncode == 0, result.stderr
@@ -156,5 +157,9 @@ def test_a_survey_of_equal_spans_is_seen_from_above_where_it_has_all_staggers(ba
     elif base == "re250":  # nothing depends on it
         assert result.returncode == 0, result.stderr
         assert "not seen from above: not every mast has a stagger" in result.stdout
+    elif base == "plan":
+        assert result.returncode == 0, result.stderr
+        told = " ".join(result.stdout.split())
+        assert "1 of 13 masts have no stagger, and theirs is assumed" in told
     else:
         assert "Support 7 (M6) of line 'masts' has no stagger" in result.stderr.replace("\n", " ")

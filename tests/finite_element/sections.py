@@ -8,6 +8,7 @@ from typing import Any
 
 from panto_env import Trajectory, simulate
 from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.plant.catenary.flexible.plan import without_plan
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.pantograph.schema import PantographData
 
@@ -111,9 +112,14 @@ class Section:
         )
 
 
+def of_catalogue(name: str) -> FlexibleCatenaryData:
+    """A line of the catalogue without its plan: the judge takes steady arms as springs."""
+    return without_plan(load_catenary(name))
+
+
 def line_of(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
     """A line of the catalogue with values of its own."""
-    values = load_catenary(name).model_dump(exclude_none=True)
+    values = of_catalogue(name).model_dump(exclude_none=True)
     values["droppers"] |= changes.get("droppers", {})
     if "spacing" in values["droppers"]:
         del values["droppers"]["positions"], values["droppers"]["sag"]
@@ -128,7 +134,7 @@ def stitched(name: str, changes: Mapping[str, Any]) -> FlexibleCatenaryData:
 
     Droppers beside supports stand where they hang from it; the others are the line's own from 11 m on.
     """
-    usual = load_catenary(name)
+    usual = of_catalogue(name)
     table = zip(usual.droppers.positions, usual.droppers.sag, strict=True)
     middle = [(x, sag) for x, sag in table if 11.0 < x < usual.span_length - 11.0]
     begin = [(x, 0.0) for x in BESIDE_SUPPORTS]

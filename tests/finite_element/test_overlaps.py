@@ -7,13 +7,13 @@ import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import splu
 
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_pantograph
 
 from .contacts import Collector
 from .energy import balance
 from .newmark import chain_matrices
 from .rest import at_rest, pair_at_rest, pairs_of
-from .sections import STITCHED_330, line_of, sections, stitched
+from .sections import STITCHED_330, line_of, of_catalogue, sections, stitched
 from .simulation import ride, simulate
 from .system import build, joined, of_pair
 from .whole_line import ClosedLine, designed
@@ -131,7 +131,7 @@ def test_two_coincident_half_lines_are_one_line():
 
 @pytest.mark.slow
 def test_a_wire_high_above_is_none_and_the_second_is_none_until_it_is_touched():
-    line = load_catenary("re330")
+    line = of_catalogue("re330")
     (rest,) = at_rest(line, 4, 1.0)
     pair = of_pair(rest, line.wires, line.damping)
     high = replace(pair, static=pair.static + np.array([0.6, 0.0]))

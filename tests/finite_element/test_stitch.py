@@ -10,7 +10,7 @@ from panto_env.plant.catenary.flexible.schema import StitchWire
 from .contacts import Collector
 from .energy import balance
 from .rest import at_rest, pairs_of
-from .sections import BARE, STITCHED_330, sections, stitched
+from .sections import BARE, STITCHED_330, of_catalogue, sections, stitched
 from .simulation import simulate
 from .static import GRAVITY, static_shape
 from .stitch import Stitch, Upper
@@ -131,7 +131,7 @@ def test_a_stitch_wire_alone_has_a_string_s_frequency_and_mass():
 @pytest.mark.slow
 def test_a_stitch_wire_of_no_tension_without_droppers_is_none():
     """At rest and in motion. Its clamps are at droppers, which then hang from the messenger."""
-    usual = load_catenary("re330")
+    usual = of_catalogue("re330")
     ghost = StitchWire.model_construct(length=10.0, tension=1e-3, mass=1e-7, clamp_mass=0.0)
     line = usual.model_copy(update={"stitch_wire": ghost})
     one, other = static_shape(line, 0.5), static_shape(usual, 0.5)

@@ -9,7 +9,7 @@ from ..marks import some_at_once
 from .contacts import Collector
 from .energy import balance
 from .rest import at_rest
-from .sections import STITCHED_330, line_of, sections, stitched
+from .sections import STITCHED_330, line_of, of_catalogue, sections, stitched
 from .simulation import figures, simulate, stretch
 from .system import build
 
@@ -83,7 +83,7 @@ def test_a_line_on_a_gradient_is_the_level_one_tilted():
         "re250",
         {"sequence": [{"contact_height": h} for h in heights[:-1]], "end_support": {"contact_height": 0.3}},
     )
-    level = load_catenary("re250").model_copy(update={"spans": 6})
+    level = of_catalogue("re250").model_copy(update={"spans": 6})
     (one,), (other,) = at_rest(tilted, 6, 0.5), at_rest(level, 6, 0.5)
     np.testing.assert_allclose(one.contact[:, 0] - 0.05 / 65 * one.nodes, other.contact[:, 0], atol=1e-9)
     np.testing.assert_allclose(one.contact[:, 1] - 0.05 / 65, other.contact[:, 1], atol=1e-9)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from panto_env.catalog import load_catenary, load_pantograph
+from panto_env.catalog import load_pantograph
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.numerics import Numerics, Runs
 from panto_env.plant.plant import Plant
@@ -16,7 +16,7 @@ from panto_env.plant.train import Train
 
 from .contacts import Collector
 from .hermite import Array
-from .sections import behind_last, sections
+from .sections import behind_last, of_catalogue, sections
 from .simulation import Result, ride_together
 from .system import build
 
@@ -89,7 +89,7 @@ def cases() -> dict[str, Case]:
     """Trains by name. The lines are longer than the catalogue's; the first collector never nears the end."""
 
     def line(name: str, spans: int) -> FlexibleCatenaryData:
-        return load_catenary(name).model_copy(update={"spans": spans})
+        return of_catalogue(name).model_copy(update={"spans": spans})
 
     def train(*names: str, behind: tuple[float, ...]) -> tuple[Collector, ...]:
         return tuple(

@@ -70,6 +70,7 @@ class ClosedLine:
         self.heights = np.interp(x, supports, self.low) + above - below
         self.support = np.array([each.support.stiffness for each in stands])
         self.support[[0, -1]] /= 2
+        self.arm = np.array([each.steady_arm.stiffness for each in stands])
         self.holding = np.flatnonzero([each.steady_arm.holds_wire for each in stands])
 
         def each(key: str) -> Array:
@@ -141,12 +142,17 @@ def designed(line: ClosedLine) -> LineShape:
 
 
 def built(
-    line: ClosedLine, unloaded: Array, stiffness: Array, pushed: tuple[int, float] = (0, 0.0)
+    line: ClosedLine,
+    unloaded: Array,
+    stiffness: Array,
+    pushed: tuple[int, float] = (0, 0.0),
+    at_arms: Array | None = None,
 ) -> LineShape:
     """The shape that droppers of these lengths (m) and stiffnesses (N/m), (n_droppers,), hold the wires in.
 
     Arms that hold the wire keep it at the support's height. pushed: number of a node of the contact wire, and
-    an upward force there (N).
+    an upward force there (N); at_arms: heights (m) of the contact wire at the supports, (supports,), at which
+    the springs of arms are unloaded, without which they are left out.
     """
     lower, weight = line.contact_wire()
     upper, above_weight = line.messenger()
@@ -163,6 +169,11 @@ def built(
     force[hung] -= GRAVITY * (half + line.upper_clamp)
     force += apart.T @ (stiffness * unloaded)
     force[2 * pushed[0]] += pushed[1]
+    if at_arms is not None:
+        springs = np.zeros(size)
+        springs[2 * line.masts] = line.arm
+        lower = lower + sparse.diags_array(springs)
+        force[2 * line.masts] += line.arm * at_arms
     both = sparse.block_diag([lower, upper]) + apart.T @ sparse.diags_array(stiffness) @ apart
     ends, lower_slopes, upper_slopes = line.ends
     held = np.concatenate([2 * line.masts[line.holding], ends, size + ends])

@@ -23,6 +23,7 @@ from panto_env.plant.state import Row
 from panto_env.plant.train import Train
 
 from ..finite_element.sections import line_of as line_with
+from ..finite_element.sections import of_catalogue
 from . import test_uneven as uneven
 from .test_flexible import PULSES, swing, undamped
 
@@ -37,7 +38,7 @@ STITCHED_DROPPERS = {
 
 
 def line_of(overlaps=({"first_span": FIRST, "rises": RISES},), spans=SPANS, stitched=False, **changes):
-    table = load_catenary("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table = of_catalogue("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
     if stitched:
         table |= {"stitch_wire": STITCH, "droppers": table["droppers"] | STITCHED_DROPPERS}
     # The last support is a hair higher, so that the line is no uniform one without overlaps.
@@ -217,7 +218,7 @@ def test_default_grid_is_fine_enough(line, pantograph, speed, distance, spans):
 def test_elasticity_of_an_overlap_is_that_of_the_wire_in_use():
     places, yields = elasticity(line_of([{"first_span": 5, "rises": RISES}], 13), 100.0)
     per_span = yields.reshape(11, -1)
-    outer = elasticity(load_catenary("re330"), 100.0)[1]
+    outer = elasticity(of_catalogue("re330"), 100.0)[1]
     np.testing.assert_allclose(per_span[0, 3:-3], outer[3:-3], rtol=0.02)
     assert places[0] == LENGTH
     assert 0.5 * outer.min() < per_span[4:6].min()
@@ -258,7 +259,7 @@ def test_what_knows_one_wire_refuses_overlaps():
     rig = load_catenary("rig-flexible")
     with pytest.raises(InputError, match="follows one contact wire, and its line has overlaps of two"):
         simulate(rig.model_copy(update={"line": line_of()}), "dsa380", 200.0, distance=100.0)
-    uniform = load_catenary("re330").model_dump(exclude={"sources"}, exclude_none=True)
+    uniform = of_catalogue("re330").model_dump(exclude={"sources"}, exclude_none=True)
     with pytest.raises(ValueError, match="needs a sequence of its spans"):
         FlexibleCatenaryData.model_validate(uniform | {"overlaps": [{"first_span": 4, "rises": RISES}]})
 

@@ -19,6 +19,7 @@ from panto_env.plant.line_condition import NEW, LineCondition
 
 from .. import line_energy
 from ..finite_element.sections import line_of as changed
+from ..finite_element.sections import of_catalogue
 from .test_flexible import PULSES, swing, undamped
 from .test_uneven import energy as energy_of_wires
 
@@ -29,7 +30,7 @@ SPANS = 20
 
 
 def line_of(spans=SPANS, droppers=DROPPERS, **changes):
-    table = load_catenary("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table = of_catalogue("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
     heavy = table["droppers"] | {"mass": 0.1, "contact_clamp_mass": 0.2, "messenger_clamp_mass": 0.3}
     table |= {"droppers": heavy | droppers, "stitch_wire": STITCH_WIRE}
     if "sequence" not in changes:
