@@ -133,6 +133,7 @@ def test_same_seed_same_weights(runs, tmp_path):
     assert not np.array_equal(one, other)
 
 
+@pytest.mark.longer
 def test_nothing_is_left_where_a_training_cannot_begin(tmp_path):
     bad = settings("ppo").model_copy(update={"environment": LINE | {"catenary": "nowhere"}})
     many = settings("ppo", evaluation={"interval_steps": 128, "seeds": 1001})
@@ -143,6 +144,7 @@ def test_nothing_is_left_where_a_training_cannot_begin(tmp_path):
 
 
 class TestResume:
+    @pytest.mark.longer
     def test_goes_on_from_the_newest_whole_checkpoint(self, copied):
         before, newest = weights(copied.model), copied.checkpoint(256)
         newest.write_bytes(newest.read_bytes()[:-100])
@@ -418,6 +420,7 @@ class TestStart:
         assert float(rows(folder)[0]["policy_std"]) == pytest.approx(taught.policy.std, rel=0.05)
 
 
+@pytest.mark.longer
 def test_a_residual_with_a_network_of_zeros_is_its_base_bit_for_bit(tmp_path):
     training = settings("ppo", total_steps=128, residual_of="fb+ff", environment=LINE | SEEING)
     added = train.train(training, tmp_path / "added", progress=False)
@@ -434,6 +437,7 @@ def test_a_residual_with_a_network_of_zeros_is_its_base_bit_for_bit(tmp_path):
     assert not np.array_equal(trained, theirs)
 
 
+@pytest.mark.longer
 def test_a_train_is_evaluated_by_the_controlled_pantograph_that_swings_most():
     train = {"pantographs": ["dsa380"] * 2, "distances": [80.0], "controlled": [1, 2], "accuracy": "fast"}
     (own,) = Comparison(train, (280.0,), (0,)).run("pd")

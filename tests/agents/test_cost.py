@@ -47,6 +47,7 @@ def nops(count):
     return f'__asm__ volatile (".rept {count}\\n nop\\n .endr"); force[0] = 0.0;'
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("processor", ["cortex-m4", "cortex-m7"])
 def test_instructions_are_counted_one_by_one(processor):
     few, many = (cost(model(nops(count)), processor, steps=3) for count in (10, 210))

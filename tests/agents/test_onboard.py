@@ -175,6 +175,7 @@ def test_plain_python_bears_the_same():
     assert np.abs(forces).max() <= 100.0
 
 
+@pytest.mark.longer
 @needs_gcc
 def test_begun_anew_it_does_the_same_again(tmp_path):
     controller = made("guarded:pd", HIGH_SPEED)

@@ -153,6 +153,7 @@ def base_of(env):
     return (env.envs[0] if "envs" in vars(env) else env.env).unwrapped
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(("kind", "chain"), [*((PPO, chain) for chain in CHAINS), (SAC, "vector")])
 def test_the_file_acts_as_the_model_does_through_its_wrappers(chain, kind, tmp_path):
     more = {"n_steps": 64, "batch_size": 64} if kind is PPO else {"learning_starts": 10, "batch_size": 8}

@@ -107,6 +107,7 @@ def test_lanes_do_as_the_policy_does(washed):
     assert ends == 1
 
 
+@pytest.mark.longer
 def test_an_exported_model_is_the_same_policy_and_holds_nothing_pickled(washed, tmp_path):
     def export(source, target):
         return CliRunner().invoke(make_app(), ["export", str(source), str(tmp_path / target)])

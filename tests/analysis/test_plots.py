@@ -89,6 +89,7 @@ def light():
     return simulate("shinkansen-simple", "identified-2dof", 320.0)
 
 
+@pytest.mark.longer
 def test_the_axis_of_a_light_force_fits_it_and_names_the_limit(light):
     """It had been two thirds empty, up to a limit of 350 N."""
     for axis in (plot_run(light).axes[0], *plot_forces([light], ["it"], (10, 12), "it").axes):

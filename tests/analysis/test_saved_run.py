@@ -34,6 +34,7 @@ def saved(path, **settings):
     return run
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in KINDS)) for name in CASES]
 )

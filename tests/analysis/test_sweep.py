@@ -77,6 +77,7 @@ def test_speed_actuator_and_policy_parameters_take_effect():
         assert row["spans"] == "all"
 
 
+@pytest.mark.longer
 def test_outcome_does_not_depend_on_threads_and_progress_counts_every_pass():
     told = []
     values = {"pantograph.masses.1": [5.0, 7.5, 10.0]}
@@ -205,6 +206,7 @@ def test_bad_command_is_one_line_and_writes_nothing(arguments, message, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.longer
 def test_plot_shows_what_varies():
     rows = sweep(
         {"catenary.mean_stiffness": [3e3, 4e3], "speed_kmh": [250.0, 300.0]}, **PAPER_3, policies=[None, "p"]

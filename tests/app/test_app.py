@@ -30,6 +30,7 @@ QUICK = Choice("periodic-stiffness", "three-mass", 200)
 TOO_FAST = Choice(speed_kmh=450)
 
 
+@pytest.mark.longer
 def test_the_code_and_the_command_are_the_run_that_is_shown():
     choice = QUICK._replace(policy="p", hardware="realistic", line_condition="fair", seed=3)
     seen = look(choice)
@@ -181,6 +182,7 @@ def test_a_part_that_is_zoomed_into_stays_in_view_until_another_line_is_chosen()
     assert (view.start, view.end) == whole
 
 
+@pytest.mark.longer
 def test_only_the_last_of_several_choices_is_run(monkeypatch):
     opened, run = Opened(), []
     opened.see()
@@ -191,6 +193,7 @@ def test_only_the_last_of_several_choices_is_run(monkeypatch):
     assert [each.speed_kmh for each in run] == [230]
 
 
+@pytest.mark.longer
 def test_a_run_under_a_policy_stops_when_something_else_is_chosen(monkeypatch):
     opened, shares = Opened(), []
 

@@ -51,6 +51,7 @@ def test_answers_of_the_closed_loop_are_those_of_a_simulation():
         assert abs(alone - answer) > 0.15 * abs(answer)
 
 
+@pytest.mark.longer
 def test_it_learns_beside_feedback_what_repeats_to_near_zero():
     controlled, passive = repeated(Adaptive(gains=[*FEEDBACK, 0.5, 0.0, 0.05]), 25)
     assert controlled[1] != pytest.approx(passive[1], rel=0.02)  # feedback acts from the start

@@ -184,6 +184,7 @@ def test_json_holds_everything_and_the_settings_that_make_it_again(outcome, tmp_
     assert [(each["policy"], each["seed"]) for each in table["traces"]] == [("passive", 0), (P, 0)]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_rows_can_be_written_as_tables(outcome, tmp_path, suffix):
     import pyarrow.csv

@@ -131,6 +131,7 @@ def test_the_interval_of_a_method_covers_the_truth():
     assert 93 <= coverage("mean of 5 trainings", "normal", 16, 5, repetitions=500) <= 97
 
 
+@pytest.mark.longer
 def test_a_bootstrap_of_each_cell_by_itself_covers_far_less():
     """So that the simulation has the power to show what is wrong."""
     assert coverage("mean, by cell", "normal", 8, 5, repetitions=200) < 85

@@ -110,6 +110,7 @@ def test_saturation_and_power_are_those_of_the_commands_and_the_forces():
     assert row.power == pytest.approx(np.abs(run.frame_force * run.frame_velocity)[inside].mean(), rel=0.01)
 
 
+@pytest.mark.longer
 def test_a_trace_is_the_force_along_two_spans_and_its_spectrum():
     given = settings(line_condition="new")
     row, _, trace = run_pass(given, LINE, Windows((1, 3)), "p:gain=0.5", SPEED_KMH, seed=3, traced=True)

@@ -54,6 +54,7 @@ def lines(settings):
     return [(each.catenary, each.pantograph, tuple(each.speeds_kmh)) for each in settings.lines]
 
 
+@pytest.mark.longer
 def test_without_options_the_benchmark_is_that_of_its_file_or_the_usual_one(handed, tmp_path):
     found = handed()
     assert found.settings == load_benchmark(tmp_path / "mine.toml")
@@ -62,6 +63,7 @@ def test_without_options_the_benchmark_is_that_of_its_file_or_the_usual_one(hand
     assert handed(config=False).settings == BenchmarkSettings()
 
 
+@pytest.mark.longer
 def test_policies_on_the_command_line_replace_the_file_s_and_its_trainings(handed):
     settings = handed("pd", "p:gain=0.5").settings
     assert (settings.policies, settings.trainings) == (("passive", "pd", "p:gain=0.5"), {})

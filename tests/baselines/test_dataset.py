@@ -107,6 +107,7 @@ def test_nonsense_is_refused(changes, message):
         settings(**changes)
 
 
+@pytest.mark.longer
 def test_what_cannot_be_run_is_refused_before_anything_is_made(tmp_path, minari):
     tuned = {"sets": [TABLE["sets"][0] | {"policies": ["tuned-pd"]}]}
     for changes, message in (
@@ -161,6 +162,7 @@ def test_seed_and_actions_give_an_episode_again(data):
         assert facts["return"] == pytest.approx(sum(rewards))
 
 
+@pytest.mark.longer
 def test_noise_is_as_strong_as_asked_for_and_the_policy_s_own_wish_is_kept(data):
     for episode, facts in zip(data, data.storage.get_episode_metadata(range(4)), strict=True):
         added = episode.actions - episode.infos["policy_action"][1:]

@@ -163,6 +163,7 @@ def test_a_changing_speed_is_no_harm():
     assert alone < guarded_too < passive - 0.7 * (passive - alone)
 
 
+@pytest.mark.longer
 def test_an_environment_behind_the_guard_does_what_the_guarded_policy_does():
     """Readings of a second in four are silent, and `pd` is driven at a gain at which the guard fades it."""
     given = {name: value for name, value in BUILT.items() if name != "record_droppers"}

@@ -126,6 +126,7 @@ def test_repetitive_control_learns_a_force_that_repeats_to_near_zero():
     assert controlled[-1] < 0.05 * passive[-1]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize(("speed_error", "left"), [(0.0, 0.05), (0.005, 0.2)])
 def test_it_learns_without_the_place_counting_its_way_from_a_speed_that_is_a_little_wrong(speed_error, left):
     policy = Repetitive(gains=(0.5, 0.0, 0.05), place="counted")
@@ -142,6 +143,7 @@ def test_repetitive_control_backs_off_where_its_model_is_wrong():
     assert np.mean(controlled[-10:]) < 1.08 * passive[-1]
 
 
+@pytest.mark.longer
 def test_lqgs_gains_are_what_the_riccati_recursions_converge_to():
     model = Disturbed(Sampled(MODEL, 0.01), CONTEXT, harmonics=1.0, wandering=3.0)
     effort, held = 0.4, 0.7
@@ -214,6 +216,7 @@ def test_mpcs_first_command_is_that_of_the_best_ones_within_limits(limit, rate):
     assert programs.first(7, free, last, total) == pytest.approx(best.x[0], abs=0.1)
 
 
+@pytest.mark.longer
 def test_preview_predicts_what_the_line_as_designed_does_under_other_commands():
     context = a_context(actuator="realistic")
     length, first = 100, 780

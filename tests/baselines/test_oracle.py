@@ -104,6 +104,7 @@ RESPONSES = {"flexible": SHORT | {"actuator": "ideal"}, "overlap": OVERLAP}
 RESPONSES["trailing"] = TRAILING | {"actuator": "ideal"}
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", some_at_once(RESPONSES, ["flexible"]))
 def test_response_is_the_difference_of_whole_runs(name, monkeypatch):
     monkeypatch.setattr(problem, "MEMORY", 100.0)

@@ -246,6 +246,7 @@ def test_tuning_finds_gains_that_help_on_lines_it_has_not_seen():
     assert tuned.passes <= 60 + 11
 
 
+@pytest.mark.longer
 def test_gains_tuned_with_a_washout_are_for_policies_that_have_it(tmp_path):
     path, without = tmp_path / "own.toml", run_settings({"accuracy": "fast"} | REAL)
     made = Tuned(250.0, (0.1, 0.2, 0.3, 0.4), (1.0, 0.9), 10, -0.1, 0.0)

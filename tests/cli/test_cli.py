@@ -187,6 +187,7 @@ def test_simulate_writes_and_prints_what_identifies_the_run(tmp_path):
     assert "standard deviation" in text
 
 
+@pytest.mark.longer
 def test_the_same_settings_give_the_same_run_again():
     run = simulate(line_condition="worn", actuator="realistic", speed_kmh=280.0, seed=1, **SHORT)
     settings = {name: value for name, value in run.settings.items() if name != "version"}
@@ -197,6 +198,7 @@ def test_the_same_settings_give_the_same_run_again():
     assert settings["time_step"] == 5e-3
 
 
+@pytest.mark.longer
 def test_defects_from_the_command_line_take_effect_and_a_sweep_carries_them_too():
     condition = "new:broken_droppers=[(2, 4)],raised_supports=[(1, 0.02)]"
     rest = ("--distance", 120, "--spans", "all", "--line-condition", condition)

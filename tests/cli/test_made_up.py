@@ -76,6 +76,7 @@ def test_a_family_of_plausible_lines(made):
     assert len(asked) == 3
 
 
+@pytest.mark.longer
 def test_a_family_with_lines_that_are_not_plausible(made):
     name, (_, high) = next(iter(FAMILY.plausible.model_dump(exclude={"pantograph"}).items()))
     made(lambda seed: {name: 2 * high + 1} if seed % 10 in (3, 5) else {})
@@ -147,6 +148,7 @@ def masts(heights):
     return "\n".join(["position (m),contact_height (m)", *rows, ""])
 
 
+@pytest.mark.longer
 def test_a_line_from_masts_is_shown_and_written_where_a_file_is_named(tmp_path):
     (tmp_path / "masts.csv").write_text(masts([5.3] * 8))
     given = ("line", "en50318-2002", "--masts", "masts.csv")
@@ -192,6 +194,7 @@ def test_trainings_have_a_row_each(monkeypatch, tmp_path):
     ]
 
 
+@pytest.mark.longer
 def test_a_healthy_and_an_unhealthy_line(monkeypatch, tmp_path):
     load = lambda path: SimpleNamespace(catenary="a", speed_kmh=250.0, path=path)  # noqa: E731
     monkeypatch.setattr(diagnose, "Trajectory", SimpleNamespace(load=load))

@@ -151,6 +151,7 @@ def test_the_whole_line_has_changed_where_a_further_pass_would_hardly_be_so_loud
         assert found.level == pytest.approx(np.exp(above))
 
 
+@pytest.mark.longer
 def test_healthy_passes_held_against_each_other_are_as_loud_as_further_ones():
     """Of noise alone. The mean of three others is off by more than that of all four: by 3 % of the level."""
     random, healthy, later = np.random.default_rng(7), [], []

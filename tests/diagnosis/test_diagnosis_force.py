@@ -46,6 +46,7 @@ def test_the_estimator_knows_the_pantograph_as_designed(runs):
     assert error_of(runs[0], pantograph=heavy).std() > 1.3 * as_designed.std()
 
 
+@pytest.mark.longer
 def test_displacements_and_forces_are_all_that_is_looked_at(runs):
     none = np.full(len(runs[0].time), np.nan)
     blind = replace(runs[0], head_velocity=none, frame_velocity=none, contact_force=none, wire=none)

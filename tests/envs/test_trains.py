@@ -80,6 +80,7 @@ def parallel(**settings):
     return panto_env.parallel_env(**IDS["Pantograph-v0"] | BOTH | SHORT | settings)
 
 
+@pytest.mark.longer
 def test_pettingzoo_accepts_it():
     from pettingzoo.test import parallel_api_test, parallel_seed_test
 

@@ -89,6 +89,7 @@ def test_what_no_pantograph_does_is_refused_with_the_likely_mistake(change, mess
     assert re.search(r"[.?]$", str(caught.value))
 
 
+@pytest.mark.longer
 def test_pantographs_and_settings_that_do_not_fit(motion):
     single = TRUE.model_copy(update={"masses": (8.0,), "stiffnesses": (50.0,), "dampings": (1.0,)})
     with pytest.raises(InputError, match="one mass only"):

@@ -112,6 +112,7 @@ def test_inertia_corrected_is_the_force_low_passed(driven):
         inertia_corrected(bare, pantograph)
 
 
+@pytest.mark.longer
 def test_an_unknown_input_is_found_whatever_it_does(driven):
     motion, pantograph = driven
     quiet = {"displacement_noise": 1e-7, "velocity_noise": 1e-6, "frame_intensity": 1e-3}

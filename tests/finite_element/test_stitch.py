@@ -115,6 +115,7 @@ def test_a_stitch_wire_goes_on_from_one_span_to_the_next():
     assert abs(bend.sum()) > 1e-4  # and its deepest place is not at the support
 
 
+@pytest.mark.longer
 def test_a_stitch_wire_alone_has_a_string_s_frequency_and_mass():
     wire, stitch = load_catenary("re330").messenger_wire, StitchWire(length=18.0, tension=3.5e3, mass=0.31)
     upper = Upper(np.linspace(0.0, 40.0, 401), wire, [Stitch(20.0, stitch)])

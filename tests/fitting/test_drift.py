@@ -147,6 +147,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.longer
 def test_the_command(folder):
     done = panto(
         "drift", "month0.safetensors", "month1.safetensors",

@@ -104,6 +104,7 @@ def test_a_wheel_that_reads_too_much_moves_no_tension(record, design, pantograph
         assert abs(each.difference - truth.of(each.value)) < 2.5 * each.deviation
 
 
+@pytest.mark.longer
 def test_tables_and_picture(fitted):
     told = plain(fitted)
     assert told["settled"] is True

@@ -80,6 +80,7 @@ def test_the_file_is_the_design_s_with_what_was_found(written, done):
     assert own[len(text) + 1] == "[as_found]"
 
 
+@pytest.mark.longer
 def test_sources_are_shown(written):
     shown = {each.key: each for each in values_of(load_catenary(written))}
     assert shown["as_found.raised_supports"].value == ((12, 0.0025),)
@@ -101,6 +102,7 @@ def test_runs_on_it_are_those_on_the_design_in_that_condition(written):
     assert np.abs(found.contact_force - plain.contact_force).max() > 1
 
 
+@pytest.mark.longer
 def test_a_fit_of_a_fitted_line_begins_with_what_the_first_ended_with_and_adds_to_it(
     written, record, pantograph, done, tmp_path
 ):

@@ -76,6 +76,7 @@ def test_they_give_what_whole_passes_give(passes):
     assert (np.abs(late - whole).max(axis=1) <= close * np.maximum(change, 1)).all()
 
 
+@pytest.mark.longer
 def test_lines_of_other_damping_have_plants_of_their_own_on_the_same_grid(passes):
     """Also where one call has several of them."""
     line, pantograph, own, _ = passes

@@ -179,6 +179,7 @@ def cut_from(whole, first, last, shift=0.0):
     return replace(whole, pieces=(cut,))
 
 
+@pytest.mark.longer
 def test_a_record_from_far_along_the_line(long_record, pantograph, design):
     """60 spans on, a record is held against a pass that begins before it, of spans named by their place."""
     far = problem([cut_from(long_record, 60, 74)], design, pantograph, free=("droppers",))
@@ -201,6 +202,7 @@ def test_a_simulated_record_may_begin_at_rest_anywhere(record, ready, design, pa
     np.testing.assert_allclose(own.force(), same.force(), rtol=1e-6)
 
 
+@pytest.mark.longer
 def test_a_measured_pass_has_settled_at_the_line_s_first_support(long_record, pantograph, design):
     """A record that begins there is held against whichever it is like: a start at rest, or a settled pass."""
     for spans, first_span in ((0, 0), (50, -LEAD)):
@@ -254,6 +256,7 @@ def test_what_a_record_says_of_itself_and_a_filter_taken_for_granted_are_among_t
     assert filtered.startswith("May was low-passed before it was recorded, and is taken as behind EN 50317's")
 
 
+@pytest.mark.longer
 def test_what_cannot_be_fitted_is_refused(record, design, pantograph):
     with pytest.raises(InputError, match="run and copy hold the same forces; give each pass once"):
         problem([record, replace(record, name="copy")], design, pantograph)

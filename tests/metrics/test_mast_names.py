@@ -37,6 +37,7 @@ def run(line, tmp_path_factory):
     return Trajectory.load(path)
 
 
+@pytest.mark.longer
 def test_tables_of_the_line_at_rest(line):
     found, name = check(line, 100.0), line.alignment().span_name
     for table in (*span_tables(found.spans, name), dropper_table(found.droppers, name)):

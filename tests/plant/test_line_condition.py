@@ -65,6 +65,7 @@ CONDITIONS = [
 ]
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("name", [EN50318, BENCHMARK])
 def test_static_state_agrees_with_finite_elements(name):
     data = load_catenary(name)

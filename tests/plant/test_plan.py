@@ -224,6 +224,7 @@ def test_wind_of_a_condition_and_of_the_plan_are_the_same():
     assert in_wind(plain, 14, [LineCondition(side_wind=28.0)]) is plain
 
 
+@pytest.mark.longer
 @pytest.mark.filterwarnings("ignore")
 def test_in_unlike_winds_arms_are_as_in_still_air():
     line = line_with(ZIGZAG, steady_arm=ARM)

@@ -96,6 +96,7 @@ def test_droppers_hold_the_wires_in_turn_unless_the_line_says_otherwise():
 SUNK = {"lost_contact_tension": 0.08, "lost_messenger_tension": 0.05, "raised_supports": [(10, 0.03)]}
 
 
+@pytest.mark.longer
 @pytest.mark.parametrize("condition", ["new", SUNK], ids=["new", "sunk"])
 def test_wires_that_coincide_are_the_equivalent_wire(condition):
     """Within 1 %, for droppers of a pair hang 0.1 m apart; each wire carries half."""
@@ -160,11 +161,13 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar):
     assert swing(data, 10, 300.0, height, goes_slack, uneven.energy)[0] < bar
 
 
+@pytest.mark.longer
 def test_lanes_equal_single_runs_and_a_restarted_one_forgets_the_run_before():
     uneven.test_lanes_of_a_batch_equal_single_runs_bit_for_bit(CA)
     uneven.test_restarted_lane_forgets_the_run_before(CA)
 
 
+@pytest.mark.longer
 def test_the_head_shares_its_force_between_the_wires():
     """Half on each in the mean, and all of it together; a wire carries most just behind its own dropper."""
     plant = Plant(changed(FAR, spans=16), Train.of(DSA), runs=Runs((160 / 3.6, 160 / 3.6)))

@@ -231,6 +231,7 @@ def climbing(slope):
     return changed("benchmark-2015", {"sequence": spans, "end_support": end})
 
 
+@pytest.mark.longer
 def test_a_climb_costs_the_damping_to_ground_times_its_speed():
     """2 per mille at 250 km/h: 0.14 m/s times 70 N s/m."""
     level, climb = (simulate(climbing(slope), APPLIED, 250).summary((16, 23)) for slope in (1e-9, 2e-3))

@@ -203,6 +203,7 @@ def test_the_first_page_is_short():
     assert len(text.split()) <= 900
 
 
+@pytest.mark.longer
 def test_no_exception_is_left_of_a_document_that_has_changed():
     used = {rule_of(command) for command in shown() if command.whole}
     assert [rule.begins for rule in RULES if rule not in used] == []

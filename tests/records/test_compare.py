@@ -42,6 +42,7 @@ def test_a_run_against_its_own_noisy_record(run, error):
     assert f"shifted by {-error:+.1f}" in shift_sentence(found)
 
 
+@pytest.mark.longer
 def test_figures_of_spans_are_those_of_the_run(run):
     found = compare(measured(run, force_noise=0.0), run)
     summary = run.summary()

@@ -43,6 +43,7 @@ def test_a_train_that_turns_back_counts_on_the_way_out_only(hold, samples, notes
     assert [part.where for part in judged.of("speed")] == ["175-195 km/h"]
 
 
+@pytest.mark.longer
 def test_a_train_that_goes_out_again_counts_from_there_on(columns, written):
     found = read_record(written(turned(columns, 3000, back=1500, again=2500)))
     assert [len(piece.force) for piece in found.pieces] == [3000, 2500]

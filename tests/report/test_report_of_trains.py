@@ -109,6 +109,7 @@ def test_runs_of_one_pantograph_and_trains_share_a_table(run, tmp_path):
     assert names == [("en50318-2002", "1"), ("en50318-2002", "1"), ("dsa250", "2")]
 
 
+@pytest.mark.longer
 def test_a_saved_train_is_whole_when_it_is_read(run, file):
     read = Trajectory.load(file)
     for own, other in zip(run.train, read.train, strict=True):

@@ -51,6 +51,7 @@ def short(monkeypatch):
     monkeypatch.setattr(passes, "RUN_SPANS", 8)
 
 
+@pytest.mark.longer
 def test_a_lane_is_the_pass_that_simulate_makes(short):
     cases = [passes.sampled(400, control(0.5), "realistic"), passes.sampled(400, "passive", "realistic")]
     for case, record in zip(cases, passes.records(cases), strict=True):
@@ -98,6 +99,7 @@ def test_amplification_follows_the_papers_equations_of_motion(frequency, gain, d
     assert passes.amplification(frequency, gain, damping) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.longer
 def test_the_passive_pantograph_has_the_mean_asked_for_and_the_same_nominal_force(short):
     result = passes.passive_at_mean(400, 48.0)
     assert result.figures.mean == pytest.approx(48.0, abs=0.1)

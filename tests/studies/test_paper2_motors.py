@@ -141,6 +141,7 @@ def test_without_control_the_bench_is_linear(passive, bench_runs):
         assert found == pytest.approx(expected, rel=0.03, abs=0.1)
 
 
+@pytest.mark.longer
 def test_proportional_control_reduces_the_force_of_the_collector_at_each_frequency(bench_runs):
     """Figs 14 and 15."""
     off, on = bench_runs[0.0], bench_runs[2.0]

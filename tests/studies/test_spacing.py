@@ -85,6 +85,7 @@ def test_the_wake_begins_with_the_wire_under_the_pantograph(monkeypatch):
     np.testing.assert_allclose(moved, after.height[100:200] - begun, atol=3e-3)
 
 
+@pytest.mark.longer
 def test_curves_are_figures_of_runs(monkeypatch):
     monkeypatch.setattr(passes, "SPEEDS_KMH", (SPEED,))
     (curve,), rows = passes.curves(passes.CASES[0], (50.0, 120.0))
