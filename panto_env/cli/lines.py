@@ -151,12 +151,12 @@ def line(
                 print_table(elasticity_table([found]))
             if run and not other and not (above and any(above.loads)):
                 console.print("This condition changes no tension along the line: it is run as designed.")
-            if above is None and any(mast.stagger is not None for mast in chosen.masts):
+            supports, given_at = len(alignment.supports), sum(m.stagger is not None for m in chosen.masts)
+            if above is None and given_at:
                 console.print("The line is not seen from above: not every mast has a stagger.")
-            supports, surveyed = len(alignment.supports), [each.stagger is not None for each in chosen.masts]
-            if above and (masts is not None or surveyed) and sum(surveyed) < supports:
+            elif above and (masts is not None or chosen.masts) and given_at < supports:
                 console.print(
-                    f"{supports - sum(surveyed)} of {supports} masts have no stagger, and theirs is assumed: "
+                    f"{supports - given_at} of {supports} masts have no stagger, and theirs is assumed: "
                     "that of the line's plan, in turn."
                 )
             for limit in broken:

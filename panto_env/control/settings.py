@@ -345,7 +345,9 @@ class RunSettings(Numerics):
     spans: Annotated[int | None, _unless_none(check_span_count)] = Field(
         None, description="spans of the line; by default as the catalogue has it"
     )
-    control_interval: ControlInterval = Field(0.01, description="time between two actions (s)")
+    control_interval: ControlInterval = Field(
+        Runs().control_interval, description="time between two actions (s)"
+    )
     bilateral: bool = Field(False, description="let the contact pull, as paper 3's equations do")
 
     @model_validator(mode="before")

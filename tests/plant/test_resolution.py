@@ -71,10 +71,6 @@ def test_a_worn_wire_allows_the_steps_of_a_lighter_one():
     assert 0.8 * thin < worn <= thin < 0.9 * new
 
 
-def test_runs_are_controlled_as_often_as_settings_say():
-    assert Runs().control_interval == run_settings({}).control_interval
-
-
 def test_a_run_says_how_many_spans_its_window_has_about_each_pantograph():
     def window(given, **train):
         settings = run_settings({"window": given, "speed_kmh": 300, "distance": 300.0} | train)

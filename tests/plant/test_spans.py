@@ -14,13 +14,12 @@ from panto_env.catalog import load_catenary
 from panto_env.catalog.values import by_value, values_of
 from panto_env.plant.catenary.flexible.layout import Layout
 from panto_env.plant.catenary.flexible.parts import Span
-from panto_env.plant.catenary.flexible.plan import without_plan
 from panto_env.plant.catenary.flexible.schema import FlexibleCatenaryData
 from panto_env.plant.catenary.flexible.static import hang, solve
 from panto_env.plant.catenary.rig import RigData
 from panto_env.plant.catenary.schema import BY_DEFAULT
 
-from ..finite_element.sections import line_of, sections
+from ..finite_element.sections import line_of, of_catalogue, sections
 from ..uniform_lines import UNIFORM
 
 FILE = """
@@ -55,7 +54,7 @@ def read(text, tmp_path):
 
 def spelt_out(name, count=6):
     """A line of the catalogue with its own span written out, once as a table and once by its type."""
-    table = without_plan(load_catenary(name)).model_dump(exclude_none=True)
+    table = of_catalogue(name).model_dump(exclude_none=True)
     own = {key: table[key] for key in Span.model_fields if key in table}
     del table["spans"]
     return table | {"span_types": {"usual": own}, "sequence": ["usual", own, *["usual"] * (count - 2)]}
@@ -63,7 +62,7 @@ def spelt_out(name, count=6):
 
 @pytest.mark.parametrize("name", UNIFORM)
 def test_equal_spans_written_out_are_the_uniform_line(name):
-    line = without_plan(load_catenary(name)).model_copy(update={"spans": 6})
+    line = of_catalogue(name).model_copy(update={"spans": 6})
     for table in (spelt_out(name), json.loads(json.dumps(spelt_out(name)))):
         written = FlexibleCatenaryData.model_validate(table)
         assert written == line
