@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 
 from panto_baselines.policies.guarded import (
+    CALM,
     CALMER,
+    CLAIM,
     EARLY_HARM,
     FADE_IN,
     FADE_OUT,
@@ -18,13 +20,16 @@ from panto_baselines.policies.guarded import (
     GOOD,
     GROWTH,
     HARM,
+    HEARD,
     LISTENING,
+    LISTENING_SPANS,
     LONGEST_PAUSE,
     LOW,
     PATIENCE,
     PAUSE,
     PEAK,
     PROBE,
+    QUIET,
     RETURN,
     SAME,
     SETTLED,
@@ -49,7 +54,7 @@ LONG_AGO = 1_000_000_000
 def begin_guard(c: Constants, s: State) -> None:
     """Begin passive, listening, with all sensors sound."""
     s.sound_for = LONG_AGO
-    s.waits = LISTENING
+    s.settles = SETTLED
     s.pause = PAUSE
     s.fade_in = PROBE
     s.heard = math.inf
@@ -139,10 +144,13 @@ def act_within_guard(c: Constants, s: State) -> None:
     speed = max(s.input[SPEED], STANDSTILL)
     if s.begun == 0:
         s.heard_at = speed
+        s.waits = max(LISTENING, LISTENING_SPANS * c.mean_length / speed)
     listen_while_passive(c, s, speed)
     pause_or_not(c, s, speed)
-    if s.waits > 0.0 and s.waits <= c.interval and s.heard > CALMER * s.before:
+    heard_for = s.passive_for - s.settles
+    if s.waits > 0.0 and s.waits <= c.interval and heard_for > HEARD and s.heard > CALMER * s.before:
         s.pause = PAUSE  # it was no better without
+        s.fade_in = FADE_IN
     s.waits = max(s.waits - c.interval, 0.0)
     change = c.interval / s.fade_in
     if s.waits > 0.0:
@@ -202,12 +210,18 @@ def listen_while_passive(c: Constants, s: State, speed: float) -> None:
     """Hear, while passive, how much the force varies; count how long control has acted."""
     if s.gate == 0.0:
         s.passive_for = min(s.passive_for + c.interval, float(LONG_AGO))
-        s.listened = max(s.listened, abs(s.deviation))
     else:
         s.passive_for = 0.0
+    calm_for = s.passive_for - s.settles
+    if calm_for > 0.0:
+        s.listened = max(s.listened, abs(s.deviation))
+        share = max(c.shares[0], c.interval / max(calm_for, c.interval))
+        s.quiet += share * (s.deviation * s.deviation - s.quiet)
+    else:
         s.listened = 0.0
-    if s.passive_for > SETTLED:
-        s.heard = spread(c, s, 0, 0)
+        s.quiet = 0.0
+    if calm_for > HEARD:
+        s.heard = math.sqrt(s.quiet)
         s.heard_at = speed
         s.most = s.listened
     if s.gate == 1.0:
@@ -228,11 +242,16 @@ def pause_or_not(c: Constants, s: State, speed: float) -> None:
         if abs(s.mean_added) > SHIFT * nominal_force(c, s):
             s.before = 0.0
             s.waits = PAUSE
+        elif s.heard < QUIET * nominal_force(c, s):
+            s.before = 0.0
+            s.waits = PAUSE
+            s.fade_in = PROBE
         elif does_harm(c, s, speed) == 1:
-            s.before = spread(c, s, 1, 0)
+            s.before = max(spread(c, s, 0, 0), spread(c, s, 0, 1))
             s.waits = s.pause
             s.fade_in = PROBE
             s.pause = min(GROWTH * s.pause, LONGEST_PAUSE)
+            s.settles = CALM
         elif speed >= FASTER * s.heard_at or s.heard_at >= FASTER * speed:
             s.before = 0.0
             s.waits = PAUSE
@@ -252,7 +271,9 @@ def does_harm(c: Constants, s: State, speed: float) -> Whole:
             return 1
     if spread(c, s, 0, 0) > harm * spread(c, s, 0, 1) or lately > SHORT_HARM * spread(c, s, 1, 1):
         return 1
-    far = abs(s.deviation) > PEAK * s.most * ratio * ratio
-    if added > STRONG * s.heard and (lately > SHORT_SPREAD * heard or far):  # else it is not of control
-        return 1
+    if added > STRONG * s.heard:  # else it is not of control
+        if lately > SHORT_SPREAD * heard or abs(s.deviation) > PEAK * s.most * ratio * ratio:
+            return 1
+        if lately > heard and spread(c, s, 1, 1) > CLAIM * heard:
+            return 1
     return 0

@@ -298,4 +298,4 @@ def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -
     state |= _zeros({"means": (2, 3), "squares": (2, 3), "filter": (2, 3)})
     state |= dict.fromkeys(("shown_steps", "fault_at", "sound_for", "heard_any"), 0)
     numbers = "held waits pause fade_in heard heard_at most before gate mean_added deviation passive_for"
-    state |= dict.fromkeys((*numbers.split(), "listened", "acted_for"), 0.0)
+    state |= dict.fromkeys((*numbers.split(), "listened", "acted_for", "settles", "quiet"), 0.0)

@@ -41,11 +41,16 @@ STANDS = 2  # control steps in a row without a change after which a reading is h
 PATIENCE, RETURN = 1.2, 0.5
 """Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
 (s) for which they must move again before it comes back."""
-LISTENING = 2.0  # time (s) at the start in which the pantograph is passive and is listened to
+LISTENING, LISTENING_SPANS = 2.0, 2.5
+"""Time (s) and number of spans, the longer of both, at the start in which the pantograph is passive and is
+listened to."""
 WINDOW, SHORT_WINDOW = 1.5, 0.4  # time constants (s) of the means and variances that the monitor compares
 FORCES = ("contact force", "force deviation", f"contact force{DEVIATION}")
 """Names of the entry that has the contact force, by kind of observation."""
-SETTLED = 1.0  # time (s) of control, or without it, after which the windows hold nothing else
+SETTLED = 1.0  # time (s) of control, or without it at the start, after which the windows hold nothing else
+CALM, HEARD = 1.5, 0.9
+"""Time (s) after control has done harm in which its waves die out; time (s) of listening, after that, from
+which on the spread counts as heard while passive."""
 HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
 """Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
 ``SETTLED``, before, and over the short window."""
@@ -54,21 +59,27 @@ SPREAD, SHORT_SPREAD = 1.1, 1.3
 passive above which control fades, whatever the model says."""
 PEAK = 1.3
 """Ratio of the force's distance from its mean to the largest one heard while passive above which it fades."""
+CLAIM = 1.5
+"""Ratio of the force's short spread without control, by the model, to that heard while passive, from which on
+the force must vary less than it did while passive: else the model or the line is another one."""
 STRONG = 0.3
 """Ratio of what control adds, by the model, to the spread heard while passive, below which neither the short
 window nor a single peak is control's doing."""
+QUIET = 0.1
+"""Ratio of the spread heard while passive to the nominal force below which there is nothing to calm."""
 SHIFT, SHIFT_WINDOW = 0.03, 5.0
 """Share of the nominal force by which control may move the mean force, by the model; time constant of that
 mean (s)."""
 LOW = 0.2  # share of the nominal force below which the command may not take more away
 FADE_OUT, FADE_IN, PROBE = 0.2, 0.5, 3.0
-"""Times (s) in which the command fades out; in, after readings were held; and in after a pause, so slowly
-that harm is seen while it is small."""
+"""Times (s) in which the command fades out; in, after readings were held or a pause that showed no harm; and
+in after any other pause, so slowly that harm is seen while it is small."""
 HIGHEST = 20.0  # frequency (Hz) up to which the force's spread is compared, as in figures
-PAUSE, GROWTH, LONGEST_PAUSE = 2.0, 4.0, 128.0
+PAUSE, GROWTH, LONGEST_PAUSE = 3.0, 4.0, 128.0
 """First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
 CALMER = 0.85
-"""Ratio of the spread heard in a pause to that over the short window before, above which it was no harm."""
+"""Ratio of the spread heard in a pause to that before, as it was or, by the model, without control, above
+which it was no harm."""
 GOOD = 20.0  # time (s) of control without harm after which the next pause is the first again
 FASTER = 1.2
 """Ratio of speeds, of now and of when it last listened, from which on it listens anew. Up to it the spread
@@ -88,11 +99,15 @@ class Guarded:
       fades out.
     - so it does where the force varies more than it did while passive (``SPREAD``), which needs no model,
       where it is farther off than it was then (``PEAK``), and where the mean force is moved (``SHIFT``).
+    - if by the model it would vary far more without control than it did while passive (``CLAIM``), but varies
+      no less than then, one of the two is wrong: it fades, and listens.
+    - where the force hardly varies while passive, it stays passive (``QUIET``).
     - where the force is low and control has taken some away, the command takes no more (``LOW``).
 
-    It comes back by itself after a pause. If the force varied less in the pause than before, control did
-    harm, and the next pause is longer; if not, the line or the speed has changed, and the next is as short as
-    the first. Where the speed is another one (``FASTER``), it pauses and listens anew.
+    It comes back by itself after a pause, in which it listens when the waves of control have died out
+    (``CALM``). If the force varied less then than before, control did harm, and the next pause is longer; if
+    not, the line or the speed has changed, and the next is as short as the first. Where the speed is another
+    one (``FASTER``), it pauses and listens anew.
     """
 
     AROUND_ANOTHER = True  # the other's name follows its own: "guarded:pd"
@@ -272,10 +287,12 @@ class Monitor:
         self.low_pass = butter(2, min(HIGHEST, 0.3 / self._interval), fs=1 / self._interval)
         self.at_rest = lfilter_zi(*self.low_pass)
         self.gate, self.low = 0.0, False
-        self._waits, self._pause, self._acted, self._passive_for = LISTENING, PAUSE, 0.0, 0.0
+        self._waits, self._mean_length = LISTENING, context.alignment.mean_length
+        self._pause, self._acted, self._passive_for, self._settles = PAUSE, 0.0, 0.0, SETTLED
         self._heard, self._heard_at = math.inf, context.speed  # spread while passive (N), at a speed (m/s)
         self._fade_in = PROBE
         self._listened, self._most, self._deviation = 0.0, math.inf, 0.0  # from the mean (N)
+        self._quiet = 0.0  # mean square of the deviation since it listens (N²)
         self._before = math.inf  # spread when it last faded (N)
         self._speed = names.index("speed") if "speed" in names else None
         self._entries = layout.entries
@@ -289,18 +306,17 @@ class Monitor:
             command = float(seen[place]) * self._limit
             self._states[k] = model.a @ self._states[k] + model.b * command
             added += float(model.c[0] @ self._states[k])
-        if readings.held == 0.0:
-            self._add(force, added)
-        deviations = np.sqrt(np.maximum(self._squares, 1e-9))
-        self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
         speed = self._heard_at
         if self._speed is not None:
             entry = self._entries[self._speed]
             speed = float(entry.centre + entry.scale * seen[self._speed])
-        self._listened = max(self._listened, abs(self._deviation)) if self._passive_for > 0.0 else 0.0
-        if self._passive_for > SETTLED:
-            self._heard, self._heard_at = float(deviations[0, 0]), speed
-            self._most = self._listened
+        if self._past is None:
+            self._waits = max(LISTENING, LISTENING_SPANS * self._mean_length / speed)
+        if readings.held == 0.0:
+            self._add(force, added)
+        deviations = np.sqrt(np.maximum(self._squares, 1e-9))
+        self._passive_for = self._passive_for + self._interval if self.gate == 0.0 else 0.0
+        self._listen(self._passive_for - self._settles, speed)
         self._acted = self._acted + self._interval if self.gate == 1.0 else 0.0
         if self._acted > GOOD:
             self._pause = PAUSE
@@ -311,18 +327,32 @@ class Monitor:
         elif self.gate > 0.0 and self._waits == 0.0:
             if abs(self._added) > SHIFT * self._nominal:
                 self._before, self._waits = 0.0, PAUSE
+            elif self._heard < QUIET * self._nominal:
+                self._before, self._waits, self._fade_in = 0.0, PAUSE, PROBE
             elif self._does_harm(deviations, speed):
-                self._before, self._waits, self._fade_in = float(deviations[1, 0]), self._pause, PROBE
-                self._pause = min(GROWTH * self._pause, LONGEST_PAUSE)
+                self._before, self._waits, self._fade_in = float(max(deviations[0, :2])), self._pause, PROBE
+                self._pause, self._settles = min(GROWTH * self._pause, LONGEST_PAUSE), CALM
             elif not 1 / FASTER < speed / self._heard_at < FASTER:
                 self._before, self._waits, self._fade_in = 0.0, PAUSE, FADE_IN
-        if 0.0 < self._waits <= self._interval and self._heard > CALMER * self._before:
-            self._pause = PAUSE  # it was no better without
+        heard_now = self._passive_for > self._settles + HEARD
+        if 0.0 < self._waits <= self._interval and heard_now and self._heard > CALMER * self._before:
+            self._pause, self._fade_in = PAUSE, FADE_IN  # it was no better without
         self._waits = max(self._waits - self._interval, 0.0)
         step = -self._interval / FADE_OUT if self._waits > 0 else self._interval / self._fade_in
         self.gate = min(max(self.gate + step, 0.0), 1.0)
         self.low = self.absolute and force < LOW * self._nominal and added < 0.0
         return self.gate
+
+    def _listen(self, time: float, speed: float) -> None:
+        """Hear how much the force varies; time: passive without waves of control (s), or below 0."""
+        if time <= 0.0:
+            self._listened = self._quiet = 0.0
+            return
+        self._listened = max(self._listened, abs(self._deviation))
+        share = max(self.shares[0], self._interval / max(time, self._interval))
+        self._quiet += share * (self._deviation**2 - self._quiet)
+        if time > HEARD:
+            self._heard, self._heard_at, self._most = math.sqrt(self._quiet), speed, self._listened
 
     def _add(self, force: float, added: float) -> None:
         now = np.array([force, force - added, added])
@@ -343,10 +373,12 @@ class Monitor:
         strong = added > STRONG * self._heard  # else what is heard is not of control
         settled = self._acted > SETTLED  # what was heard at first is of waves that still build up
         faster = max(1.0, speed / self._heard_at) ** 2
+        heard, most = self._heard * faster, self._most * faster
         return bool(
             acted > (HARM if settled else EARLY_HARM) * without
             or acted_lately > SHORT_HARM * without_lately
-            or (settled and acted > SPREAD * self._heard * faster)
-            or (strong and acted_lately > SHORT_SPREAD * self._heard * faster)
-            or (strong and abs(self._deviation) > PEAK * self._most * faster)
+            or (settled and acted > SPREAD * heard)
+            or (strong and acted_lately > SHORT_SPREAD * heard)
+            or (strong and acted_lately > heard and without_lately > CLAIM * heard)
+            or (strong and abs(self._deviation) > PEAK * most)
         )

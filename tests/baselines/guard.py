@@ -64,7 +64,7 @@ def judge(policies, without, track, number, speed, seed):
     """
     warnings.simplefilter("ignore")
     for rule in without:
-        setattr(guarded, rule, 0.0 if rule == "LOW" else math.inf)
+        setattr(guarded, rule, 0.0 if rule in ("LOW", "QUIET") else math.inf)
     settings = load_benchmark(f"benchmark/{track}")
     arguments = _arguments(settings, settings.lines[number], speed, seed)
     passive, *runs = (simulate(policy=each, record_droppers=False, **arguments) for each in (None, *policies))

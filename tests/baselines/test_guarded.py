@@ -99,6 +99,24 @@ def test_a_policy_that_harms_is_stopped():
     assert stopped < 10.0
 
 
+@pytest.mark.longer
+def test_a_late_actuator_deceives_the_model_but_not_the_guard():
+    """By the model control does good, since it would vary more without; when passive, it varies less."""
+    given = {**BUILT, "actuator": "realistic:delay=0.085", "seed": 2, "spans": 24}
+    passive, alone, stopped = (
+        simulate("family:high-speed", "dsa380", 275.0, policy=policy, **given).summary(FIRST).std
+        for policy in (None, "agent-any-line", "guarded:agent-any-line")
+    )
+    assert alone > 2 * passive
+    assert stopped < 1.1 * passive
+
+
+def test_where_the_force_hardly_varies_it_stays_passive():
+    given = {**BUILT, "distance": 700.0, "seed": 1}
+    run = simulate("beijing-yizhuang", "dsa250", 120.0, policy="guarded:agent-any-line", **given)
+    assert np.abs(run.frame_force).max() < 1.0
+
+
 @pytest.mark.slow
 def test_a_policy_that_diverges_far_behind_the_window_is_stopped_and_comes_back():
     case = ("sweden-st15", "dsa250", 160.0)
@@ -186,8 +204,9 @@ def test_an_environment_behind_the_guard_does_what_the_guarded_policy_does():
         outcomes.append((forces, gates))
     (forces, gates), (others, _) = outcomes
     np.testing.assert_allclose(forces, others, atol=0.02)  # actions of an environment have single precision
-    assert min(gates) == 0.0
-    assert max(gates) > 0.5
+    opened = gates.index(max(gates))
+    assert gates[opened] > 0.2
+    assert min(gates[opened:]) == 0.0
 
 
 def test_the_environment_behind_the_guard_keeps_gymnasiums_rules():
@@ -195,7 +214,7 @@ def test_the_environment_behind_the_guard_keeps_gymnasiums_rules():
     check_env(GuardedEnv(env), skip_render_check=True)
 
 
-RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK"]
+RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK", "CLAIM"]
 
 
 @pytest.mark.slow
