@@ -8,19 +8,24 @@ from __future__ import annotations
 import math
 from collections.abc import MutableSequence
 
-from .guarding import act_within_guard, begin_guard, check_readings
+from panto_baselines.policies.guard_rules import (
+    Constants,
+    Number,
+    State,
+    act_within_guard,
+    begin_guard,
+    check_readings,
+    nominal_force,
+    shown_force,
+)
+
 from .learning import act_by_learning, model_force
 from .seeing import (
     PLACE,
-    Constants,
-    Number,
     Readings,
     Single,
-    State,
     forget_earlier_spans,
-    nominal_force,
     see,
-    shown_force,
     sine_of_turns,
     take_readings,
 )

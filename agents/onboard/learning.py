@@ -9,6 +9,14 @@ from __future__ import annotations
 
 import math
 
+from panto_baselines.policies.guard_rules import (
+    SPEED,
+    STANDSTILL,
+    Constants,
+    Number,
+    State,
+    shown_force,
+)
 from panto_baselines.policies.repetitive import (
     ANOTHER,
     BACK_OFF,
@@ -21,8 +29,7 @@ from panto_baselines.policies.repetitive import (
     TOLERATED,
 )
 
-from .guarding import STANDSTILL
-from .seeing import PLACE, SPEED, Constants, Number, State, shown_force, sine_of_turns
+from .seeing import PLACE, sine_of_turns
 
 
 def act_by_learning(c: Constants, s: State) -> Number:

@@ -11,7 +11,8 @@ import numpy as np
 
 from panto_baselines.policies.fb_ff import FORCE_RANGE, FeedbackFeedforward
 from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
-from panto_baselines.policies.guarded import FORCES, Guard, Guarded
+from panto_baselines.policies.guard_rules import SENSORS
+from panto_baselines.policies.guarded import FORCES, Guard, Guarded, state_of
 from panto_baselines.policies.line_model import Sampled, line_model, mean_line
 from panto_baselines.policies.repetitive import PEAKS, WASHED, Repetitive, WashoutSettings, harmonics
 from panto_env.base.arrays import METRES_PER_SECOND
@@ -23,7 +24,6 @@ from panto_env.policies import find_policy
 from ..model_file import Actor, Facts
 from ..policy import TrainedPolicy
 from . import acting, seeing
-from .guarding import SHOWN
 
 Table = dict[str, Any]
 Feedback: TypeAlias = Proportional | ProportionalDerivative | FeedbackFeedforward
@@ -55,7 +55,7 @@ def parts_of(policy: Any, name: str, task: Task) -> tuple[Table, Table]:
     if isinstance(inner, TrainedPolicy):
         _add_network(constants, state, inner.facts, inner.actor)
     if isinstance(policy, Guarded):
-        _add_guard(constants, state, Guard(context, *policy.delays), context)
+        _add_guard(constants, state, Guard(context, *policy.delays))
     return constants, state
 
 
@@ -109,7 +109,7 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "force_scale": force.scale,
         "force_centre": force.centre,
     }
-    inputs, sensors = constants["inputs"], seeing.SENSORS
+    inputs, sensors = constants["inputs"], SENSORS
     shapes = {
         "input": inputs,
         "reading": sensors,
@@ -266,36 +266,8 @@ def _add_repetitive(constants: Table, state: Table, policy: Repetitive, task: Ta
     state |= dict.fromkeys((*numbers.split(), "first_spans", "first_count", "trust"), 0.0)
 
 
-def _add_guard(constants: Table, state: Table, guard: Guard, context: Context) -> None:
-    readings, monitor, models = guard.readings, guard.monitor, guard.monitor.models
-    steps, states, sensors = constants["memory_steps"] + 8, models[0].size, seeing.SENSORS
-    entry, spans, ahead = zip(*readings.memory, strict=True) if readings.memory else ((0,), (0,), (0.0,))
-    low_pass_b, low_pass_a = monitor.low_pass
-    constants |= {
-        "present": readings.present,
-        "earlier": np.array(readings.past or [[0]]),
-        "zero": readings.zero,
-        "guard_share": readings.share,
-        "fault_steps": steps,
-        "remembered": len(readings.memory),
-        "remembered_entry": np.array(entry),
-        "remembered_spans": np.array(spans, dtype=float),
-        "remembered_ahead": np.array(ahead),
-        "unknown": readings.unknown / context.nominal_force,
-        "knows_force": monitor.absolute,
-        "states": states,
-        "model_a": np.array([model.a for model in models]),
-        "model_b": np.array([model.b for model in models]),
-        "model_c": np.array([model.c[0] for model in models]),
-        "low_pass_a": low_pass_a,
-        "low_pass_b": low_pass_b,
-        "at_rest": monitor.at_rest,
-        "shares": monitor.shares,
-    }
-    state |= _zeros({"shows": sensors, "last": sensors, "shown": (SHOWN, sensors), "shift": sensors})
-    state |= _zeros({"stood": sensors, "faulty": steps}, np.int64)
-    state |= _zeros({"model": (len(models), states), "following_model": states, "now": 3})
-    state |= _zeros({"means": (2, 3), "squares": (2, 3), "filter": (2, 3)})
-    state |= dict.fromkeys(("shown_steps", "fault_at", "sound_for", "heard_any"), 0)
-    numbers = "held waits pause fade_in heard heard_at most before gate mean_added deviation passive_for"
-    state |= dict.fromkeys((*numbers.split(), "listened", "acted_for", "settles", "quiet"), 0.0)
+def _add_guard(constants: Table, state: Table, guard: Guard) -> None:
+    """Add what is the guard's alone; the nominal force and the readings are those of the controller."""
+    own = guard.constants | {"fault_steps": constants["memory_steps"] + 8}
+    for table, given in ((constants, own), (state, state_of(own))):
+        table |= {name: value for name, value in given.items() if name not in table}

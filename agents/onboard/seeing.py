@@ -1,10 +1,11 @@
 """From raw readings to the scaled observation of a policy: the first part of the on-board controller.
 
-This module, ``acting`` and ``guarding`` describe the controller once. Plain Python runs them as they stand
-(``Controller``), and ``translate`` turns the same functions into C99. So they keep to a small subset of
-Python: arithmetic, comparisons, if, for over range, while, local numbers, arrays of fixed size. ``c`` holds
-constants, ``s`` the state, both by name; ``r`` the readings of a step. A branch whose condition holds
-constants alone is decided when it is translated: a controller has only the parts that its policy needs.
+This module, ``acting``, ``learning`` and ``panto_baselines.policies.guard_rules`` describe the controller
+once. Plain Python runs them as they stand (``Controller``), and ``translate`` turns the same functions into
+C99. So they keep to a small subset of Python: arithmetic, comparisons, if, for over range, while, local
+numbers, arrays of fixed size. ``c`` holds constants, ``s`` the state, both by name; ``r`` the readings of a
+step. A branch whose condition holds constants alone is decided when it is translated: a controller has only
+the parts that its policy needs.
 
 The environment does the same to its own readings (``panto_env.control.observation``, ``memory``); the tests
 compare the two step by step.
@@ -16,23 +17,27 @@ import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
+from panto_baselines.policies.guard_rules import (
+    SENSORS,
+    SPEED,
+    Constants,
+    Number,
+    State,
+    Whole,
+    nominal_force,
+)
 from panto_env.backend.compile import python_function
 from panto_env.control.memory import BEFORE
 from panto_env.control.observation import BOUND
 from panto_env.plant import functions
 
-Constants: TypeAlias = Any
-State: TypeAlias = Any
 Readings = Sequence[float]
-Whole: TypeAlias = Any
-Number: TypeAlias = Any
 Single: TypeAlias = Any
-"""What a function returns, for the translation: int, double, float."""
+"""What a function returns, for the translation: float."""
 
-FORCE, SENSORS = 4, 5
-"""Place of the contact force among the inputs, and number of those that sensors on the pantograph read."""
-PLACE, SPEED, FURTHER = 5, 6, 7
-"""Places of the place along the line and the speed; first of the inputs after them."""
+FORCE, PLACE = SENSORS - 1, SENSORS
+FURTHER = SPEED + 1
+"""Places of contact force and place along the line among the inputs; first of those after the speed."""
 sine_of_turns = python_function(functions.sine_of_turns)
 """The environment's own function of it, in plain Python."""
 LARGEST = 1e6
@@ -163,23 +168,3 @@ def entry(c: Constants, s: State, k: int) -> Number:
     if source == PAST:
         return s.past[number]
     return s.past[number] / nominal_force(c, s) - 1.0
-
-
-def nominal_force(c: Constants, s: State) -> Number:
-    """Static force and aerodynamic uplift in still air at the speed read (N); beyond a table its last one."""
-    force = c.static_force + c.aerodynamic * s.input[SPEED] * s.input[SPEED]
-    if c.uplift_points > 0:
-        force = force + c.uplift[0]
-        for k in range(c.uplift_points - 1):
-            wide = c.uplift_speed[k + 1] - c.uplift_speed[k]
-            into = min(max(s.input[SPEED] - c.uplift_speed[k], 0.0), wide)
-            force = force + into * (c.uplift[k + 1] - c.uplift[k]) / wide
-    return force
-
-
-def shown_force(c: Constants, s: State) -> Number:
-    """Contact force (N) that the observation shows, or its deviation from its average."""
-    shown = float(s.seen[c.force_entry])
-    if c.of_nominal:
-        return nominal_force(c, s) * (1.0 + c.force_scale * shown)
-    return c.force_centre + c.force_scale * shown

@@ -15,7 +15,7 @@ import numpy as np
 
 from panto_baselines.benchmark.settings import load_benchmark
 from panto_baselines.benchmark.single_pass import _arguments
-from panto_baselines.policies import guarded
+from panto_baselines.policies import guard_rules
 from panto_env import simulate
 from panto_env.analysis.pool import in_processes
 from panto_env.metrics.low_pass import low_pass
@@ -64,7 +64,7 @@ def judge(policies, without, track, number, speed, seed):
     """
     warnings.simplefilter("ignore")
     for rule in without:
-        setattr(guarded, rule, 0.0 if rule in ("LOW", "QUIET") else math.inf)
+        setattr(guard_rules, rule, 0.0 if rule in ("LOW", "QUIET") else math.inf)
     settings = load_benchmark(f"benchmark/{track}")
     arguments = _arguments(settings, settings.lines[number], speed, seed)
     passive, *runs = (simulate(policy=each, record_droppers=False, **arguments) for each in (None, *policies))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from panto_baselines.policies import guarded
+from panto_baselines.policies import guard_rules
 from panto_baselines.policies.guarded import Guarded, GuardedEnv
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary
@@ -87,8 +87,8 @@ def test_it_listens_first_and_then_does_what_the_policy_does():
     quiet = Listener(0.1)
     given = BUILT | {"actuator": "ideal", "distance": 400.0}
     run = simulate("en50318-2002", "dsa380", 280.0, policy=Guarded(quiet), **given)
-    assert not run.frame_force[run.time < guarded.LISTENING - 0.05].any()
-    acted = run.time > guarded.LISTENING + guarded.PROBE + 0.05
+    assert not run.frame_force[run.time < guard_rules.LISTENING - 0.05].any()
+    acted = run.time > guard_rules.LISTENING + guard_rules.PROBE + 0.05
     assert np.abs(run.frame_force[acted]).max() == pytest.approx(10.0)
 
 
@@ -227,5 +227,5 @@ RULES = ["HARM", "EARLY_HARM", "SHORT_HARM", "SPREAD", "SHORT_SPREAD", "PEAK", "
 )
 def test_without_its_rules_it_fails(rules, case, monkeypatch):
     for name in rules:
-        monkeypatch.setattr(guarded, name, np.inf)
+        monkeypatch.setattr(guard_rules, name, np.inf)
     assert max(changes(*case)) > 15.0

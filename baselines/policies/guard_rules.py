@@ -1,48 +1,70 @@
-"""The guard around a policy: readings that cannot be are held, and a command that does harm fades to passive.
+"""What the guard around a policy does in each step: its rules, in the subset of Python that becomes C.
 
-A part of the on-board controller's description; see ``seeing`` for its form. Rules and constants are those of
-``panto_baselines.policies.guarded``, whose observations, step by step, these functions see. What depends on
-the speed of a run there depends on the speed read here.
+Plain Python runs these functions as they stand (``guarded.Guard``), and ``panto_agents.onboard`` translates
+them for a controller on a train. So they keep to arithmetic, comparisons, if, for over range, local numbers,
+arrays of fixed size. ``c`` holds constants, ``s`` the state, both by name.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
-from panto_baselines.policies.guarded import (
-    CALM,
-    CALMER,
-    CLAIM,
-    EARLY_HARM,
-    FADE_IN,
-    FADE_OUT,
-    FASTER,
-    GOOD,
-    GROWTH,
-    HARM,
-    HEARD,
-    LISTENING,
-    LISTENING_SPANS,
-    LONGEST_PAUSE,
-    LOW,
-    PATIENCE,
-    PAUSE,
-    PEAK,
-    PROBE,
-    QUIET,
-    RETURN,
-    SAME,
-    SETTLED,
-    SHIFT,
-    SHORT_HARM,
-    SHORT_SPREAD,
-    SPREAD,
-    STANDS,
-    STRONG,
-)
+Constants: TypeAlias = Any
+State: TypeAlias = Any
+Whole: TypeAlias = Any
+Number: TypeAlias = Any
+"""What a function returns, for the translation: int, double."""
 
-from .seeing import SENSORS, SPEED, Constants, Number, State, Whole, nominal_force, shown_force
-
+SENSORS = 5  # readings on the pantograph, the contact force last
+SPEED = 6  # place of the train's speed (m/s) among the inputs
+SAME = 5e-5
+"""Difference of two readings, in the observation's scale, below which a sensor seems to stand still."""
+STANDS = 2  # control steps in a row without a change after which a reading is held
+PATIENCE, RETURN = 1.2, 0.5
+"""Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
+(s) for which they must move again before it comes back."""
+LISTENING, LISTENING_SPANS = 2.0, 2.5
+"""Time (s) and number of spans, the longer of both, at the start in which the pantograph is passive and is
+listened to."""
+WINDOW, SHORT_WINDOW = 1.5, 0.4  # time constants (s) of the means and variances that the monitor compares
+SETTLED = 1.0  # time (s) of control, or without it at the start, after which the windows hold nothing else
+CALM, HEARD = 1.5, 0.9
+"""Time (s) after control has done harm in which its waves die out; time (s) of listening, after that, from
+which on the spread counts as heard while passive."""
+HARM, EARLY_HARM, SHORT_HARM = 1.0, 1.03, 1.2
+"""Ratios of the force's standard deviation to that without control, by the model, above which it fades: after
+``SETTLED``, before, and over the short window."""
+SPREAD, SHORT_SPREAD = 1.1, 1.3
+"""Ratios of the force's standard deviation, over the long window and the short one, to that last heard while
+passive above which control fades, whatever the model says."""
+PEAK = 1.3
+"""Ratio of the force's distance from its mean to the largest one heard while passive above which it fades."""
+CLAIM = 1.5
+"""Ratio of the force's short spread without control, by the model, to that heard while passive, from which on
+the force must vary less than it did while passive: else the model or the line is another one."""
+STRONG = 0.3
+"""Ratio of what control adds, by the model, to the spread heard while passive, below which neither the short
+window nor a single peak is control's doing."""
+QUIET = 0.1
+"""Ratio of the spread heard while passive to the nominal force below which there is nothing to calm."""
+SHIFT, SHIFT_WINDOW = 0.03, 5.0
+"""Share of the nominal force by which control may move the mean force, by the model; time constant of that
+mean (s)."""
+LOW = 0.2  # share of the nominal force below which the command may not take more away
+FADE_OUT, FADE_IN, PROBE = 0.2, 0.5, 3.0
+"""Times (s) in which the command fades out; in, after readings were held or a pause that showed no harm; and
+in after any other pause, so slowly that harm is seen while it is small."""
+HIGHEST = 20.0  # frequency (Hz) up to which the force's spread is compared, as in figures
+PAUSE, GROWTH, LONGEST_PAUSE = 3.0, 4.0, 128.0
+"""First time (s) that control pauses after harm, the factor from one pause to the next, and the longest."""
+CALMER = 0.85
+"""Ratio of the spread heard in a pause to that before, as it was or, by the model, without control, above
+which it was no harm."""
+GOOD = 20.0  # time (s) of control without harm after which the next pause is the first again
+FASTER = 1.2
+"""Ratio of speeds, of now and of when it last listened, from which on it listens anew. Up to it the spread
+that it heard is taken to grow with the square of the speed."""
 SHOWN = 9
 """Control steps whose readings, as shown, are kept."""
 STANDSTILL = 1.0
@@ -102,7 +124,7 @@ def check_readings(c: Constants, s: State) -> None:
     for k in range(SENSORS):
         s.shown[0, k] = s.shows[k]
     s.shown_steps = min(s.shown_steps + 1, SHOWN)
-    if c.memory_spans > 0 and s.sound_for < c.fault_steps:
+    if c.remembered > 0 and s.sound_for < c.fault_steps:
         forget_faulty_times(c, s)
 
 
@@ -168,9 +190,10 @@ def added_by_control(c: Constants, s: State) -> Number:
     for a in range(c.actions):
         command = s.past[a] * c.force_limit
         for i in range(c.states):
-            s.following_model[i] = c.model_b[a, i] * command
+            following = c.model_b[a, i] * command
             for j in range(c.states):
-                s.following_model[i] += c.model_a[a, i, j] * s.model[a, j]
+                following += c.model_a[a, i, j] * s.model[a, j]
+            s.following_model[i] = following
         for i in range(c.states):
             s.model[a, i] = s.following_model[i]
             added += c.model_c[a, i] * s.model[a, i]
@@ -277,3 +300,23 @@ def does_harm(c: Constants, s: State, speed: float) -> Whole:
         if lately > heard and spread(c, s, 1, 1) > CLAIM * heard:
             return 1
     return 0
+
+
+def nominal_force(c: Constants, s: State) -> Number:
+    """Static force and aerodynamic uplift in still air at the speed read (N); beyond a table its last one."""
+    force = c.static_force + c.aerodynamic * s.input[SPEED] * s.input[SPEED]
+    if c.uplift_points > 0:
+        force = force + c.uplift[0]
+        for k in range(c.uplift_points - 1):
+            wide = c.uplift_speed[k + 1] - c.uplift_speed[k]
+            into = min(max(s.input[SPEED] - c.uplift_speed[k], 0.0), wide)
+            force = force + into * (c.uplift[k + 1] - c.uplift[k]) / wide
+    return force
+
+
+def shown_force(c: Constants, s: State) -> Number:
+    """Contact force (N) that the observation shows, or its deviation from its average."""
+    shown = float(s.seen[c.force_entry])
+    if c.of_nominal:
+        return nominal_force(c, s) * (1.0 + c.force_scale * shown)
+    return c.force_centre + c.force_scale * shown
