@@ -3,7 +3,8 @@
 Policies behind the guard, on all lines, speeds, cases and journeys of the benchmark's tracks, under seeds
 that nothing was tuned on. Over any ten spans of a pass σ is to be at most 5 % above that of the passive
 pantograph, and no contact is to be lost that this keeps. --without: rules of the guard that are left out, by
-the names of their constants. --alone: the policies without it.
+the names of their constants. --alone: the policies without it. --first: seeds that are passed over, so that
+many can be run in parts.
 """
 
 import argparse
@@ -36,12 +37,12 @@ FIRST_SEED = 5_000_000
 """Nothing was trained, tuned or selected from here on."""
 
 
-def passes(tracks, seeds):
+def passes(tracks, first, seeds):
     """Track, number of its line, speed and seed."""
     for track in tracks:
         for number, line in enumerate(load_benchmark(f"benchmark/{track}").lines):
             for speed in line.speeds_kmh:
-                yield from ((track, number, speed, FIRST_SEED + seed) for seed in range(seeds))
+                yield from ((track, number, speed, FIRST_SEED + first + seed) for seed in range(seeds))
 
 
 def sliding(run):
@@ -87,12 +88,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("policies", nargs="*", default=POLICIES)
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first", type=int, default=0, help="seeds to pass over")
     parser.add_argument("--tracks", nargs="*", default=TRACKS)
     parser.add_argument("--without", nargs="*", default=())
     parser.add_argument("--alone", action="store_true", help="without the guard")
     given = parser.parse_args()
     policies = [each if given.alone else f"guarded:{each}" for each in given.policies]
-    todo = list(passes(given.tracks, given.seeds))
+    todo = list(passes(given.tracks, given.first, given.seeds))
     with counting("passes") as progress:
         found = in_processes(
             [partial(judge, policies, given.without, *one) for one in todo], progress=progress
