@@ -25,6 +25,7 @@ from panto_env.plant.train import Train
 
 from .. import line_energy
 from ..finite_element import simulation as finite_element
+from ..finite_element.sections import of_catalogue
 from ..marks import some_at_once
 
 EN, STIFFNESS = "en50318-2002", 5e5  # N/m, of its messenger supports
@@ -188,10 +189,10 @@ def test_undamped_line_keeps_its_energy_for_10_s(height, goes_slack, bar, precis
 )
 def test_agrees_with_finite_elements(line, pantograph, speed):
     """Both converged: sigma within 2 %; on EN 50318's line the other figures within 2 N and 0.5 mm."""
-    data = load_catenary(line)
+    data = of_catalogue(line)
     panto = load_pantograph(pantograph).model_copy(update={"force": "applied"})  # as finite elements take it
     part, distance = (1 if line == EN else 2), 6.0167 * data.span_length
-    run = simulate(line, panto, speed, spacing=0.125, time_step=2.5e-4 / part, distance=distance, **WHOLE)
+    run = simulate(data, panto, speed, spacing=0.125, time_step=2.5e-4 / part, distance=distance, **WHOLE)
     given = {"element": 0.5 / part, "time_step": 5e-4 / part, "distance": distance}
     other = finite_element.simulate(data, panto, speed, **given)
     ours, theirs = run.summary((5, 6)), finite_element.figures(other)
