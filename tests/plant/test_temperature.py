@@ -23,6 +23,7 @@ from panto_env.report.page import page
 from ..command import panto
 from ..finite_element.hermite import matrices, uniform_load
 from ..finite_element.static import GRAVITY, static_shape
+from ..finite_element.sections import of_catalogue
 from ..finite_element.system import _placement, build
 from .test_uneven import line_of
 
@@ -34,7 +35,7 @@ EA = {"contact_wire": 15e6, "messenger_wire": 10e6}
 
 def fixed(name, wires):
     """A line of the catalogue with these wires fixed at both ends."""
-    data = load_catenary(name)
+    data = of_catalogue(name)
     own = {each: getattr(data, each).model_copy(update={"axial_stiffness": EA[each]}) for each in wires}
     return data.model_copy(update=own)
 
