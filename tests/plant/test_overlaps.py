@@ -38,7 +38,8 @@ STITCHED_DROPPERS = {
 
 
 def line_of(overlaps=({"first_span": FIRST, "rises": RISES},), spans=SPANS, stitched=False, **changes):
-    table = of_catalogue("re330").model_dump(exclude={"sources", "spans", "steady_arm"}, exclude_none=True)
+    table = of_catalogue("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
+    table["steady_arm"] = {"mass": 0.0, "stiffness": 0.0}
     if stitched:
         table |= {"stitch_wire": STITCH, "droppers": table["droppers"] | STITCHED_DROPPERS}
     # The last support is a hair higher, so that the line is no uniform one without overlaps.

@@ -22,8 +22,8 @@ from panto_env.report.page import page
 
 from ..command import panto
 from ..finite_element.hermite import matrices, uniform_load
-from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.sections import of_catalogue
+from ..finite_element.static import GRAVITY, static_shape
 from ..finite_element.system import _placement, build
 from .test_uneven import line_of
 
