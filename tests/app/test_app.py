@@ -67,7 +67,7 @@ def test_bad_choices_are_errors_of_one_sentence():
     alone = look(QUICK._replace(policy="front-preview"))
     assert "no controlled one has any in front of it" in alone.error
     assert (alone.found, alone.requirements) == (None, [])
-    early = look(Choice(speed_kmh=420))
+    early = look(Choice(speed_kmh=400))
     assert re.fullmatch(r"The run ended early at .* It has no figures\.", early.error)
     assert early.found.run.terminated
 

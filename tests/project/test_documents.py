@@ -124,7 +124,6 @@ def folder(tmp_path, monkeypatch):
         "masts.csv",
         "overlap.toml",
         "curve-masts.csv",
-        "re250-arms.toml",
         "standard.toml",
         "droppers.toml",
     ):
