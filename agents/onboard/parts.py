@@ -12,7 +12,7 @@ import numpy as np
 from panto_baselines.policies.fb_ff import FORCE_RANGE, FeedbackFeedforward
 from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
 from panto_baselines.policies.guard_rules import SENSORS
-from panto_baselines.policies.guarded import FORCES, Guard, Guarded, state_of
+from panto_baselines.policies.guarded import Guard, Guarded, of_shown_force, state_of
 from panto_baselines.policies.line_model import Sampled, line_model, mean_line
 from panto_baselines.policies.repetitive import PEAKS, WASHED, Repetitive, WashoutSettings, harmonics
 from panto_env.base.arrays import METRES_PER_SECOND
@@ -75,7 +75,6 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
     pantograph, speed = context.pantograph, context.speed
     aerodynamic = pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
     uplift = np.array(pantograph.uplift_table or ((0.0, 0.0),))
-    force = next(each for each in layout.entries if each.name in FORCES)
     sources = [_source(each, front, actions) for each in layout.entries]
     constants: Table = {
         "inputs": seeing.FURTHER + front + (actions if context.washout else 0),
@@ -104,11 +103,7 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "uplift": uplift[:, 1].copy(),
         "force_limit": context.force_limit,
         "washout_share": float(episode.washout_share),
-        "force_entry": layout.entries.index(force),
-        "of_nominal": force.name == "force deviation",
-        "force_scale": force.scale,
-        "force_centre": force.centre,
-    }
+    } | of_shown_force(layout)
     inputs, sensors = constants["inputs"], SENSORS
     shapes = {
         "input": inputs,

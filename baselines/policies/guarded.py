@@ -27,7 +27,7 @@ from panto_env.control.entries import (
     READING_ENTRIES,
     earlier,
 )
-from panto_env.control.observation import Context
+from panto_env.control.observation import Context, Layout
 from panto_env.policies import find_policy, wishes
 
 from . import guard_rules
@@ -125,10 +125,8 @@ class Guard:
         self.constants = _of_readings(context) | _of_monitor(context, delay, lag)
         self.state = state_of(self.constants)
         entries = context.layout.entries
-        names = [entry.name for entry in entries]
-        self._speed = entries[names.index("speed")] if "speed" in names else None
-        self._speed_at = names.index("speed") if "speed" in names else 0
-        self._commands = [k for k, name in enumerate(names) if re.fullmatch("last .* action", name)]
+        self._speed = next(((k, entry) for k, entry in enumerate(entries) if entry.name == "speed"), None)
+        self._commands = [k for k, entry in enumerate(entries) if re.fullmatch("last .* action", entry.name)]
         self._c, self._s = (
             SimpleNamespace(**{name: _plain(value) for name, value in table.items()})
             for table in (self.constants, self.state)
@@ -141,8 +139,8 @@ class Guard:
         state = self._s
         state.seen = observation.copy()
         if self._speed is not None:
-            speed = float(observation[self._speed_at])
-            state.input[SPEED] = self._speed.centre + self._speed.scale * speed
+            place, entry = self._speed
+            state.input[SPEED] = entry.centre + entry.scale * float(observation[place])
         guard_rules.check_readings(self._c, state)
         return np.array(state.seen)
 
@@ -206,28 +204,34 @@ def _of_readings(context: Context) -> dict[str, Any]:
     }
 
 
-def _of_monitor(context: Context, delay: float, lag: float) -> dict[str, Any]:
-    """Constants by which control is judged: the force that is seen, a model of what it adds, the windows."""
-    from scipy.signal import butter, lfilter_zi  # slow to import
-
-    interval, line, layout = context.control_interval, mean_line(context), context.layout
-    models = [
-        Sampled(line_model(replace(context, channels=(channel,)), line, delay, lag), interval)
-        for channel in context.channels
-    ]
+def of_shown_force(layout: Layout) -> dict[str, Any]:
+    """Constants by which the contact force is read from an observation: see ``guard_rules.shown_force``."""
     force = next(entry for entry in layout.entries if entry.name in FORCES)
-    low_pass = butter(2, min(HIGHEST, 0.3 / interval), fs=1 / interval)
     return {
-        "actions": context.actions,
-        "force_limit": context.force_limit,
         "force_entry": layout.entries.index(force),
         "of_nominal": force.name == "force deviation",
         "force_scale": force.scale,
         "force_centre": force.centre,
+    }
+
+
+def _of_monitor(context: Context, delay: float, lag: float) -> dict[str, Any]:
+    """Constants by which control is judged: the force that is seen, a model of what it adds, the windows."""
+    from scipy.signal import butter, lfilter_zi  # slow to import
+
+    interval, line = context.control_interval, mean_line(context)
+    models = [
+        Sampled(line_model(replace(context, channels=(channel,)), line, delay, lag), interval)
+        for channel in context.channels
+    ]
+    low_pass = butter(2, min(HIGHEST, 0.3 / interval), fs=1 / interval)
+    return of_shown_force(context.layout) | {
+        "actions": context.actions,
+        "force_limit": context.force_limit,
         "static_force": context.nominal_force,  # that of the run, at any speed
         "aerodynamic": 0.0,
         "uplift_points": 0,
-        "knows_force": layout.kind != DEVIATIONS,
+        "knows_force": context.layout.kind != DEVIATIONS,
         "states": models[0].size,
         "model_a": np.array([model.a for model in models]),
         "model_b": np.array([model.b for model in models]),
