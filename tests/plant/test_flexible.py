@@ -8,6 +8,7 @@ from panto_env.plant import functions as interpolation
 from panto_env.plant.catenary.flexible.arrays import CONTACT, MESSENGER, PAD, STENCIL
 from panto_env.plant.catenary.flexible.build import at_rest, constants
 from panto_env.plant.catenary.flexible.grid import spring_levels
+from panto_env.plant.catenary.flexible.parts import SteadyArm
 from panto_env.plant.catenary.flexible.resolution import resolution
 from panto_env.plant.catenary.flexible.schema import Rayleigh, Support
 from panto_env.plant.catenary.flexible.static import solve
@@ -102,9 +103,9 @@ PULSES = pytest.mark.parametrize(("height", "goes_slack", "bar"), [(1e-3, False,
 
 
 def undamped(line):
-    return line.model_copy(
-        update={"damping": Rayleigh(alpha=0, beta=0), "support": Support(stiffness=STIFFNESS, damping=0)}
-    )
+    """A line without damping, and without steady arms, whose springs no energy here counts."""
+    changes = {"damping": Rayleigh(alpha=0, beta=0), "steady_arm": SteadyArm(mass=0, stiffness=0)}
+    return line.model_copy(update=changes | {"support": Support(stiffness=STIFFNESS, damping=0)})
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (3.0, 0.0), (0.0, 2e-3)])

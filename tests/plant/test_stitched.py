@@ -31,7 +31,6 @@ SPANS = 20
 
 def line_of(spans=SPANS, droppers=DROPPERS, **changes):
     table = of_catalogue("re330").model_dump(exclude={"sources", "spans"}, exclude_none=True)
-    table["steady_arm"] = {"mass": 0.0, "stiffness": 0.0}
     heavy = table["droppers"] | {"mass": 0.1, "contact_clamp_mass": 0.2, "messenger_clamp_mass": 0.3}
     table |= {"droppers": heavy | droppers, "stitch_wire": STITCH_WIRE}
     if "sequence" not in changes:
