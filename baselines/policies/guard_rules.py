@@ -167,6 +167,8 @@ def act_within_guard(c: Constants, s: State) -> None:
     if s.begun == 0:
         s.heard_at = speed
         s.waits = max(LISTENING, LISTENING_SPANS * c.mean_length / speed)
+    if s.waits > 0.0 and s.before > 0.0 and s.passive_for < s.settles:
+        s.before = max(s.before, spread(c, s, 0, 0))  # the waves of harm are part of it
     listen_while_passive(c, s, speed)
     pause_or_not(c, s, speed)
     heard_for = s.passive_for - s.settles
