@@ -12,10 +12,9 @@ import numpy as np
 from panto_baselines.policies.fb_ff import FORCE_RANGE, FeedbackFeedforward
 from panto_baselines.policies.feedback import Proportional, ProportionalDerivative
 from panto_baselines.policies.guard_rules import SENSORS
-from panto_baselines.policies.guarded import Guard, Guarded, of_shown_force, state_of
+from panto_baselines.policies.guarded import Guard, Guarded, of_nominal_force, of_shown_force, state_of
 from panto_baselines.policies.line_model import Sampled, line_model, mean_line
 from panto_baselines.policies.repetitive import PEAKS, WASHED, Repetitive, WashoutSettings, harmonics
-from panto_env.base.arrays import METRES_PER_SECOND
 from panto_env.base.errors import InputError
 from panto_env.control import Context, Task
 from panto_env.control.entries import CENTRED, DEVIATIONS, MEASURED, READING_ENTRIES, Entry, present
@@ -72,9 +71,6 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
     front, actions = len(layout.front), context.actions
     places, spans = len(layout.memory), layout.memory_spans if layout.memory else 0
     steps = episode.memory.kept.shape[1] if places else 1
-    pantograph, speed = context.pantograph, context.speed
-    aerodynamic = pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
-    uplift = np.array(pantograph.uplift_table or ((0.0, 0.0),))
     sources = [_source(each, front, actions) for each in layout.entries]
     constants: Table = {
         "inputs": seeing.FURTHER + front + (actions if context.washout else 0),
@@ -96,14 +92,10 @@ def _seen(name: str, task: Task, context: Context) -> tuple[Table, Table]:
         "memory_places": places,
         "memory_steps": steps,
         "steps_ahead": np.array(layout.memory) / context.control_interval,
-        "static_force": context.nominal_force - aerodynamic * speed**2 - pantograph.tabled_uplift(speed),
-        "aerodynamic": aerodynamic,
-        "uplift_points": len(pantograph.uplift_table),
-        "uplift_speed": uplift[:, 0] / METRES_PER_SECOND,
-        "uplift": uplift[:, 1].copy(),
         "force_limit": context.force_limit,
         "washout_share": float(episode.washout_share),
-    } | of_shown_force(layout)
+    }
+    constants |= of_shown_force(layout) | of_nominal_force(context)
     inputs, sensors = constants["inputs"], SENSORS
     shapes = {
         "input": inputs,

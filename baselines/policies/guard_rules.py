@@ -19,7 +19,8 @@ Number: TypeAlias = Any
 SENSORS = 5  # readings on the pantograph, the contact force last
 SPEED = 6  # place of the train's speed (m/s) among the inputs
 SAME = 5e-5
-"""Difference of two readings, in the observation's scale, below which a sensor seems to stand still."""
+"""Difference of two readings, in the observation's scale, below which a sensor seems to stand still; more
+where an entry changes with the speed."""
 STANDS = 2  # control steps in a row without a change after which a reading is held
 PATIENCE, RETURN = 1.2, 0.5
 """Time (s) for which readings are held before the command fades: the policy goes on with what it knew. Time
@@ -43,6 +44,8 @@ PEAK = 1.3
 CLAIM = 1.5
 """Ratio of the force's short spread without control, by the model, to that heard while passive, from which on
 the force must vary less than it did while passive: else the model or the line is another one."""
+SLIGHT = 0.05
+"""Ratio of what control adds, by the model, to the spread heard while passive below which it does no harm."""
 STRONG = 0.3
 """Ratio of what control adds, by the model, to the spread heard while passive, below which neither the short
 window nor a single peak is control's doing."""
@@ -91,7 +94,7 @@ def check_readings(c: Constants, s: State) -> None:
         read = float(s.seen[c.present[k]])
         s.shows[k] = read
         if s.begun == 1:
-            if abs(read - (1.0 - c.guard_share) * s.last[k]) < SAME:
+            if abs(read - (1.0 - c.guard_share) * s.last[k]) < c.same[k]:
                 s.stood[k] = min(s.stood[k] + 1, LONG_AGO)
             else:
                 s.stood[k] = 0
@@ -112,7 +115,7 @@ def check_readings(c: Constants, s: State) -> None:
     s.faulty[s.fault_at] = any_bad
     if s.begun == 1:
         if any_bad == 1:
-            s.held = min(s.held + c.interval, float(LONG_AGO))
+            s.held += c.interval
             s.sound_for = 0
         else:
             s.held = 0.0
@@ -154,7 +157,8 @@ def forget_faulty_times(c: Constants, s: State) -> None:
             ago = int(math.floor(steps + 0.5))  # noqa: RUF046 - C's floor gives a double
             for k in range(max(ago - 3, 1), min(ago + 4, c.fault_steps + 1)):
                 if s.faulty[(s.fault_at - k + 1 + c.fault_steps) % c.fault_steps] == 1:
-                    s.seen[c.remembered_entry[n]] = c.unknown * nominal_force(c, s)
+                    off = nominal_force(c, s) - c.unknown_centre[n] - c.unknown_slope[n] * s.input[SPEED]
+                    s.seen[c.remembered_entry[n]] = off * c.unknown_share[n]
 
 
 def act_within_guard(c: Constants, s: State) -> None:
@@ -172,14 +176,16 @@ def act_within_guard(c: Constants, s: State) -> None:
     listen_while_passive(c, s, speed)
     pause_or_not(c, s, speed)
     heard_for = s.passive_for - s.settles
-    if s.waits > 0.0 and s.waits <= c.interval and heard_for > HEARD and s.heard > CALMER * s.before:
+    ends = s.waits > 0.0 and s.waits <= c.interval
+    if ends and s.before > 0.0 and heard_for > HEARD and s.heard > CALMER * s.before:
         s.pause = PAUSE  # it was no better without
         s.fade_in = FADE_IN
-    s.waits = max(s.waits - c.interval, 0.0)
-    change = c.interval / s.fade_in
+    if s.held == 0.0 or math.isfinite(s.heard):
+        s.waits = max(s.waits - c.interval, 0.0)
     if s.waits > 0.0:
-        change = -c.interval / FADE_OUT
-    s.gate = min(max(s.gate + change, 0.0), 1.0)
+        s.gate = max(s.gate - c.interval / FADE_OUT, 0.0)
+    elif s.held == 0.0:  # it comes back by what is read now
+        s.gate = min(s.gate + c.interval / s.fade_in, 1.0)
     for a in range(c.actions):
         if c.knows_force and force < LOW * nominal_force(c, s) and added < 0.0:
             s.action[a] = max(s.action[a], 0.0)
@@ -233,24 +239,24 @@ def spread(c: Constants, s: State, window: int, what: int) -> Number:
 
 def listen_while_passive(c: Constants, s: State, speed: float) -> None:
     """Hear, while passive, how much the force varies; count how long control has acted."""
-    if s.gate == 0.0:
-        s.passive_for = min(s.passive_for + c.interval, float(LONG_AGO))
-    else:
+    if s.gate > 0.0:
         s.passive_for = 0.0
+    elif s.held == 0.0:
+        s.passive_for += c.interval
     calm_for = s.passive_for - s.settles
-    if calm_for > 0.0:
+    if calm_for <= 0.0:
+        s.listened = 0.0
+        s.quiet = 0.0
+    elif s.held == 0.0:
         s.listened = max(s.listened, abs(s.deviation))
         share = max(c.shares[0], c.interval / max(calm_for, c.interval))
         s.quiet += share * (s.deviation * s.deviation - s.quiet)
-    else:
-        s.listened = 0.0
-        s.quiet = 0.0
-    if calm_for > HEARD:
-        s.heard = math.sqrt(s.quiet)
-        s.heard_at = speed
-        s.most = s.listened
+        if calm_for > HEARD:
+            s.heard = math.sqrt(s.quiet)
+            s.heard_at = speed
+            s.most = s.listened
     if s.gate == 1.0:
-        s.acted_for = min(s.acted_for + c.interval, float(LONG_AGO))
+        s.acted_for += c.interval
     else:
         s.acted_for = 0.0
     if s.acted_for > GOOD:
@@ -264,10 +270,8 @@ def pause_or_not(c: Constants, s: State, speed: float) -> None:
             s.fade_in = FADE_IN
         s.waits = max(s.waits, RETURN)
     elif s.gate > 0.0 and s.waits == 0.0:
-        if abs(s.mean_added) > SHIFT * nominal_force(c, s):
-            s.before = 0.0
-            s.waits = PAUSE
-        elif s.heard < QUIET * nominal_force(c, s):
+        nominal = nominal_force(c, s)
+        if abs(s.mean_added) > SHIFT * nominal or s.heard < QUIET * nominal:
             s.before = 0.0
             s.waits = PAUSE
             s.fade_in = PROBE
@@ -286,6 +290,8 @@ def pause_or_not(c: Constants, s: State, speed: float) -> None:
 def does_harm(c: Constants, s: State, speed: float) -> Whole:
     """1 where the force varies more than it would without control, or did, or is farther off; else 0."""
     added = spread(c, s, 1, 2)
+    if max(added, spread(c, s, 0, 2)) < SLIGHT * s.heard:
+        return 0
     lately = spread(c, s, 1, 0)
     ratio = max(1.0, speed / s.heard_at)
     heard = s.heard * ratio * ratio
@@ -321,4 +327,4 @@ def shown_force(c: Constants, s: State) -> Number:
     shown = float(s.seen[c.force_entry])
     if c.of_nominal:
         return nominal_force(c, s) * (1.0 + c.force_scale * shown)
-    return c.force_centre + c.force_scale * shown
+    return c.force_centre + c.force_slope * s.input[SPEED] + c.force_scale * shown

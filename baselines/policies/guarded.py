@@ -18,6 +18,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from panto_env.base.arrays import METRES_PER_SECOND
 from panto_env.control.entries import (
     AVERAGED,
     CENTRED,
@@ -28,6 +29,7 @@ from panto_env.control.entries import (
     earlier,
 )
 from panto_env.control.observation import Context, Layout
+from panto_env.plant.speed import STRONGEST
 from panto_env.policies import find_policy, wishes
 
 from . import guard_rules
@@ -49,10 +51,10 @@ class Guarded:
 
     - a reading that stands still, or is exactly zero, is held at its last value; what memory shows of
       that time is taken for unknown. After ``PATIENCE`` the command fades out, until the reading has moved
-      again for ``RETURN``.
+      again for ``RETURN``. Nothing is heard meanwhile, and a command that has faded does not come back.
     - from a model of pantograph and mean line (``line_model``) and the command that was given, it knows what
       control has added to the contact force. If the force would vary less without (``HARM``), the command
-      fades out.
+      fades out, unless control adds next to nothing (``SLIGHT``).
     - so it does where the force varies more than it did while passive (``SPREAD``), which needs no model,
       where it is farther off than it was then (``PEAK``), and where the mean force is moved (``SHIFT``).
     - if by the model it would vary far more without control than it did while passive (``CLAIM``), but varies
@@ -178,6 +180,10 @@ def _of_readings(context: Context) -> dict[str, Any]:
     present = np.array([names.index(name) for name in own])
     entries = [layout.entries[place] for place in present]
     zeros = [-1.0 / FORCE_DEVIATION if e.name == "force deviation" else -e.centre / e.scale for e in entries]
+    by_speed = np.array([entry.slope / entry.scale for entry in entries])  # of an entry, for each m/s
+    if layout.kind == CENTRED:
+        lift = context.pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
+        by_speed[-1] += 2 * lift * context.speed / context.nominal_force / entries[-1].scale
     past = [[names.index(earlier(name, k)) for name in own] for k in range(1, layout.history + 1)]
     memory = [
         (place, int(span.split()[0]), float(ahead.split()[0]) / interval)
@@ -186,13 +192,15 @@ def _of_readings(context: Context) -> dict[str, Any]:
         for _, span, ahead in [name.split(", ")]
     ]
     entry, spans, ahead = zip(*memory, strict=True) if memory else ((0,), (0,), (0.0,))
+    unknown = [layout.entries[place] for place in entry]  # shows the nominal force
     return {
         "interval": interval,
         "mean_length": context.alignment.mean_length,
         "history": layout.history,
         "present": present,
         "earlier": np.array(past or [[0]]),
-        "zero": np.full(len(own), np.inf) if ending else np.array(zeros),
+        "zero": np.where([ending != "" or entry.slope != 0 for entry in entries], np.inf, zeros),
+        "same": guard_rules.SAME + STRONGEST * interval * np.abs(by_speed),
         # of an average, in a step
         "guard_share": 1 - math.exp(-interval / AVERAGED) if ending else 0.0,
         "fault_steps": LOOKED_BACK,
@@ -200,7 +208,9 @@ def _of_readings(context: Context) -> dict[str, Any]:
         "remembered_entry": np.array(entry),
         "remembered_spans": np.array(spans, dtype=float),
         "remembered_ahead": np.array(ahead),
-        "unknown": 0.0 if layout.kind in (CENTRED, DEVIATIONS) else 0.01,  # of the nominal force, in 100 N
+        "unknown_centre": np.array([each.centre for each in unknown]),
+        "unknown_slope": np.array([each.slope for each in unknown]),
+        "unknown_share": np.array([0.0 if ending else 1 / each.scale for each in unknown]),
     }
 
 
@@ -212,6 +222,21 @@ def of_shown_force(layout: Layout) -> dict[str, Any]:
         "of_nominal": force.name == "force deviation",
         "force_scale": force.scale,
         "force_centre": force.centre,
+        "force_slope": force.slope,
+    }
+
+
+def of_nominal_force(context: Context) -> dict[str, Any]:
+    """Constants by which the nominal force follows from the speed: see ``guard_rules.nominal_force``."""
+    pantograph, speed = context.pantograph, context.speed
+    aerodynamic = pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
+    uplift = np.array(pantograph.uplift_table or ((0.0, 0.0),))
+    return {
+        "static_force": context.nominal_force - aerodynamic * speed**2 - pantograph.tabled_uplift(speed),
+        "aerodynamic": aerodynamic,
+        "uplift_points": len(pantograph.uplift_table),
+        "uplift_speed": uplift[:, 0] / METRES_PER_SECOND,
+        "uplift": uplift[:, 1].copy(),
     }
 
 
@@ -225,22 +250,23 @@ def _of_monitor(context: Context, delay: float, lag: float) -> dict[str, Any]:
         for channel in context.channels
     ]
     low_pass = butter(2, min(HIGHEST, 0.3 / interval), fs=1 / interval)
-    return of_shown_force(context.layout) | {
-        "actions": context.actions,
-        "force_limit": context.force_limit,
-        "static_force": context.nominal_force,  # that of the run, at any speed
-        "aerodynamic": 0.0,
-        "uplift_points": 0,
-        "knows_force": context.layout.kind != DEVIATIONS,
-        "states": models[0].size,
-        "model_a": np.array([model.a for model in models]),
-        "model_b": np.array([model.b for model in models]),
-        "model_c": np.array([model.c[0] for model in models]),
-        "low_pass_a": low_pass[1],
-        "low_pass_b": low_pass[0],
-        "at_rest": lfilter_zi(*low_pass),
-        "shares": 1 - np.exp(-interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW])),
-    }
+    return (
+        of_shown_force(context.layout)
+        | of_nominal_force(context)
+        | {
+            "actions": context.actions,
+            "force_limit": context.force_limit,
+            "knows_force": context.layout.kind != DEVIATIONS,
+            "states": models[0].size,
+            "model_a": np.array([model.a for model in models]),
+            "model_b": np.array([model.b for model in models]),
+            "model_c": np.array([model.c[0] for model in models]),
+            "low_pass_a": low_pass[1],
+            "low_pass_b": low_pass[0],
+            "at_rest": lfilter_zi(*low_pass),
+            "shares": 1 - np.exp(-interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW])),
+        }
+    )
 
 
 def state_of(constants: dict[str, Any]) -> dict[str, Any]:

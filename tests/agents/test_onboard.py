@@ -57,6 +57,7 @@ CASES = {
     "guarded-frozen": ("guarded:agent-any-pantograph", FROZEN),
     "guarded-pd": ("guarded:pd", FROZEN),
     "guarded-harm": ("guarded:p:gain=2.5", HIGH_SPEED | {"distance": 2500.0}),
+    "guarded-braking": ("guarded:agent-any-pantograph", BRAKING),
     "pd-uplift-by-table": ("pd", PRESSED),
     "forward": ("fb+ff:dead_zone=10,gain=0.3", HIGH_SPEED),
     "centred": ("pd", HIGH_SPEED | {"observation": "centred"}),

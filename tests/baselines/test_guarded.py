@@ -6,7 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from panto_baselines.policies import guard_rules
-from panto_baselines.policies.guarded import Guarded, GuardedEnv
+from panto_baselines.policies.guarded import Guard, Guarded, GuardedEnv
 from panto_env import InputError, simulate
 from panto_env.catalog import load_catenary
 from panto_env.policies import check_named, find_policy, wishes
@@ -81,6 +81,61 @@ def test_a_faulty_reading_is_held_and_afterwards_as_without_the_fault(observatio
     past = own.read(f"{name if observation != 'centred' else 'force deviation'}, 1 step ago")
     if observation != "centred":
         np.testing.assert_allclose(past[310:379], during[0], atol=1e-2)
+
+
+FASTER = {"speed_profile": "place:0=200,400=250", "sensors": "ideal", "speed_drift": 0.0}
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [{"observation": "measured"}, {"normalise": (190.0, 310.0)}, {"observation": "centred"}],
+    ids=["measured", "own", "centred"],
+)
+def test_the_force_that_it_reads_is_the_contact_force(seen):
+    """Whatever the observation is, and while the speed changes, on which normalised entries depend."""
+    given = {name: value for name, value in (BUILT | FASTER | seen).items() if name != "record_droppers"}
+    env = gymnasium.make("Pantograph-v0", pantograph="dsa380", distance=400.0, run_in=2, settle=0, **given)
+    observation, _ = env.reset(seed=1)
+    guard = Guard(env.unwrapped.context, 0.0, 0.0)
+    for _ in range(200):
+        guard.checked(observation)
+        expected = env.unwrapped.context.layout.read(observation, "contact force")
+        assert guard_rules.shown_force(guard._c, guard._s) == pytest.approx(expected, abs=0.05)
+        guard.limited([0.0])
+        observation = env.step(np.zeros(1, np.float32))[0]
+
+
+@pytest.mark.parametrize("seen", [{"normalise": (190.0, 310.0)}, {"observation": "centred"}])
+def test_a_frozen_reading_is_held_while_the_speed_changes(seen):
+    fault = {"part": "force", "kind": "frozen", "begin": 2.0, "lasts": 100.0}
+    guarded = Guarded(Listener(**seen))
+    settings = BUILT | FASTER | {"sensors": "realistic"}
+    simulate("en50318-2002", "dsa380", policy=guarded, distance=350.0, faults=fault, **settings)
+    assert guarded._guard._s.held > 3
+
+
+def test_what_is_heard_while_passive_is_not_of_held_readings():
+    """A fault of 5 s while passive: what it holds then says nothing of how much the force varies."""
+
+    def listening(**more):
+        guarded = Guarded(Listener())
+        heard(guarded, **more)
+        return guarded._guard._s.heard
+
+    usual = listening()
+    for begin in (2.6, 2.7, 2.8):
+        fault = {"part": "force", "kind": "silent", "begin": begin, "lasts": 5.0}
+        assert listening(faults=fault) == pytest.approx(usual, rel=0.15)
+
+
+def test_it_stays_passive_until_it_has_heard_the_line():
+    """Readings that are silent from the start on: it cannot know how much the force varies."""
+    fault = {"part": "readings", "kind": "silent", "begin": 0.0, "lasts": 100.0}
+    pushing = Listener(0.5)
+    run = simulate(
+        "en50318-2002", "dsa380", 280.0, policy=Guarded(pushing), distance=500.0, faults=fault, **BUILT
+    )
+    assert np.abs(run.frame_force).max() < 1e-9
 
 
 def test_it_listens_first_and_then_does_what_the_policy_does():
@@ -183,9 +238,10 @@ def test_a_changing_speed_is_no_harm():
 
 @pytest.mark.longer
 def test_an_environment_behind_the_guard_does_what_the_guarded_policy_does():
-    """Readings of a second in four are silent, and `pd` is driven at a gain at which the guard fades it."""
+    """Readings are silent for two seconds, so that the guard fades `pd`."""
     given = {name: value for name, value in BUILT.items() if name != "record_droppers"}
-    given |= {"faults": "readings-silent", "speed_kmh": 280.0, "distance": 500.0, "run_in": 2, "settle": 0}
+    given |= {"speed_kmh": 280.0, "distance": 700.0, "run_in": 2, "settle": 0}
+    given["faults"] = {"part": "readings", "kind": "silent", "begin": 6.5, "lasts": 2.0}
     given["observation"] = "measured"
     env = gymnasium.make("panto_env:Pantograph-v0", pantograph="dsa380", **given)
     outcomes = []
