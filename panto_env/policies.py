@@ -103,16 +103,22 @@ def check_named(policy: str, where: str | Path) -> None:
     Anyone may have written the file, and the code would have all rights of the user, who has not named it.
     Our own model files hold no code; those of other loaders may. where: the file, for the message.
     """
-    kind, _ = _kind(policy)
-    if kind == "installed":  # its parameters may name others
-        for name in _named_in(policy.partition(":")[2]):
-            check_named(name, where)
-    if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
+    for name in code_named(policy):
         raise InputError(
-            f"{where} names the policy {shown(policy)}, but a file may name only installed policies and "
+            f"{where} names the policy {shown(name)}, but a file may name only installed policies and "
             f"model files ({MODELS}): code from a path runs only where you name it yourself, on the command "
             "line or in Python."
         )
+
+
+def code_named(policy: str) -> Iterator[str]:
+    """Names within that of a policy, or this one itself, whose code comes from a path."""
+    kind, _ = _kind(policy)
+    if kind == "installed":  # its parameters may name others
+        for name in _named_in(policy.partition(":")[2]):
+            yield from code_named(name)
+    if kind == "code" or (kind == "model" and Path(policy).suffix != MODELS):
+        yield policy
 
 
 def _named_in(parameters: str) -> Iterator[str]:

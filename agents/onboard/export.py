@@ -187,7 +187,9 @@ def _task(driver: Any, facts: Facts | None, settings: dict[str, Any]) -> Task:
     # The memory of earlier spans must hold them at the lowest speed of the training.
     given |= {"speed_kmh": (float(slowest), float(high)), "pantograph_scatter": 0.0, "faults": ()}
     given |= wishes(driver) | settings
-    task = Task(on_example(run_settings(given)), keep_samples=False)
+    example = on_example(run_settings(given))
+    speeds = (float(slowest), float(np.max(example.speed_kmh)))  # a drawn line may have fewer
+    task = Task(example.model_copy(update={"speed_kmh": speeds}), keep_samples=False)
     task.reset(0, np.random.default_rng(0))
     return task
 

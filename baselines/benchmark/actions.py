@@ -50,7 +50,10 @@ def read(path: str | Path, expected: str) -> list[Played]:
     """Actions of all passes. Raises InputError unless they are whole and have the expected checksum."""
     try:
         _, arrays = read_arrays(path)
-        each = np.split(arrays["actions"], np.cumsum(arrays["steps"])[:-1])
+        columns = arrays.get("columns", np.ones(1, int))
+        each = np.split(arrays["actions"], np.cumsum(arrays["steps"] * columns)[:-1])
+        if "columns" in arrays:
+            each = [one.reshape(-1, count) for one, count in zip(each, columns, strict=True)]
         passes = [Played(one, float(time)) for one, time in zip(each, arrays["washout"], strict=True)]
     except FileNotFoundError as error:
         raise InputError(
@@ -65,12 +68,15 @@ def read(path: str | Path, expected: str) -> list[Played]:
 
 
 def _arrays(passes: Sequence[Played]) -> dict[str, NDArray[np.generic]]:
-    """All passes one after the other."""
-    return {
-        "actions": np.concatenate([each.actions for each in passes]),
+    """All passes one after the other; where their numbers of actions differ, flat, with these numbers."""
+    found: dict[str, NDArray[np.generic]] = {
         "steps": np.array([len(each.actions) for each in passes]),
         "washout": np.array([each.washout for each in passes]),
     }
+    columns = np.array([each.actions.shape[1] for each in passes])
+    if (columns == columns[0]).all():
+        return {"actions": np.concatenate([each.actions for each in passes])} | found
+    return {"actions": np.concatenate([each.actions.ravel() for each in passes]), "columns": columns} | found
 
 
 STRIDE = 0.5

@@ -35,6 +35,7 @@ from panto_env.policies import (
     Policy,
     PolicyError,
     checked_action,
+    code_named,
     errors_name,
     find_policy,
     policy_names,
@@ -61,9 +62,14 @@ def find_apart(source: Any, trusted: bool, number: int = 0) -> Any:
     in this process, as do installed policies if they are ``trusted``. Raises InputError where the policy
     doesn't exist or cannot be made.
     """
-    if not isinstance(source, str) or (trusted and source.partition(":")[0] in policy_names()):
+    if not isinstance(source, str) or (trusted and _installed(source)):
         return find_policy(source)
     return PolicyApart(source, number)
+
+
+def _installed(source: str) -> bool:
+    """Whether a policy is installed, and so are those that its parameters name."""
+    return source.partition(":")[0] in policy_names() and not any(code_named(source))
 
 
 class PolicyApart:
@@ -75,7 +81,7 @@ class PolicyApart:
         Raises InputError if it cannot be made.
         """
         self._source = source
-        self._process = "" if source.partition(":")[0] in policy_names() else source, number
+        self._process = "" if _installed(source) else source, number
         wished = json.loads(self._ask("being loaded", PREPARATION_LIMIT))
         with errors_name(source, "being loaded"):
             run_settings(wished)

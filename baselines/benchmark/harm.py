@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from panto_env.base.arrays import Array
 from panto_env.base.errors import beside
@@ -75,8 +76,8 @@ class Harm:
             **{name: sum(getattr(harm, name) for harm in each) for name in counts},
             worst=worst.worst,
             worst_at=f"{place}, {worst.worst_at}",
-            lowest_minimum=max(harm.lowest_minimum for harm in each),
-            most_uplift=max(harm.most_uplift for harm in each),
+            lowest_minimum=max((harm.lowest_minimum for harm in each), key=last_if_nan),
+            most_uplift=max((harm.most_uplift for harm in each), key=last_if_nan),
         )
 
 
@@ -98,18 +99,22 @@ def harm_of(rows: Sequence[Row], passive_rows: Sequence[Row]) -> Harm:
     loss, passive_loss = figure("contact_loss")
     minimum, passive_minimum = figure("min")
     uplift, passive_uplift = figure("max_uplift")
-    below, above = (passive_minimum - minimum).max(axis=0), (uplift - passive_uplift).max(axis=0)
+    below, above = passive_minimum - minimum, uplift - passive_uplift
+
+    def passes_with(harmful: NDArray[np.bool_]) -> int:
+        return int(harmful.any(axis=0).sum())
+
     return Harm(
         passes=len(rows),
-        sigma=int(np.sum(changes.max(axis=0) > WORSE["sigma"])),
-        loss=int(np.sum((loss - passive_loss).max(axis=0) > WORSE["loss"])),
-        lost=int(np.sum(((loss > 0) & (passive_loss == 0)).any(axis=0))),
-        minimum=int(np.sum(below > WORSE["minimum"])),
-        uplift=int(np.sum(1e3 * above > WORSE["uplift"])),
+        sigma=passes_with(changes > WORSE["sigma"]),
+        loss=passes_with(loss - passive_loss > WORSE["loss"]),
+        lost=passes_with((loss > 0) & (passive_loss == 0)),
+        minimum=passes_with(below > WORSE["minimum"]),
+        uplift=passes_with(1e3 * above > WORSE["uplift"]),
         worst=float(changes[late, number]),
         worst_at=f"seed {rows[number].seed}" + (", late" if late else ""),
-        lowest_minimum=float(below.max()),
-        most_uplift=float(above.max()),
+        lowest_minimum=float(max(below.flat, key=last_if_nan)),
+        most_uplift=float(max(above.flat, key=last_if_nan)),
     )
 
 

@@ -93,7 +93,7 @@ def standings(
     places = [cell.place for cell in own_cells[REFERENCE]]
     everywhere = [name for name, own in own_cells.items() if [cell.place for cell in own] == places]
     passive = own_rows[REFERENCE]
-    names = [(row.catenary, row.pantograph) for row in passive]  # a seed is one line in all cases
+    names = [row.catenary for row in passive]  # a seed is one line for all pantographs and cases
     lines = {name: k for k, name in enumerate(dict.fromkeys(names))}
     clusters = Clusters(np.array([lines[name] for name in names]), np.array([row.seed for row in passive]))
     changes = {name: relative_changes(own_rows[name])[None] for name in everywhere}
@@ -107,7 +107,7 @@ def standings(
     ranked = sorted(found[name].change for name in changes if not found[name].disqualified)
     for name, own in changes.items():
         shares = {
-            other: share_of(own[:, None] < theirs, clusters)
+            other: share_of(own[:, None] < np.where(np.isnan(theirs), np.inf, theirs), clusters)
             for other, theirs in changes.items()
             if other != name
         }

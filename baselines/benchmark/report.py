@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, groupby, pairwise
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -113,12 +113,16 @@ def margins_table(title: str, lines: Sequence[Mapping[str, Any]], cells: Sequenc
         of_case[cell.policy, cell.case].append(cell.change)
 
     def crossing(policy: str, name: str) -> str:
-        """The value at which changes, in the order of the values, first rise above 0."""
+        """The value at which changes, in the order of the values, first rise above 0; "–" if a run failed."""
         cases = sorted((line["sweep"][name], line["case"]) for line in lines if name in line.get("sweep", {}))
-        found = [(value, float(np.mean(of_case[policy, case]))) for value, case in cases]
+        found = [(value, float(np.mean(of_case[policy, case] or nan))) for value, case in cases]
+        if not np.isfinite([change for _, change in found]).all():
+            return "–"
+        if found[0][1] > 0:
+            return f"{found[0][0]:g}"
         for (low, before), (high, after) in pairwise(found):
             if after > 0:
-                return f"{low:g}" if before > 0 else f"{low + (high - low) * before / (before - after):.3g}"
+                return f"{low + (high - low) * before / (before - after):.3g}"
         return f"> {found[-1][0]:g}"
 
     policies = dict.fromkeys(cell.policy for cell in cells if cell.policy != REFERENCE)

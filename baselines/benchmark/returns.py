@@ -64,10 +64,10 @@ def returns(
     """
     if identifier not in IDS:
         raise InputError(f"Unknown id '{identifier}': known are {', '.join(IDS)}.")
-    lines = {(cell.catenary, cell.pantograph) for cell in result.cells}
+    lines = [Line.model_validate(each) for each in result.settings["lines"]]
     if len(lines) != 1:
-        raise InputError(f"A result of one line is needed, not of {len(lines)}; take another one.")
-    (line,) = (Line.model_validate(each) for each in result.settings["lines"])
+        raise InputError(f"A result of one line or case is needed, not of {len(lines)}; take another one.")
+    (line,) = lines
     if len(line.controlled) > 1:
         numbers = " and ".join(map(str, line.controlled))
         raise InputError(f"A result of one controlled pantograph is needed, not of {numbers}.")

@@ -24,6 +24,7 @@ from panto_env.control.lines import fewest_spans, on_example
 from panto_env.control.settings import far_enough, run_settings
 from panto_env.metrics.figures import FIRST_SETTLED, HEADINGS, LAST_USUAL
 from panto_env.plant.catenary.schema import CLEAR
+from panto_env.policies import code_named
 
 from ..oracle.stored import stored_changes
 from . import actions, apart
@@ -142,10 +143,10 @@ def run(
 
 
 def _learnt(jobs: Sequence[Callable[[], Pass]], passes: Sequence[Pass]) -> tuple[str, ...]:
-    """Policies of Python files whose last and first pass, each played again alone, differ in a bit."""
+    """Policies with code from a path whose last and first pass, each played again alone, differ in a bit."""
     own = defaultdict(list)
     for k, each in enumerate(passes):
-        if each.row.policy.partition(":")[0].endswith(".py") and not control_of(each.row.policy):
+        if not control_of(each.row.policy) and any(code_named(each.row.policy)):
             own[each.row.policy].append(k)
 
     def differs(k: int) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -152,10 +153,16 @@ def read_submission(folder: str | Path) -> tuple[Card, str, tuple[str, ...]]:
     if not source.is_file():
         raise InputError(f"{path} names the policy '{card.policy}', but there is no file {source}.")
     try:
-        requirements = tuple(required.read_text("utf-8").split()) if required.exists() else ()
+        requirements = _requirements(required.read_text("utf-8")) if required.exists() else ()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{required} could not be read: write it as text in UTF-8.") from error
     return card, ":".join((str(source), *rest)), requirements
+
+
+def _requirements(text: str) -> tuple[str, ...]:
+    """Lines of a file for pip, without comments."""
+    lines = (re.sub(r"(^|\s)#.*", "", line).strip() for line in text.splitlines())
+    return tuple(line for line in lines if line)
 
 
 def check(

@@ -55,6 +55,7 @@ def leaderboard(result: Result) -> PageTable:
         share = one.better_than.get(after.get(one.policy) or "")
         return Entry("–") if share is None else _share(share.share)._replace(note=share.between)
 
+    # max(nan, 0.0) is nan, which is shown as such
     columns: list[Column[Standing]] = [
         *_first_columns(result.standings, result.method_of),
         ("CL (%)", lambda one: _figure(one.contact_loss, 2)),
@@ -68,9 +69,9 @@ def leaderboard(result: Result) -> PageTable:
         ("CL higher in", lambda one: _figure(one.harm.loss, 0)),
         ("contact lost in", lambda one: _figure(one.harm.lost, 0)),
         ("minimum lower in", lambda one: _figure(one.harm.minimum, 0)),
-        ("at most by (N)", lambda one: _figure(max(0.0, one.harm.lowest_minimum), 0)),
+        ("at most by (N)", lambda one: _figure(max(one.harm.lowest_minimum, 0.0), 0)),
         ("uplift higher in", lambda one: _figure(one.harm.uplift, 0)),
-        ("at most by (mm)", lambda one: _figure(max(0.0, 1e3 * one.harm.most_uplift), 1)),
+        ("at most by (mm)", lambda one: _figure(max(1e3 * one.harm.most_uplift, 0.0), 1)),
         ("better than the next in", better),
         ("effort (N)", lambda one: _figure(one.effort, 1)),
         ("mechanical power (W)", lambda one: _figure(one.power, 1)),

@@ -73,6 +73,9 @@ def judge(policies, without, track, number, speed, seed):
     for run in runs:
         worst, lost_alone = (-math.inf, 0), 0
         for own, than in zip(run.train, passive.train, strict=True):
+            if own.terminated and not than.terminated:  # it broke off where passive went on
+                worst, lost_alone = (math.inf, 0), lost_alone + 1
+                continue
             (std, lost), (quiet, lost_too) = sliding(own), sliding(than)
             length = min(len(std), len(quiet))
             changes = 100 * (std[:length] / quiet[:length] - 1)

@@ -98,6 +98,8 @@ def test_only_trusted_and_installed_policies_run_beside_the_plant(tmp_path):
     file = written(tmp_path, "return np.zeros(1)")
     assert isinstance(find_apart("pd", trusted=False), PolicyApart)
     assert isinstance(find_apart(file, trusted=True), PolicyApart)
+    assert isinstance(find_apart(f"guarded:{file}", trusted=True), PolicyApart)
+    assert not isinstance(find_apart("guarded:pd", trusted=True), PolicyApart)
     assert not isinstance(find_apart("pd", trusted=True), PolicyApart)
 
 

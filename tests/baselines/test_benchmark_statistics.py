@@ -1,5 +1,6 @@
 """The benchmark's cells and standings of passes made up by hand: means, pairs, who is ranked and how."""
 
+import math
 from dataclasses import fields, replace
 
 import numpy as np
@@ -157,6 +158,30 @@ def test_standings_are_over_all_cells():
     low, high = a.interval
     assert low < a.change < high
     assert found["passive"].interval is None
+
+
+def test_a_pass_that_ended_early_is_lost_against_one_that_did_not():
+    rows = [row("passive", k) for k in range(4)]
+    rows += [row("a", k, std=0.5) for k in range(4)] + [row("b", k, std=math.nan) for k in range(4)]
+    found = {each.policy: each for each in standings(rows, statistics.compare(rows))}
+    assert found["a"].better_than["b"].share == 1.0
+    assert found["b"].better_than["a"].share == 0.0
+
+
+def test_two_pantographs_on_a_line_are_no_two_lines():
+    """Their seeds draw the same line, so their passes say no more of other lines."""
+    random = np.random.default_rng(1)
+    own = random.uniform(0.4, 0.9, 8)
+    widths = []
+    for names in (("p",), ("p", "q")):
+        rows = [
+            replace(row(policy, k, std=std), pantograph=name)
+            for name in names
+            for policy, stds in (("passive", np.ones(8)), ("a", own))
+            for k, std in enumerate(stds)
+        ]
+        widths.append(np.ptp(standings(rows, statistics.compare(rows))[1].interval))
+    assert widths[1] == pytest.approx(widths[0], rel=0.05)
 
 
 def test_a_standing_s_effort_power_and_saturation_are_means_of_the_cells():

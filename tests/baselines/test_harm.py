@@ -1,12 +1,13 @@
 """Harm and the late window: what they count, and cheap policies that try to win by one window alone."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from panto_baselines.benchmark import run as benchmark
-from panto_baselines.benchmark.harm import harm_of, window_changes
+from panto_baselines.benchmark.harm import Harm, harm_of, window_changes
 from panto_baselines.benchmark.overall import standings
 from panto_baselines.benchmark.report import harm_table, kilometre_tables, margins_table
 from panto_baselines.benchmark.run import evaluated_windows
@@ -103,6 +104,17 @@ def test_minimum_and_uplift_are_counted_with_the_worst():
     assert table.cells[0][-3:] == ("1 (5 N)", "1 (3 mm)", "3")
 
 
+def test_harm_passes_over_what_has_no_figure():
+    """A pass whose early mean no passive pantograph has, and one that ended early."""
+    late = row("a", 0, std=1.2, min=40.0)
+    nowhere = replace(late, pressed_std=math.nan, late=late)
+    harm = harm_of([nowhere], [replace(row(min=50.0), late=row(min=50.0))])
+    assert (harm.sigma, harm.worst) == (1, pytest.approx(20))
+    ended = harm_of([row("a", std=math.nan, min=math.nan)], [row(min=50.0)])
+    for parts in (("a", harm), ("b", ended)), (("b", ended), ("a", harm)):
+        assert Harm.over(parts).lowest_minimum == pytest.approx(10.0)
+
+
 LATE = {"late_spans": (30, 32), "policies": ["passive"], "seeds": 1}
 
 
@@ -193,6 +205,20 @@ def test_margins_are_where_a_policy_meets_the_passive_pantograph():
     assert table.headings == ("policy", "delay (ms)", "gain")
     assert table.cells == [("p", f"{20 + 20 * 10 / 15:.3g}", "> 2")]
     assert margins_table("track", [{"case": "d"}], compare(rows)) is None
+
+
+@pytest.mark.parametrize(
+    ("stds", "shown"),
+    [((0.6, 0.8, math.nan), "–"), ((0.6, math.nan, 1.3), "–"), ((1.5, 0.9, 0.9), "0"), ((0.6, 0.8), "> 20")],
+)
+def test_a_margin_needs_a_figure_of_every_case(stds, shown):
+    lines = [{"case": f"{k}", "sweep": {"delay (ms)": 20 * k}} for k in range(len(stds))]
+    rows = [
+        replace(row(name, std=own), case=f"{k}")
+        for k, std in enumerate(stds)
+        for name, own in (("passive", 1), ("p", std))
+    ]
+    assert margins_table("track", lines, compare(rows)).cells == [("p", shown)]
 
 
 CHEATS = '''

@@ -12,7 +12,7 @@ from panto_baselines.benchmark import run as benchmark
 from panto_baselines.benchmark.actions import Played
 from panto_baselines.benchmark.settings import BenchmarkSettings, Line, Windows
 from panto_baselines.benchmark.single_pass import drive, run_pass
-from panto_baselines.benchmark.submission import replay
+from panto_baselines.benchmark.submission import read_submission, replay
 from panto_env import InputError, simulate
 from panto_env.base.checksums import read_checked, write_checked
 from panto_env.base.settings import parse
@@ -101,6 +101,24 @@ def test_an_action_that_was_changed_by_a_billionth_is_found(result, tmp_path):
     assert done.exit_code == 1
     assert "1 of 3 rows do not follow" in " ".join(done.stdout.split())
     assert called(command.replay, path, "--workers", 1, "--tolerance", 1e-4).exit_code == 0
+
+
+def test_requirements_of_a_submission_are_its_lines(tmp_path):
+    card = dict.fromkeys(("name", "description", "licence", "learnt_from"), "x")
+    card |= {"policy": "mine.py:Mine", "authors": ["x"]}
+    (tmp_path / "card.toml").write_text("".join(f"{name} = {value!r}\n" for name, value in card.items()))
+    (tmp_path / "mine.py").write_text("")
+    (tmp_path / "requirements.txt").write_text("# of ours\nnumpy >= 1.26  # fast\n\nscipy[all]\n")
+    assert read_submission(tmp_path)[2] == ("numpy >= 1.26", "scipy[all]")
+
+
+def test_passes_with_one_actuator_and_with_two_are_kept_side_by_side(tmp_path):
+    passes = [Played(np.full((steps, count), 0.1 * steps), 0.0) for steps, count in ((3, 1), (4, 2), (2, 1))]
+    actions.save(passes, tmp_path / "a.safetensors")
+    for read, own in zip(
+        actions.read(tmp_path / "a.safetensors", actions.digest(passes)), passes, strict=True
+    ):
+        np.testing.assert_array_equal(read.actions, own.actions)
 
 
 @pytest.mark.longer

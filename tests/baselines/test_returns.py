@@ -102,11 +102,12 @@ def test_every_ingredient_is_a_valid_change_of_the_id(name):
 
 
 def test_results_of_several_lines_and_unknown_ids_are_refused():
-    cells = [SimpleNamespace(catenary=name, pantograph="p", speed_kmh=300.0) for name in ("a", "b")]
-    with pytest.raises(InputError, match="one line"):
-        returns(SimpleNamespace(cells=cells))
+    line = {"catenary": "en50318-2002", "pantograph": "dsa380", "speeds_kmh": [280]}
+    for other in ({"catenary": "re330"}, {"case": "another"}):
+        with pytest.raises(InputError, match="one line or case is needed, not of 2"):
+            returns(SimpleNamespace(settings={"lines": [line, line | other]}))
     with pytest.raises(InputError, match="Unknown id"):
-        returns(SimpleNamespace(cells=cells[:1]), "Pantograph-v9")
+        returns(SimpleNamespace(settings={"lines": [line]}), "Pantograph-v9")
 
 
 def result_of_train(controlled):
