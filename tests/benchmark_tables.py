@@ -38,7 +38,7 @@ BEST = 3
 SHOWN = {
     "agent-any-pantograph": "learned, for four pantographs",
     "agent-robust": "learned, also with faults",
-    "agent-small": "learned, in 4 kB",
+    "agent-small": "learned, 4 kB of weights",
     "repetitive": "learns during the run",
     "fb+ff:gain=0.3,washout=1": "paper 1's",
     "pd:washout=1": "feedback",

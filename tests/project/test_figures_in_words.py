@@ -163,7 +163,7 @@ SENTENCES = {
             ],
         ),
         (
-            "leaves `agent-any-pantograph` −{:.0f} of −{:.0f} %, −{:.0f} % behind the guard",
+            "`agent-any-pantograph` has −{:.0f} % instead of −{:.0f} %, behind the guard −{:.0f} %",
             lambda: [
                 case("faults", policy, which)
                 for policy, which in (
@@ -202,7 +202,7 @@ SENTENCES = {
         ),
         ("no ranked one is above {:.1f} %", lambda: [max(abs(each["most_moved"]) for each in ranked())]),
         (
-            "of {} places in the rankings, {} have none",
+            "more than 1.5 % in a pass: of {}, {} never do",
             lambda: (len(ranked()), sum(each["moved"] == 0 for each in ranked())),
         ),
     ],
