@@ -147,7 +147,7 @@ def test_a_line_that_ends_before_has_one_window():
 
 @pytest.mark.slow
 def test_tracks_of_lines_that_nobody_fitted_have_two_windows():
-    for track in ("any-line", "unknown-line", "long"):
+    for track in ("any-line", "unknown-line", "train-both", "train-trailing", "long"):
         assert load_benchmark(f"benchmark/{track}").late_spans == (101, 110)
 
 

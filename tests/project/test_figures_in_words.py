@@ -342,7 +342,7 @@ SENTENCES = {
             ),
         ),
         (
-            "on the track train-trailing: −{:.1f} % (−{:.1f} to −{:.1f}), first at each speed",
+            "on the track train-trailing: −{:.1f} % (−{:.1f} to −{:.1f}), first at 200 and 250 km/h",
             lambda: np.array(less("train-trailing", "agent-trailing"))[[0, 2, 1]],
         ),
         (
