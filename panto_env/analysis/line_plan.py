@@ -96,14 +96,14 @@ class LinePlan:
             [value for each in self.supports if not math.isnan(value := getattr(each, name))]
             for name in ("still_pull", "pull", "slope")
         )
-        out = max(abs(each.windy) for each in self.spans)
+        out = max(max(abs(each.still), abs(each.windy)) for each in self.spans)  # wind may blow it back
         windy = any(self.loads)
         found = [
             Criterion(
                 "smallest_radial_force", "minimum pull of a steady arm in still air", "N", min(still),
                 LEAST_PULL, None, PULL_SOURCE,
             ),
-            Criterion("largest_radial_force", "maximum pull of a steady arm", "N", max(pulls)),
+            Criterion("largest_radial_force", "maximum pull of a steady arm", "N", max(still + pulls)),
             Criterion(
                 "lateral_position", "maximum lateral position of the contact wire", "m", out,
                 None, DEVIATION[head], DEVIATION_SOURCE,
@@ -127,7 +127,7 @@ class LinePlan:
                 Criterion("rise_in_wind", "rise or fall of a support in the wind", "mm", 1e3 * highest)
             )
         if slopes:
-            found.append(Criterion("arm_slope", "maximum slope of a steady arm", "°", max(slopes)))
+            found.append(Criterion("arm_slope", "maximum slope of a steady arm", "°", max(map(abs, slopes))))
         return found
 
     def tables(self, name: Callable[[int], str] = str) -> list[Table]:

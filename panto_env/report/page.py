@@ -46,8 +46,8 @@ def page_template(package: str, **filters: Callable[..., Any]) -> Template:
 LEFT_OUT = (
     "crossings, and of section insulators and neutral sections all but mass, spring and height (points)",
     "two contact wires where the line gives one equivalent wire; with both, their distance across the head",
-    "sideways waves, except as a damper where asked for: stagger, curves and wind act at rest, through steady "
-    "arms",
+    "sideways waves, except as a damper where asked for: stagger, curves and wind act at rest, through "
+    "steady arms",
     "wind on stitch wires, droppers and arms, waves of pressure in tunnels; ice and temperature that differ "
     "along the line",
     "third rails",

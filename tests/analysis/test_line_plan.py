@@ -163,3 +163,26 @@ def test_a_survey_of_equal_spans_is_seen_from_above_where_it_has_all_staggers(ba
         assert f"{missing} of 13 masts have no stagger, and theirs is assumed" in told
     else:
         assert "Support 7 (M6) of line 'masts' has no stagger" in result.stderr.replace("\n", " ")
+
+
+def planned(plan, **changes):
+    """en50318-2002 with a plan and arms by their length."""
+    line = load_catenary("en50318-2002").model_dump(exclude={"sources"}, exclude_none=True)
+    arm = {"mass": 1.5, "length": 1.2}
+    return FlexibleCatenaryData.model_validate(line | {"plan": plan, "steady_arm": arm} | changes)
+
+
+def test_wind_that_blows_the_wire_back_hides_no_broken_limit():
+    """At a radius of 1 km the middle lies 0.45 m out in still air; wind from outside brings it in."""
+    line = planned({"stagger": [0.0], "radius": 1000.0})
+    blown = NEW.model_copy(update={"side_wind": -25.0})
+    found = {each.key: each for each in line_plan(line, blown).criteria()}
+    assert found["lateral_position"].value == pytest.approx(0.45, abs=0.02)
+    assert not found["lateral_position"].kept
+    assert found["largest_radial_force"].value == pytest.approx(1200, rel=0.01)
+
+
+def test_points_beyond_the_spans_that_are_shown_do_no_harm_in_wind():
+    line = planned({"stagger": [0.3, -0.3]}, spans=40, points=[{"span": 30, "offset": 20.0, "mass": 8.0}])
+    blown = NEW.model_copy(update={"side_wind": 20.0})
+    assert line_plan(line, blown).criteria()

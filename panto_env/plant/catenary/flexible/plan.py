@@ -233,7 +233,7 @@ def pulled_arms(layout: Layout) -> list[PulledArm]:
             continue
         carried = float(weight[k + 1]) + GRAVITY * (arm.mass / 2 + arm.clamp_mass)
         angle = math.atan2(carried, abs(force))
-        if math.degrees(angle) > STEEPEST_ARM:
+        if abs(math.degrees(angle)) > STEEPEST_ARM:
             where = f"at support {layout.alignment.support_name(k + 1, k + 2)} " if line.sequence else ""
             raise InputError(
                 f"The steady arm {where}of line '{line.name}' is pulled with {abs(force):.0f} N only and "
@@ -325,4 +325,7 @@ def in_wind(
     if line.sequence:
         return line.model_copy(update=changed)
     table = line.model_dump(exclude={"sources", "plan"}, exclude_none=True)
-    return type(line).model_validate(table | changed | {"spans": spans, "sequence": ({},) * spans})
+    points = [point for point in table["points"] if point["span"] <= spans]
+    return type(line).model_validate(
+        table | changed | {"spans": spans, "sequence": ({},) * spans, "points": points}
+    )

@@ -396,7 +396,7 @@ def warn_if_short(data: FlexibleCatenaryData, numerics: Numerics, runs: Runs) ->
     waves = data.plan is not None and data.plan.sideways_waves
     if data.arms_by_plan and not waves and to_kmh(runs.speeds[1]) > SIDEWAYS:
         slopes = [arm.slope for part in data.layout().tension_lengths for arm in pulled_arms(part.layout)]
-        steepest = math.degrees(math.atan(np.nanmax(slopes)))
+        steepest = math.degrees(math.atan(np.nanmax(np.abs(slopes))))
         if steepest > STEEP_ARM:
             cautions.append(
                 f"Steady arms of line '{data.name}' slope by up to {steepest:.0f}°, and the contact wire's "
