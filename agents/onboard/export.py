@@ -188,7 +188,8 @@ def _task(driver: Any, facts: Facts | None, settings: dict[str, Any]) -> Task:
     given |= {"speed_kmh": (float(slowest), float(high)), "pantograph_scatter": 0.0, "faults": ()}
     given |= wishes(driver) | settings
     example = on_example(run_settings(given))
-    speeds = (float(slowest), float(np.max(example.speed_kmh)))  # a drawn line may have fewer
+    # A drawn line may be for fewer speeds.
+    speeds = (float(np.min(given["speed_kmh"])), float(np.max(example.speed_kmh)))
     task = Task(example.model_copy(update={"speed_kmh": speeds}), keep_samples=False)
     task.reset(0, np.random.default_rng(0))
     return task

@@ -182,8 +182,8 @@ def _of_readings(context: Context) -> dict[str, Any]:
     zeros = [-1.0 / FORCE_DEVIATION if e.name == "force deviation" else -e.centre / e.scale for e in entries]
     by_speed = np.array([entry.slope / entry.scale for entry in entries])  # of an entry, for each m/s
     if layout.kind == CENTRED:
-        lift = context.pantograph.aerodynamic_coefficient * METRES_PER_SECOND**2
-        by_speed[-1] += 2 * lift * context.speed / context.nominal_force / entries[-1].scale
+        lift = 2 * of_nominal_force(context)["aerodynamic"] * context.speed
+        by_speed[-1] += lift / context.nominal_force / entries[-1].scale
     past = [[names.index(earlier(name, k)) for name in own] for k in range(1, layout.history + 1)]
     memory = [
         (place, int(span.split()[0]), float(ahead.split()[0]) / interval)
@@ -250,23 +250,21 @@ def _of_monitor(context: Context, delay: float, lag: float) -> dict[str, Any]:
         for channel in context.channels
     ]
     low_pass = butter(2, min(HIGHEST, 0.3 / interval), fs=1 / interval)
-    return (
-        of_shown_force(context.layout)
-        | of_nominal_force(context)
-        | {
-            "actions": context.actions,
-            "force_limit": context.force_limit,
-            "knows_force": context.layout.kind != DEVIATIONS,
-            "states": models[0].size,
-            "model_a": np.array([model.a for model in models]),
-            "model_b": np.array([model.b for model in models]),
-            "model_c": np.array([model.c[0] for model in models]),
-            "low_pass_a": low_pass[1],
-            "low_pass_b": low_pass[0],
-            "at_rest": lfilter_zi(*low_pass),
-            "shares": 1 - np.exp(-interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW])),
-        }
-    )
+    return {
+        **of_shown_force(context.layout),
+        **of_nominal_force(context),
+        "actions": context.actions,
+        "force_limit": context.force_limit,
+        "knows_force": context.layout.kind != DEVIATIONS,
+        "states": models[0].size,
+        "model_a": np.array([model.a for model in models]),
+        "model_b": np.array([model.b for model in models]),
+        "model_c": np.array([model.c[0] for model in models]),
+        "low_pass_a": low_pass[1],
+        "low_pass_b": low_pass[0],
+        "at_rest": lfilter_zi(*low_pass),
+        "shares": 1 - np.exp(-interval / np.array([WINDOW, SHORT_WINDOW, SHIFT_WINDOW])),
+    }
 
 
 def state_of(constants: dict[str, Any]) -> dict[str, Any]:

@@ -168,6 +168,15 @@ def test_repetitive_control_learns_on_at_another_speed(tmp_path):
     assert passed(FromStart(), BRAKING, controller)[1] < CLOSE
 
 
+def test_memory_lasts_at_the_lowest_speed_of_the_training_or_at_one_that_is_given():
+    usual, faster = (
+        exported("agent-any-line", catenary="re330", pantograph="dsa380", **given).constants["memory_steps"]
+        for given in ({}, {"speed_kmh": (290.0, 300.0)})
+    )
+    lowest = find_policy("agent-any-line").facts.environment["speed_kmh"][0]
+    assert (usual - 2) / (faster - 2) == pytest.approx(290.0 / lowest, rel=0.01)
+
+
 def test_plain_python_bears_the_same():
     controller = made("guarded:pd", HIGH_SPEED)
     plain = controller.controller()
